@@ -22,7 +22,7 @@ from heat_igl.drawing.discs import discs
 from heat_igl.geodesic import SolverChoice
 from heat_igl.io import ply
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
-from heat_igl.kernels.cloud.local_planes import tangent_planes
+from heat_igl.kernels.cloud.local_fits import tangent_planes
 from heat_igl.mesh.cloud_orientation import oriented
 from heat_igl.mesh.cloud_triangles import (
     cloud_triangles,
@@ -710,12 +710,12 @@ def test_points_come_before_their_nearest() -> None:
     P[40:80] = 1e-170 * np.random.default_rng(1).standard_normal((40, 3))
     tree = point_tree(P)
     np.testing.assert_array_equal(tree.P, P[tree.order])
-    index, square = tree.nearest(np.arange(300), 20)
+    index, reach = tree.nearest(np.arange(300), 20)
     np.testing.assert_array_equal(index[:, 0], np.arange(300))
-    assert (np.diff(square, axis=1) >= 0).all()
     far = np.square(tree.P[:, None] - tree.P).sum(axis=2)
-    np.testing.assert_allclose(square, np.sort(far, axis=1)[:, :20], rtol=1e-12)
-    np.testing.assert_allclose(np.take_along_axis(far, index, axis=1), square, rtol=1e-12)
+    near = np.take_along_axis(far, index, axis=1)
+    np.testing.assert_allclose(near, np.sort(far, axis=1)[:, :20], rtol=1e-12)
+    np.testing.assert_allclose(near[:, -1], reach**2, rtol=1e-12)
 
 
 def test_exact_distance_on_noisy_points() -> None:
@@ -733,7 +733,7 @@ def test_principal_axes() -> None:
     P = np.random.default_rng(0).uniform(-1, 1, (41, 3)) * [1, 0.8, 0.2]
     index = np.argsort(np.linalg.norm(P - P[0], axis=1)).astype(np.int32)[None]
     square = np.square(P[index[0]] - P[0]).sum(axis=1)[None]
-    axes, _, bend = tangent_planes(P, index, square, False)
+    axes, _, bend = tangent_planes(P, index, False)
     weights = np.maximum(1 - square[0] / square[0, -1], 1e-3)
     expected, vectors = np.linalg.eigh(
         np.cov((P[index[0]] - P[0]).T / np.sqrt(square[0, -1]), aweights=weights, ddof=0)
@@ -823,8 +823,8 @@ def test_directions_on_a_surface_that_cannot_be_oriented_are_an_error() -> None:
 def test_neighbours_on_another_sheet_are_left_out() -> None:
     P, _ = two_sheets(1500, 1.5 / np.sqrt(1500))
     tree = point_tree(P)
-    index, square = tree.nearest(np.arange(len(P)), 31)
-    kept, _, axes = one_sheet(tree.P, index, square, False)
+    index, _ = tree.nearest(np.arange(len(P)), 31)
+    kept, _, axes = one_sheet(tree.P, index, False)
     inner = (np.abs(tree.P[:, :2] - 0.5) < 0.35).all(axis=1)
     is_other = (tree.P[kept, 2] > 0) != (tree.P[:, None, 2] > 0)
     assert ((tree.P[index, 2] > 0) != (tree.P[:, None, 2] > 0))[inner].sum(axis=1).mean() > 10
@@ -836,8 +836,8 @@ def test_neighbours_on_another_sheet_are_left_out() -> None:
 def test_neighbours_across_a_right_angle_stay() -> None:
     P = plane(2000)
     folded = np.where(P[:, :1] < 0.5, P, np.stack([0 * P[:, 0] + 0.5, P[:, 1], P[:, 0] - 0.5], axis=1))
-    index, square = point_tree(folded).nearest(np.arange(2000), 31)
-    kept, _, _ = one_sheet(point_tree(folded).P, index, square, False)
+    index, _ = point_tree(folded).nearest(np.arange(2000), 31)
+    kept, _, _ = one_sheet(point_tree(folded).P, index, False)
     assert (kept[:, :8] >= 0).mean() > 0.99
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heat_igl.kernels.cloud.local_planes import tangent_planes
-from heat_igl.kernels.cloud.quadrics import onto_quadrics
+from heat_igl.kernels.cloud.local_fits import onto_quadrics, tangent_planes
 from heat_igl.mesh.neighbourhoods import point_tree
 
 rng = np.random.default_rng
@@ -16,8 +15,9 @@ rng = np.random.default_rng
 def test_a_quadric_is_that_of_weighted_least_squares(k: int) -> None:
     P = rng(7).random((400, 3)) * [1, 1, 0.1]
     tree = point_tree(P)
-    index, square = tree.nearest(np.arange(400), k)
-    axes, _, bend = tangent_planes(tree.P, index, square, False)
+    index, _ = tree.nearest(np.arange(400), k)
+    square = np.square(tree.P[index] - tree.P[:, None]).sum(axis=2)
+    axes, _, bend = tangent_planes(tree.P, index, False)
     # The order of the neighbours does not matter.
     moved, deviation, thickness = onto_quadrics(tree.P, np.append(index[:, :1], index[:, :0:-1], axis=1))
     np.testing.assert_allclose(thickness, bend, rtol=1e-9)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.kernels.cloud.empty_balls import on_one_side, roomiest_normals
-from heat_igl.kernels.cloud.local_planes import tangent_planes
-from heat_igl.kernels.cloud.quadrics import onto_quadrics
+from heat_igl.kernels.cloud.local_fits import onto_quadrics, tangent_planes
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -74,11 +73,11 @@ class PointTree:
         return _tree(self.P)
 
     def nearest(self, chosen: IntArray, k: int) -> tuple[AnyArray, FloatArray]:
-        """The k nearest points (b, k) int32 of some of `P`, themselves first, and the squared distances (b, k)."""
+        """The k nearest points (b, k) int32 of some of `P`, themselves first, and the distance (b,) of the last."""
         distance, index = self.tree.query(self.P[chosen], k)
         # Squares of distances may underflow, and then others are as near as the point itself.
         index[:, 0] = chosen
-        return index.astype(np.int32), np.square(distance)
+        return index.astype(np.int32), distance[:, -1]
 
     def moved(self, P: FloatArray) -> PointTree:
         """The same points, in the same order, at other positions (n, 3)."""
@@ -140,25 +139,23 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: 
     bend = np.zeros(len(P))
 
     def fill(rows: slice) -> None:
-        index, square = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
-        found.radius[rows] = found.reach[rows] = np.sqrt(square[:, -1])
+        index, found.reach[rows] = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
         if normals is not None:
-            found.axes[rows] = _axes_along(normals[rows])
+            found.radius[rows], found.axes[rows] = found.reach[rows], _axes_along(normals[rows])
         else:
-            found.axes[rows], found.radius[rows], bend[rows] = tangent_planes(P, index, square, shrinks)
+            shrunk = index.copy()
+            found.axes[rows], found.radius[rows], bend[rows] = tangent_planes(P, shrunk, shrinks)
+            index = np.where((bend[rows] > _SEVERAL_SHEETS)[:, None], index, shrunk)
         found.index[rows] = index
 
     over_rows(fill, len(P), _BLOCK)
     bent = np.flatnonzero(bend > _SEVERAL_SHEETS)
     if len(bent):
-        index, square = tree.nearest(bent, k + 1)
-        found.index[bent], found.radius[bent], found.axes[bent] = one_sheet(P, index, square, shrinks)
+        found.index[bent], found.radius[bent], found.axes[bent] = one_sheet(P, found.index[bent], shrinks)
     return found
 
 
-def one_sheet(
-    P: FloatArray, index: IntArray, square: FloatArray, shrinks: bool
-) -> tuple[IntArray, FloatArray, FloatArray]:
+def one_sheet(P: FloatArray, index: IntArray, shrinks: bool) -> tuple[IntArray, FloatArray, FloatArray]:
     """Neighbours on the same sheet of the surface as each of b points, and the tangent planes through them.
 
     The sheets of a thin part, or on the two sides of a narrow gap, nearly touch: the neighbours of a point are on
@@ -169,9 +166,9 @@ def one_sheet(
     ----------
     P : (n, 3) float64
         All points.
-    index, square : (b, k) int32, (b, k) float64
-        Neighbours, by distance and each point first, and the squared distances. Only neighbours that are among the b
-        points themselves are left out.
+    index : (b, k) int32
+        Neighbours, by distance and each point first. Only neighbours that are among the b points themselves are left
+        out.
     shrinks : bool
         Whether neighbourhoods are made smaller where that makes them flatter.
 
@@ -189,14 +186,14 @@ def one_sheet(
     number[index[:, 0]] = np.arange(len(index))
 
     def balls(rows: slice) -> tuple[FloatArray, FloatArray, FloatArray]:
-        normals, radii, room = roomiest_normals(P, index[rows], square[rows], directions)
+        normals, radii, room = roomiest_normals(P, index[rows], directions)
         return normals, radii, room
 
     normals, radii, room = map(np.concatenate, zip(*over_rows(balls, len(index), _BLOCK), strict=True))
 
     def seen(rows: slice) -> tuple[IntArray, FloatArray, FloatArray]:
-        kept, squares = on_one_side(P, index[rows], square[rows], number, normals, radii)
-        axes, radius, _ = tangent_planes(P, kept, squares, shrinks)
+        kept = on_one_side(P, index[rows], number, normals, radii)
+        axes, radius, _ = tangent_planes(P, kept, shrinks)
         return kept, radius, axes
 
     found, radius, axes = map(np.concatenate, zip(*over_rows(seen, len(index), _BLOCK), strict=True))

@@ -11,7 +11,6 @@ __all__ = ["on_one_side", "roomiest_normals"]
 def roomiest_normals(
     P: cython.const[cython.double][:, ::1],
     index: cython.const[cython.int][:, ::1],
-    square: cython.const[cython.double][:, ::1],
     directions: cython.const[cython.double][:, ::1],
 ):
     """Normals of points, on the side with most room for balls, and the radii of balls on both sides.
@@ -23,8 +22,8 @@ def roomiest_normals(
     ----------
     P : (n, 3) float64
         All points.
-    index, square : (b, k) int32, (b, k) float64
-        Neighbours of some points, by distance and each point first, and the squared distances.
+    index : (b, k) int32
+        Neighbours of some points, by distance and each point first.
     directions : (3, m) float64
         Unit vectors in all directions, in columns.
 
@@ -47,8 +46,7 @@ def roomiest_normals(
     row: cython.Py_ssize_t
     with cython.nogil:
         for row in range(index.shape[0]):
-            reach: cython.double = sqrt(square[row, square.shape[1] - 1])
-            _invert(P, index[row], square[row], reach, inverted)
+            reach: cython.double = _invert(P, index[row], inverted)
             _shares(inverted, directions, least)
             _average(directions, least, normal[row], free[row])
             radius[row, 0] = reach * _share(inverted, normal[row], 1.0)
@@ -60,21 +58,24 @@ def roomiest_normals(
 @cython.nogil
 @cython.exceptval(check=False)
 def _invert(
-    P: cython.const[cython.double][:, ::1],
-    index: cython.const[cython.int][::1],
-    square: cython.const[cython.double][::1],
-    reach: cython.double,
-    inverted: cython.double[:, ::1],
-) -> cython.void:
-    """The neighbours d as 2 R d / |d|^2, R the reach: a ball along u of radius R / max(that . u) is empty."""
+    P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][::1], inverted: cython.double[:, ::1]
+) -> cython.double:
+    """The neighbours d as 2 R d / |d|^2 (R is returned): the ball of radius R / max(that . u) along u is empty."""
     j: cython.Py_ssize_t
     x: cython.Py_ssize_t
+    last: cython.int = index[index.shape[0] - 1]
+    square: cython.double = 0.0
+    for x in range(3):
+        square += (P[last, x] - P[index[0], x]) * (P[last, x] - P[index[0], x])
+    reach: cython.double = max(sqrt(square), TINY)
     for j in range(index.shape[0]):
+        square = 0.0
         for x in range(3):
-            inverted[j, x] = 0.0
-            if square[j] > 0.0:
-                near: cython.double = max(square[j] / reach / reach, TINY)
-                inverted[j, x] = 2.0 * ((P[index[j], x] - P[index[0], x]) / reach) / near
+            inverted[j, x] = (P[index[j], x] - P[index[0], x]) / reach
+            square += inverted[j, x] * inverted[j, x]
+        for x in range(3):
+            inverted[j, x] *= 2.0 / max(square, TINY)
+    return reach
 
 
 @cython.cfunc
@@ -161,7 +162,6 @@ def _along(
 def on_one_side(
     P: cython.const[cython.double][:, ::1],
     index: cython.const[cython.int][:, ::1],
-    square: cython.const[cython.double][:, ::1],
     number: cython.const[cython.int][::1],
     normals: cython.const[cython.double][:, ::1],
     radii: cython.const[cython.double][:, ::1],
@@ -176,8 +176,8 @@ def on_one_side(
     ----------
     P : (n, 3) float64
         All points.
-    index, square : (c, k) int32, (c, k) float64
-        Neighbours, each point first, and the squared distances.
+    index : (c, k) int32
+        Neighbours, each point first.
     number : (n,) int32
         Row of each point in `normals` and `radii`, -1 if it has none: such neighbours are on one sheet with all.
     normals, radii : (b, 3) float64, (b, 2) float64
@@ -185,12 +185,11 @@ def on_one_side(
 
     Returns
     -------
-    index, square : (c, k) int32, (c, k) float64
+    (c, k) int32
         Those that stay, in the same order; -1 after the last.
     """
-    indices, squares = np.full((index.shape[0], index.shape[1]), -1, np.int32), np.zeros_like(square)
-    kept: cython.int[:, ::1] = indices
-    squared: cython.double[:, ::1] = squares
+    found = np.full((index.shape[0], index.shape[1]), -1, np.int32)
+    kept: cython.int[:, ::1] = found
     row: cython.Py_ssize_t
     j: cython.Py_ssize_t
     with cython.nogil:
@@ -204,12 +203,11 @@ def on_one_side(
                     or number[other] < 0
                     or _sees_the_same(P, at, other, number[at], number[other], normals, radii)
                 ):
-                    kept[row, size], squared[row, size] = other, square[row, j]
+                    kept[row, size] = other
                     size += 1
             if size < 4:
                 kept[row, :] = index[row, :]
-                squared[row, :] = square[row, :]
-    return indices, squares
+    return found
 
 
 @cython.cfunc

@@ -1,3 +1,7 @@
+cdef enum:
+    # Sums over neighbours are taken in so many parts, which vectors hold.
+    LANES = 4
+
 cdef extern from *:
     """
     // Least weight of a neighbour.
@@ -8,7 +12,7 @@ cdef extern from *:
     // stay below: neighbours on the other side of a thin part or beyond an edge bend the plane.
     #define BENT 0.02
     #define FLATTER 0.7
+    // Points on a line leave a quadric undetermined; so much on the diagonal, per neighbour, makes the smallest one.
+    #define DIAGONAL 1e-9
     """
-    double LEAST_WEIGHT, TINY, BENT, FLATTER
-
-cdef void principal(double[:, ::1] work, double[:, ::1] axes, double[::1] variances) noexcept nogil
+    double LEAST_WEIGHT, TINY, BENT, FLATTER, DIAGONAL

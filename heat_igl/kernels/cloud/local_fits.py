@@ -1,12 +1,71 @@
-"""Quadrics fitted to the neighbours of points. Points weigh 1 - (d / r)^2, at distance d of radius r."""
+"""Planes and quadrics fitted to the neighbours of points. Points weigh 1 - (d / r)^2, at distance d of radius r."""
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.local_planes import LEAST_WEIGHT, TINY, principal
-from cython.cimports.heat_igl.kernels.cloud.quadrics import DIAGONAL, LANES
-from cython.cimports.libc.math import sqrt
+from cython.cimports.heat_igl.kernels.cloud.local_fits import BENT, DIAGONAL, FLATTER, LANES, LEAST_WEIGHT, TINY
+from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["onto_quadrics"]
+__all__ = ["onto_quadrics", "tangent_planes"]
+
+
+def tangent_planes(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.int[:, ::1],
+    shrinks: cython.bint,
+):
+    """Tangents and normals of points, by principal components of neighbourhoods, some of which are made smaller.
+
+    Parameters
+    ----------
+    P : (n, 3) float64
+        All points.
+    index : (b, k) int32
+        Neighbours of some points, by distance and each point first, -1 after the last. Neighbours that are left out
+        become -1.
+    shrinks : bool
+        Whether two thirds, a half and a third of the neighbours are tried where the points vary much along the normal,
+        and those taken that are flatter.
+
+    Returns
+    -------
+    axes : (b, 3, 3) float64
+        Directions of most, less and least variance in rows, orthonormal.
+    radius : (b,) float64
+        Distance of the farthest neighbour that is left.
+    bend : (b,) float64
+        Ratio of the two smaller variances of all neighbours.
+    """
+    found, radii, bends = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0]), np.empty(index.shape[0])
+    bent: cython.double[::1] = bends
+    axes: cython.double[:, :, ::1] = found
+    radius: cython.double[::1] = radii
+    trial: cython.double[:, ::1] = np.empty((3, 3))
+    variances: cython.double[::1] = np.empty(3)
+    work: cython.double[:, ::1] = np.empty((6, 3))
+    local: cython.double[:, ::1] = _room_for(index.shape[1])
+    row: cython.Py_ssize_t
+    sixths: cython.Py_ssize_t
+    j: cython.Py_ssize_t
+    with cython.nogil:
+        for row in range(index.shape[0]):
+            k: cython.Py_ssize_t = index.shape[1]
+            while index[row, k - 1] < 0:
+                k -= 1
+            size: cython.Py_ssize_t = k
+            radius[row] = _principal_axes(P, index[row, :k], local, work, axes[row], variances)
+            bend: cython.double = variances[0] / max(variances[1], TINY)
+            bent[row] = bend
+            for sixths in range(4, 1, -1):
+                fewer: cython.Py_ssize_t = 1 + (k - 1) * sixths // 6
+                if not shrinks or bend <= BENT or fewer < 8:
+                    break
+                reach: cython.double = _principal_axes(P, index[row, :fewer], local, work, trial, variances)
+                if variances[0] < FLATTER * bend * variances[1]:
+                    bend, size, radius[row] = variances[0] / variances[1], fewer, reach
+                    axes[row, :, :] = trial
+            for j in range(size, k):
+                index[row, j] = -1
+    return found, radii, bends
 
 
 def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][:, ::1]):
@@ -34,8 +93,7 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
     moved: cython.double[:, ::1] = positions
     deviation: cython.double[::1] = deviations
     thickness: cython.double[::1] = ratios
-    # Sums are taken over LANES neighbours at a time; the last of these may be none, which weigh nothing.
-    local: cython.double[:, ::1] = np.zeros((4, (k + LANES - 1) // LANES * LANES))
+    local: cython.double[:, ::1] = _room_for(k)
     system: cython.double[:, ::1] = np.empty((6, 7))
     work: cython.double[:, ::1] = np.empty((6, 3))
     axes: cython.double[:, ::1] = np.empty((3, 3))
@@ -46,12 +104,10 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
     x: cython.int
     with cython.nogil:
         for row in range(b):
-            radius: cython.double = _around(P, index[row], local)
-            _covariance(local, work)
-            total: cython.double = work[3, 0]
-            principal(work, axes, variances)
+            radius: cython.double = _principal_axes(P, index[row], local, work, axes, variances)
             _turn(local, axes)
             _normal_equations(local, system)
+            total: cython.double = system[0, 0]
             for x in range(6):
                 system[x, x] += DIAGONAL * k
             _eliminate(system)
@@ -60,6 +116,29 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
             for x in range(3):
                 moved[row, x] = P[index[row, 0], x] + radius * system[0, 6] * axes[2, x]
     return positions, deviations, ratios
+
+
+def _room_for(k: cython.Py_ssize_t):
+    """Neighbours in columns. Sums are taken over LANES at a time; the last ones may be none, which weigh nothing."""
+    return np.zeros((4, (k + LANES - 1) // LANES * LANES))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _principal_axes(
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][::1],
+    local: cython.double[:, ::1],
+    work: cython.double[:, ::1],
+    axes: cython.double[:, ::1],
+    variances: cython.double[::1],
+) -> cython.double:
+    """Put the neighbours into `local`, and find their axes and variances; the radius."""
+    radius: cython.double = _around(P, index, local)
+    _covariance(local, work)
+    _principal(work, axes, variances)
+    return radius
 
 
 @cython.cfunc
@@ -89,6 +168,8 @@ def _around(
     for j in range(k):
         local[0, j], local[1, j], local[2, j] = scale * local[0, j], scale * local[1, j], scale * local[2, j]
         local[3, j] = max(1.0 - per_square * local[3, j], LEAST_WEIGHT)
+    for j in range(k, local.shape[1]):
+        local[3, j] = 0.0
     return radius
 
 
@@ -96,7 +177,7 @@ def _around(
 @cython.nogil
 @cython.exceptval(check=False)
 def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cython.void:
-    """The covariance in rows 0 to 2 of `work`, and the sum of the weights in row 3."""
+    """The covariance in rows 0 to 2 of `work`."""
     part: cython.double[40]
     sums: cython.double[10]
     c: cython.Py_ssize_t
@@ -131,7 +212,6 @@ def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cy
     work[0, 1] = work[1, 0] = sums[5] - sums[1] * sums[2]
     work[0, 2] = work[2, 0] = sums[6] - sums[1] * sums[3]
     work[1, 2] = work[2, 1] = sums[8] - sums[2] * sums[3]
-    work[3, 0] = sums[0]
 
 
 @cython.cfunc
@@ -246,3 +326,62 @@ def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1
             off -= system[3, 6] * x * x + system[4, 6] * x * y + system[5, 6] * y * y
             squares[lane] += local[3, j + lane] * off * off
     return squares[0] + squares[1] + squares[2] + squares[3]
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _principal(work: cython.double[:, ::1], axes: cython.double[:, ::1], variances: cython.double[::1]) -> cython.void:
+    """The axes of most, less and least variance, and the variances, ascending, of the covariance in rows 0 to 2."""
+    x: cython.int
+    y: cython.int
+    for x in range(3):
+        for y in range(3):
+            work[3 + x, y] = 1.0 if x == y else 0.0
+    for _sweep in range(30):
+        if not (_rotate(work, 0, 1) | _rotate(work, 0, 2) | _rotate(work, 1, 2)):
+            break
+    lowest: cython.int = 0 if work[0, 0] <= work[1, 1] else 1
+    highest: cython.int = 1 - lowest
+    if work[2, 2] < work[lowest, lowest]:
+        lowest = 2
+    elif work[2, 2] > work[highest, highest]:
+        highest = 2
+    # Of three numbers that add up to 3, the one in the middle.
+    middle: cython.int = 3 - lowest - highest
+    variances[0], variances[1], variances[2] = work[lowest, lowest], work[middle, middle], work[highest, highest]
+    for x in range(3):
+        axes[0, x], axes[1, x], axes[2, x] = work[3 + highest, x], work[3 + middle, x], work[3 + lowest, x]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _rotate(work: cython.double[:, ::1], p: cython.int, q: cython.int) -> cython.bint:
+    """One rotation of Jacobi's eigenvalue algorithm; False if entry (p, q) is zero already.
+
+    Rows 3 to 5 of `work` gather the eigenvectors.
+    """
+    entry: cython.double = work[p, q]
+    if fabs(entry) <= 1e-17 * (fabs(work[p, p]) + fabs(work[q, q])):
+        return False
+    half: cython.double = 0.5 * (work[q, q] - work[p, p]) / entry
+    tangent: cython.double = 1.0 / (fabs(half) + sqrt(half * half + 1.0))
+    if half < 0.0:
+        tangent = -tangent
+    cosine: cython.double = 1.0 / sqrt(tangent * tangent + 1.0)
+    sine: cython.double = tangent * cosine
+    r: cython.int = 3 - p - q
+    work[p, p] -= tangent * entry
+    work[q, q] += tangent * entry
+    work[p, q] = work[q, p] = 0.0
+    along: cython.double = work[r, p]
+    across: cython.double = work[r, q]
+    work[r, p] = work[p, r] = cosine * along - sine * across
+    work[r, q] = work[q, r] = sine * along + cosine * across
+    x: cython.int
+    for x in range(3):
+        along, across = work[3 + p, x], work[3 + q, x]
+        work[3 + p, x], work[3 + q, x] = cosine * along - sine * across, sine * along + cosine * across
+    return True
