@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import perturbed, zoo
+from surfaces import moebius_strip
 
 import heat_igl
 from heat_igl import (
@@ -138,21 +139,7 @@ def test_faces_turned_over_give_the_same_surface(cow):
 
 
 def test_moebius_strip_keeps_a_seam_and_its_area():
-    n = 40
-    angle = 2 * np.pi * np.arange(n) / n
-    V = []
-    for width in (-0.3, -0.1, 0.1, 0.3):
-        radius = 1 + width * np.cos(angle / 2)
-        V.append(np.stack([radius * np.cos(angle), radius * np.sin(angle), width * np.sin(angle / 2)], axis=1))
-    row = np.arange(3)[:, None]
-    k = np.arange(n)[None, :]
-    last = k == n - 1
-    index = lambda r, j: np.where(last & (j == 0), (3 - r) * n, r * n + j)  # noqa: E731
-    following = (k + 1) % n
-    a, b = row * n + k, index(row, following)
-    c, d = (row + 1) * n + k, index(row + 1, following)
-    F = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([b, d, c], -1).reshape(-1, 3)])
-    mesh = perturbed(Mesh(np.concatenate(V), F), 0.4)
+    mesh = perturbed(moebius_strip(40, 3), 0.4)
     found = delaunay(mesh)
     assert found.n_flips > 0
     assert not found.aligned.all()

@@ -16,8 +16,6 @@ import igl
 import numpy as np
 import psutil
 import pytest
-import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 from conftest import wheel_path, zoo
 from scipy.spatial import Delaunay
 
@@ -26,7 +24,7 @@ from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.reference import guarded, measurement, native
 from heat_igl.reference.steiner import graph_distance
 from heat_igl.runtime import PeakMemory
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 from heat_igl.validation import closed_forms
 
 SOLVERS = ("windows", *reference.EXACT_SOLVERS)
@@ -63,33 +61,9 @@ def flat_torus(n: int, m: int) -> tuple[Mesh, FloatArray, FloatArray]:
     return Mesh(V, F), np.stack([along.ravel(), up.ravel()], axis=1), np.array([n * side, 2.0])
 
 
-def zigzag(folds: int) -> Mesh:
-    """A strip folded like a map: much farther along it than across its bounding box."""
-    flat = rectangle(20 * folds + 1, 5, 4.0 * folds, 1.0)
-    x, y = flat.V[:, 0], flat.V[:, 1]
-    return Mesh(np.column_stack([np.abs(np.remainder(x + 4, 8) - 4), y, 0.01 * x]), flat.F)
-
-
 def relative(distance: FloatArray, truth: FloatArray) -> FloatArray:
     away = np.isfinite(truth) & (truth > 0)
     return np.asarray(np.abs(distance[away] - truth[away]) / truth[away])
-
-
-def paths_through_edge_points(mesh: Mesh, source: int, per_edge: int) -> FloatArray:
-    """Shortest paths through points on edges: an upper bound that shares nothing with the solvers under test."""
-    i, j = mesh.edges.T
-    weight = ((np.arange(per_edge) + 1) / (per_edge + 1))[:, None]
-    points = np.concatenate([mesh.V, (mesh.V[i][:, None] * (1 - weight) + mesh.V[j][:, None] * weight).reshape(-1, 3)])
-    number = {(int(a), int(b)): k for k, (a, b) in enumerate(mesh.edges)}
-    pairs = []
-    for face in np.sort(mesh.F, axis=1):
-        edge = [number[int(face[a]), int(face[b])] for a, b in ((0, 1), (1, 2), (0, 2))]
-        here = np.concatenate([face, *(mesh.n_vertices + e * per_edge + np.arange(per_edge) for e in edge)])
-        p, q = np.triu_indices(len(here), 1)
-        pairs.append(np.sort(np.stack([here[p], here[q]], axis=1), axis=1))
-    p, q = np.unique(np.concatenate(pairs), axis=0).T
-    graph = sp.csr_array((np.linalg.norm(points[p] - points[q], axis=1), (p, q)), shape=(len(points), len(points)))
-    return np.asarray(csgraph.dijkstra(graph, directed=False, indices=source)[: mesh.n_vertices])
 
 
 # --- exact -----------------------------------------------------------------------------------------------------------
@@ -126,7 +100,7 @@ def test_exact_is_approached_from_above_by_independent_paths() -> None:
     truth = reference.exact(mesh, 7)
     excess = []
     for per_edge in (3, 7, 15):
-        above = paths_through_edge_points(mesh, 7, per_edge)
+        above = graph_distance(mesh, 7, per_edge)[0]
         assert (above >= truth * (1 - 1e-12)).all()
         excess.append(relative(above, truth).mean())
     assert 3 < excess[0] / excess[1] < 6
@@ -296,52 +270,6 @@ def test_convex_solid_is_the_straight_line() -> None:
 # --- MeshLab and the other heat methods ------------------------------------------------------------------------------
 
 
-def test_front_of_meshlab_is_near_but_neither_exact_nor_a_bound() -> None:
-    mesh = cow()
-    errors, below, above = [], 0, 0
-    for seed in range(3):
-        source = source_on_largest_component(mesh, seed)
-        truth, front = reference.exact(mesh, source), reference.meshlab(mesh, source)
-        errors.append(relative(front, truth).mean())
-        below += int((front < truth * (1 - 1e-4)).sum())
-        above += int((front > truth * (1 + 1e-4)).sum())
-    assert 5e-4 < np.mean(errors) < 1e-2
-    assert below > 0
-    assert above > 0
-
-
-def test_default_cutoff_of_meshlab_writes_zeros_on_a_folded_sheet() -> None:
-    mesh = zigzag(6)
-    default = as_it_comes(mesh, 0, "compute_scalar_by_geodesic_distance_from_selection_per_vertex")
-    assert (default == 0).mean() > 0.5
-    ours = reference.meshlab(mesh, 0)
-    assert (ours == 0).sum() == 1
-    assert relative(ours, reference.exact(mesh, 0)).mean() < 0.01
-
-
-def filter_as_it_comes(V: FloatArray, F: IntArray, marks: FloatArray, name: str) -> dict[str, Any]:
-    """A filter of MeshLab with its default parameters; runs in the guarded child."""
-    import pymeshlab
-
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(V, F, v_scalar_array=marks))
-    meshes.compute_selection_by_condition_per_vertex(condselect="(q > 0.5)")
-    meshes.apply_filter(name)
-    return {"distance": meshes.current_mesh().vertex_scalar_array()}
-
-
-def as_it_comes(mesh: Mesh, source: int, name: str) -> FloatArray:
-    marks = np.zeros(mesh.n_vertices)
-    marks[source] = 1
-    arrays = {"V": mesh.V, "F": mesh.F, "marks": marks}
-    reply = guarded.call("test_reference:filter_as_it_comes", arrays, {"name": name})
-    return np.asarray(reply.values["distance"])
-
-
-def test_border_of_a_closed_surface_is_infinitely_far() -> None:
-    assert np.isinf(reference.meshlab_border(shapes.icosphere(1))).all()
-
-
 def test_heat_filter_of_meshlab_survives_an_offset() -> None:
     mesh = cow()
     near = reference.meshlab_heat(mesh, 5)
@@ -349,7 +277,6 @@ def test_heat_filter_of_meshlab_survives_an_offset() -> None:
     # At 1e6 the coordinates keep ten digits, of which single precision leaves none.
     far = Mesh(mesh.V + 1e6, mesh.F)
     assert relative(reference.meshlab_heat(far, 5), near).max() < 1e-2
-    assert np.isnan(as_it_comes(far, 5, "compute_scalar_by_heat_geodesic_distance_from_selection_per_vertex")).all()
 
 
 INEXACT: dict[str, Callable[..., FloatArray]] = {
