@@ -184,7 +184,7 @@ class GeodesicPathSolver:
     @property
     def _routes(self) -> Router:
         if self._router is None:
-            self._router = Router(self._mesh, self._shortener.surface)
+            self._router = Router(self._mesh, self._shortener.faces)
         return self._router
 
     def _loop(self, legs: list[Course]) -> SurfaceCurve:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from heat_igl.curves.shortening import Course
-from heat_igl.curves.surface import Surface
 from heat_igl.errors import SourceError
 from heat_igl.kernels.paths import routes
 from heat_igl.mesh import Mesh
@@ -22,9 +21,9 @@ kernel: Any = routes
 class Router:
     """Finds courses through places on a mesh; the tables are made once. Each thread needs an object of its own."""
 
-    def __init__(self, mesh: Mesh, surface: Surface) -> None:
+    def __init__(self, mesh: Mesh, faces: Any) -> None:
         self._mesh = mesh
-        self._routes = kernel.EdgeRoutes(surface, mesh.V)
+        self._routes = kernel.EdgeRoutes(faces, mesh.V)
 
     def legs(self, faces: IntArray, barycentric: FloatArray) -> list[Course]:
         """The k - 1 courses between places (k,), each from one to the next.

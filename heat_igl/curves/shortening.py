@@ -5,21 +5,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import igl
 import numpy as np
 
 from heat_igl.curves.places import snapped
-from heat_igl.curves.surface import Surface, opposite_sides, surface
 from heat_igl.errors import SourceError
+from heat_igl.intrinsic import corner_angles
 from heat_igl.kernels.mesh import polar_angles
-from heat_igl.kernels.paths import shortening
+from heat_igl.kernels.paths import shortening, strips
 from heat_igl.mesh import Mesh, SurfaceCurve, is_oriented_manifold
+from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["Course", "Shortened", "Shortener", "as_curve", "course_of"]
 
-# The compiled module, whose signatures are those of Cython.
+# The compiled modules, whose signatures are those of Cython.
 kernel: Any = shortening
+tables: Any = strips
+# Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
+_SHORTEST = 1e-12
+# Of each face the edge `length` opposite each corner, the `angle` at each, `vertex` and `edge` numbers. Corner c lies
+# `along` of the way from corner c + 2 to c + 1, and `above` this edge, in lengths of the edge.
+_FACE = np.dtype(
+    [*((name, "f8", 3) for name in ("length", "angle", "along", "above")), ("vertex", "i4", 3), ("edge", "i4", 3)]
+)
 # Segments are joined if their ends are no farther apart than this, in mean edge lengths.
 _GAP = 1e-6
 
@@ -113,24 +123,29 @@ class Shortener:
 
     Attributes
     ----------
-    surface : Surface
-        The triangles.
+    faces : FaceTable
+        The triangles, for other kernels.
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        self.surface = surface(mesh)
-        triangle = self.surface.triangle
-        sums = np.bincount(triangle["vertex"].ravel(), triangle["angle"].ravel(), mesh.n_vertices)
+        self._mesh = mesh
+        face, edge = _faces(mesh), mesh.facets
+        first_side, side = (rows.astype(np.int32) for rows in group_by_label(edge.of_face.ravel(), len(edge.n_faces)))
+        first_corner, corner = (rows.astype(np.int32) for rows in group_by_label(mesh.F.ravel(), mesh.n_vertices))
+        self.faces = tables.FaceTable(face, first_side, side, first_corner, corner)
+        sums = np.bincount(mesh.F.ravel(), face["angle"].ravel(), mesh.n_vertices)
         # At a vertex with angles of 2 pi or more, and on the boundary, at most one side is locally shortest. On edges
         # of more than two faces there are more than two sides.
-        sums[mesh.facets.vertices[mesh.facets.n_faces != 2]] = np.inf
+        sums[edge.vertices[edge.n_faces != 2]] = np.inf
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
-        most_corners = int(np.diff(self.surface.first_corner).max())
         directions = np.empty(0), np.empty(0), np.empty(0, np.int32)
-        if mesh.facets.n_faces.max() <= 2 and is_oriented_manifold(mesh):
-            opposite = opposite_sides(self.surface)
-            directions = *_directions(self.surface, opposite), opposite
-        self._kernel = kernel.Shortener(self.surface, half_turn, most_corners, directions)
+        if edge.n_faces.max() <= 2 and is_oriented_manifold(mesh):
+            opposite = np.full(len(side), -1, np.int32)
+            inner = first_side[:-1][edge.n_faces == 2]
+            opposite[side[inner]], opposite[side[inner + 1]] = side[inner + 1], side[inner]
+            first = np.where(np.diff(first_corner) > 0, corner[np.minimum(first_corner[:-1], len(corner) - 1)], -1)
+            directions = *_directions(face["angle"].ravel(), opposite, first), opposite
+        self._kernel = kernel.Shortener(self.faces, half_turn, int(np.diff(first_corner).max()), directions)
 
     def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
         """The locally shortest curve of the class of a course: between the ends, or as a loop."""
@@ -141,20 +156,30 @@ class Shortener:
             # it to itself.
             vertex = joins[stuck, 2]
             faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
-            at = (self.surface.triangle["vertex"][faces[[0, -1]]] == vertex).astype(float)
+            at = (self._mesh.F[faces[[0, -1]]] == vertex).astype(float)
             _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False)
         return Shortened(*found)
 
 
-def _directions(surface: Surface, opposite: AnyArray) -> tuple[FloatArray, FloatArray]:
+def _faces(mesh: Mesh) -> AnyArray:
+    """The faces (m,) as the kernels read them, see `_FACE`."""
+    # Not mollified: mollification gives a flat triangle some height, and would bend the paths across it.
+    lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
+    face = np.empty(mesh.n_faces, _FACE)
+    face["length"], face["angle"] = lengths, corner_angles(lengths)
+    base, left, right = lengths, np.roll(lengths, -1, axis=1), np.roll(lengths, -2, axis=1)
+    half = (base + left + right) / 2
+    # By Heron's formula. `left` is the side from corner c to corner c + 2.
+    face["along"] = ((left - right) * (left + right) / base + base) / (2 * base)
+    face["above"] = 2 * np.sqrt(np.maximum(half * (half - base) * (half - left) * (half - right), 0)) / base**2
+    face["vertex"], face["edge"] = mesh.F, mesh.facets.of_face
+    return face
+
+
+def _directions(angles: FloatArray, opposite: AnyArray, first: AnyArray) -> tuple[FloatArray, FloatArray]:
     """The angle (3 m,) of each corner's right side around its vertex, and the sums (n,), negative on the boundary."""
-    first = surface.first_corner[:-1].astype(np.int64)
-    is_used = np.diff(surface.first_corner) > 0
-    first[is_used] = surface.corner[first[is_used]]
-    first[~is_used] = -1
     leaving = np.zeros(len(opposite))
-    angles = surface.triangle["angle"].ravel()
-    sums, _, closes = polar_angles.polar_angles(angles, opposite.astype(np.int64), first, leaving)
+    sums, _, closes = polar_angles.polar_angles(angles, opposite.astype(np.int64), first.astype(np.int64), leaving)
     # The half-edge that leaves from a corner is the side opposite the corner before.
     return np.roll(leaving.reshape(-1, 3), 1, axis=1).ravel(), np.where(closes, sums, -sums)
 

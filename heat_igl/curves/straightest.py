@@ -167,10 +167,8 @@ class Tracer:
         self._mesh, self._surface = as_simplices(given), tangent_surface(given)
         self._frames: TangentFrames = tangent_frames(given)
         triangulation, polar = self._frames.triangulation, self._frames.angles
-        half = np.where(polar.on_boundary, -1.0, polar.sums / 2)[self._surface.F]
-        self._tables = kernel.Triangles(
-            triangulation.l, triangulation.areas, polar.corners, triangulation.twin, np.ascontiguousarray(half)
-        )
+        half = np.ascontiguousarray(np.where(polar.on_boundary, -1.0, polar.sums / 2)[self._surface.F])
+        self._triangles = triangulation.l, triangulation.areas, polar.corners, triangulation.twin, half
 
     @property
     def curvature(self) -> float:
@@ -267,7 +265,7 @@ class Tracer:
 
         def work(part: slice) -> None:
             given = (starts.faces[part], starts.barycentric[part], turn[part], lengths[part])
-            kernel.trace(self._tables, *given, *(field[part] for field in found), *none)
+            kernel.trace(self._triangles, *given, *(field[part] for field in found), *none)
 
         threads = n_threads() if k >= _FEW else 1
         bounds = np.linspace(0, k, threads + 1).astype(int)
@@ -282,7 +280,7 @@ class Tracer:
         n = int(found.counts[0])
         faces, points = np.empty(n, np.int64), np.empty((n, 2, 3))
         given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
-        kernel.trace(self._tables, *given, *found, np.zeros(1, np.int64), faces, points)
+        kernel.trace(self._triangles, *given, *found, np.zeros(1, np.int64), faces, points)
         faces, points = on_one_side(faces, points, self._mesh.n_faces)
         return SurfaceCurve(faces, points[:, 0], points[:, 1], mesh=self._mesh)
 

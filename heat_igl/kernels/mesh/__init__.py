@@ -1,1 +1,17 @@
-"""Triangles known by their edge lengths: checked, glued, numbered, flipped and refined; bounds of distances."""
+"""Triangles by their corners and edge lengths: checked, joined along edges, numbered, flipped and refined.
+
+Half-edge ``3 f + c`` is the side of face f opposite its corner c; `triangles.pxd` steps from one to the next. A mesh
+goes through these modules, as far as its use needs:
+
+1. `mesh_arrays` checks positions and faces when a mesh is made, and `incidence` finds its edges and components.
+2. `gluing` joins the half-edges that share an edge and takes their lengths, without the edges of a mesh;
+   `numbering` brings neighbours near each other in memory.
+3. `flipping` makes the triangulation Delaunay where nobody asks for the history of the flips, as windows from vertices.
+   Flips with a history are in `heat_igl.intrinsic`.
+4. `refinement` splits faces of a Delaunay triangulation and flips edges until no angle is small, and records the moves;
+   `carrying` finds the faces that points are in after them.
+5. `polar_angles` sums the angles around vertices for tangent frames.
+6. `side_derivatives` leads derivatives by edge lengths back to the positions.
+
+`bounds` and `checking` are about distances: what edges and straight lines say of them without a search.
+"""

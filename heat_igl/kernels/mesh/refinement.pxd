@@ -9,6 +9,9 @@ cdef extern from *:
     const double SHARPEST
 
 cdef enum:
+    # Kinds of moves, as `heat_igl.intrinsic.history` has them.
+    SPLIT = 0
+    FLIP = 1
     # A walk to a circumcenter crosses few triangles, since the triangulation is Delaunay.
     MOST_STEPS = 200
 

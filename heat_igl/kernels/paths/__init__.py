@@ -5,10 +5,10 @@ distance is needed. `heat_igl.curves.shortening` and `.straightest` make the arg
 
 1. `routes`: a path between two places begins as the shortest way along edges, found by A*. A curve that is given
    begins as it is.
-2. `strips`: the faces that the curve runs through make a strip; where it passes a vertex, the strip is led around it the
+2. `strips`: the faces that a curve runs through make a strip; where it passes a vertex, the strip is led around it the
    shorter way (`Detour`). Laid out in the plane, the strip is a polygon, in which a funnel finds the shortest path
    (`Layout`).
-3. `straightening`: where that path bends at a vertex with an angle below pi on another side, the strip is led there, and
+3. `straightening`: where that path bends at a vertex with an angle below pi on another side, the strip is led there and
    step 2 is repeated until there is no such bend (`Course`). Vertices with less than 2 pi can be passed on both sides:
    the other side is tried, and kept if the path becomes shorter (`Passing`).
 4. `shortening`: an open curve is done then. A loop is first relaxed as a polyline of vertices, the smallest angle first

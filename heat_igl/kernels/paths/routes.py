@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.paths.strips import Surface
+from cython.cimports.heat_igl.kernels.paths.strips import FaceTable
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.libc.math import INFINITY, sqrt
 
@@ -14,7 +14,7 @@ __all__ = ["EdgeRoutes"]
 class EdgeRoutes:
     """The edges of a surface, and the state of a search; `position` (n, 3) are the places of the vertices."""
 
-    s: Surface
+    s: FaceTable
     position: cython.const[cython.double][:, ::1]
     # Of each vertex: the length of the best way to it, where this comes from, and the face of the last part.
     length: cython.double[::1]
@@ -27,8 +27,8 @@ class EdgeRoutes:
     queue: PriorityQueue
     goal: cython.double[3]
 
-    def __init__(self, surface, position):
-        self.s, self.position = Surface(surface), position
+    def __init__(self, faces: FaceTable, position):
+        self.s, self.position = faces, position
         n = len(position)
         self.length, self.before, self.face = np.full(n, np.inf), np.empty(n, np.int32), np.empty(n, np.int32)
         self.touched, self.queue = np.empty(n, np.int32), PriorityQueue(n)

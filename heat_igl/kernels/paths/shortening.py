@@ -31,9 +31,9 @@ from cython.cimports.heat_igl.kernels.paths.straightening import (
 from cython.cimports.heat_igl.kernels.paths.strips import (
     SNAP,
     Crossing,
+    FaceTable,
     Place,
     Strip,
-    Surface,
     at_corner,
     corner_of,
     side_of,
@@ -211,7 +211,7 @@ class Polyline:
     """
 
     course: Course
-    s: Surface
+    s: FaceTable
     polar: cython.const[cython.double][::1]
     across: cython.const[cython.int][::1]
     is_oriented: cython.bint
@@ -600,15 +600,15 @@ class Loop:
 @cython.final
 @cython.cclass
 class Shortener:
-    """Shortens curves on one surface, one after another; see `heat_igl.curves.shortening.Shortener`."""
+    """Shortens curves on the same faces, one after another; see `heat_igl.curves.shortening.Shortener`."""
 
     course: Course
     passing: Passing
     loop: Loop
     length: cython.double
 
-    def __init__(self, surface, half_turn, most_corners, directions):
-        self.course = Course(Surface(surface), most_corners)
+    def __init__(self, faces: FaceTable, half_turn, most_corners, directions):
+        self.course = Course(faces, most_corners)
         self.passing = Passing(self.course, half_turn)
         self.loop = Loop(self.passing, most_corners, *directions)
 

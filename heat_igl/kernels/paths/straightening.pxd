@@ -1,4 +1,4 @@
-from heat_igl.kernels.paths.strips cimport Detour, Layout, Place, Strip, Surface
+from heat_igl.kernels.paths.strips cimport Detour, Layout, Place, Strip, FaceTable
 
 cdef extern from *:
     """
@@ -35,7 +35,7 @@ cdef struct Choice:
 
 
 cdef class Course:
-    cdef Surface s
+    cdef FaceTable s
     cdef Strip strip, straighter
     cdef Detour detour
     cdef Layout layout

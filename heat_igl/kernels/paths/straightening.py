@@ -17,11 +17,11 @@ from cython.cimports.heat_igl.kernels.paths.straightening import (
 )
 from cython.cimports.heat_igl.kernels.paths.strips import (
     Detour,
+    FaceTable,
     Layout,
     Place,
     Sides,
     Strip,
-    Surface,
     at_corner,
     corner_of,
     moved,
@@ -44,7 +44,7 @@ class Course:
     It starts at `start` in `face`, at `vertex` if that is not -1, and ends at `end` in the last face of the strip.
     """
 
-    def __init__(self, s: Surface, n_corners):
+    def __init__(self, s: FaceTable, n_corners):
         self.s = s
         self.strip, self.straighter, self.detour, self.layout = Strip(), Strip(), Detour(n_corners), Layout()
         self.segment = np.empty(64, _SEGMENT)

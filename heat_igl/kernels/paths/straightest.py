@@ -5,24 +5,7 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import foot
 from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_SIDE, PI, Layout, Ray
 from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
 
-__all__ = ["Triangles", "trace"]
-
-
-@cython.cclass
-class Triangles:
-    """m triangles by edge lengths `l` (m, 3) > 0, areas (m,) and angles (m, 3), glued by `twin` (3 m,).
-
-    `half` (m, 3) is at each corner half the sum of the angles around the vertex, and negative on the boundary.
-    """
-
-    l: cython.double[:, ::1]
-    area: cython.double[::1]
-    angle: cython.double[:, ::1]
-    twin: cython.longlong[::1]
-    half: cython.double[:, ::1]
-
-    def __init__(self, l, area, angle, twin, half):
-        self.l, self.area, self.angle, self.twin, self.half = l, area, angle, twin, half
+__all__ = ["trace"]
 
 
 @cython.final
@@ -30,7 +13,11 @@ class Triangles:
 class _Tracer:
     """Triangles, the geodesic being traced, and room for the segments of all, if they are stored."""
 
-    tables: Triangles
+    l: cython.double[:, ::1]
+    area: cython.double[::1]
+    angle: cython.double[:, ::1]
+    twin: cython.longlong[::1]
+    half: cython.double[:, ::1]
     stores: cython.bint
     faces: cython.longlong[::1]
     points: cython.double[:, :, ::1]
@@ -108,13 +95,13 @@ class _Tracer:
             if self.entry[c] == 1.0:
                 # In a vertex: the angle from the side that leaves from this corner.
                 if c == 1:
-                    turn -= PI - self.tables.angle[f, 1]
+                    turn -= PI - self.angle[f, 1]
                 elif c == 2:
-                    turn += PI - self.tables.angle[f, 0]
+                    turn += PI - self.angle[f, 0]
                 if turn > PI:
                     turn -= 2.0 * PI
-                if turn > self.tables.angle[f, c] and turn - self.tables.angle[f, c] < LEAST_ANGLE:
-                    turn = self.tables.angle[f, c]
+                if turn > self.angle[f, c] and turn - self.angle[f, c] < LEAST_ANGLE:
+                    turn = self.angle[f, c]
                 if turn < 0.0 and turn > -LEAST_ANGLE:
                     turn = 0.0
                 return self.leave_corner(3 * f + c, turn)
@@ -134,14 +121,14 @@ class _Tracer:
         f: cython.longlong = corner // 3
         k: cython.int = corner % 3
         t: cython.longlong
-        half: cython.double = self.tables.half[f, k]
+        half: cython.double = self.half[f, k]
         if half > 0.0:
             while turn < 0.0:
                 turn += 2.0 * half
         steps: cython.longlong = 0
         while turn < 0.0:
             # Clockwise; on the boundary only.
-            t = self.tables.twin[3 * f + (k + 2) % 3]
+            t = self.twin[3 * f + (k + 2) % 3]
             if t < 0:
                 if turn < -LEAST_ANGLE:
                     return False
@@ -149,16 +136,16 @@ class _Tracer:
                 break
             f = t // 3
             k = (t % 3 + 2) % 3
-            turn += self.tables.angle[f, k]
-        while turn > self.tables.angle[f, k]:
-            t = self.tables.twin[3 * f + (k + 1) % 3]
+            turn += self.angle[f, k]
+        while turn > self.angle[f, k]:
+            t = self.twin[3 * f + (k + 1) % 3]
             steps += 1
             if t < 0 or steps > MOST_IDLE:
-                if turn - self.tables.angle[f, k] > LEAST_ANGLE:
+                if turn - self.angle[f, k] > LEAST_ANGLE:
                     return False
-                turn = self.tables.angle[f, k]
+                turn = self.angle[f, k]
                 break
-            turn -= self.tables.angle[f, k]
+            turn -= self.angle[f, k]
             f = t // 3
             k = (t % 3 + 1) % 3
         self.ray.h = 3 * f + (k + 2) % 3
@@ -175,11 +162,11 @@ class _Tracer:
         p = cython.address(self.face)
         f: cython.longlong = self.ray.h // 3
         side: cython.int = self.ray.h % 3
-        base: cython.double = self.tables.l[f, side]
+        base: cython.double = self.l[f, side]
         p.f, p.side = f, side
         p.x[0], p.y[0], p.x[1], p.y[1] = 0.0, 0.0, base, 0.0
-        p.x[2] = foot(base, self.tables.l[f, (side + 2) % 3], self.tables.l[f, (side + 1) % 3])
-        p.y[2] = 2.0 * self.tables.area[f] / base
+        p.x[2] = foot(base, self.l[f, (side + 2) % 3], self.l[f, (side + 1) % 3])
+        p.y[2] = 2.0 * self.area[f] / base
         if self.ray.is_inside:
             p.start_x = self.entry[1] * base + self.entry[2] * p.x[2]
             p.start_y = self.entry[2] * p.y[2]
@@ -212,7 +199,7 @@ class _Tracer:
                 a = dx * (p.y[c] - p.start_y) - dy * (p.x[c] - p.start_x)
                 b = dx * (p.y[(c + 1) % 3] - p.start_y) - dy * (p.x[(c + 1) % 3] - p.start_x)
                 between: cython.double = min(-a, b)
-                if fabs(a) + fabs(b) < ON_SIDE * self.tables.l[p.f, (p.side + c) % 3]:
+                if fabs(a) + fabs(b) < ON_SIDE * self.l[p.f, (p.side + c) % 3]:
                     # It runs along this side, and leaves at the end: a crossing would be rounding.
                     between -= 1e200
                 if between > best:
@@ -230,7 +217,7 @@ class _Tracer:
         p.k = k
         # Rounding moves a ray by a share of the way that it has come: near its start it may pass a vertex close by.
         come: cython.double = travelled + self.along(c, share)
-        near: cython.double = ON_SIDE * min(come / self.tables.l[p.f, (p.side + k) % 3], 1.0)
+        near: cython.double = ON_SIDE * min(come / self.l[p.f, (p.side + k) % 3], 1.0)
         if share < near:
             share = 0.0
         elif share > 1.0 - near:
@@ -261,7 +248,7 @@ class _Tracer:
         p = cython.address(self.face)
         c: cython.int = (p.k + 1) % 3 if p.share == 1.0 else p.k
         corner: cython.longlong = 3 * p.f + (p.side + 1 + c) % 3
-        half: cython.double = self.tables.half[p.f, corner % 3]
+        half: cython.double = self.half[p.f, corner % 3]
         a: cython.double = p.x[(c + 1) % 3] - p.x[c]
         b: cython.double = p.y[(c + 1) % 3] - p.y[c]
         dx: cython.double = self.ray.dx
@@ -269,7 +256,7 @@ class _Tracer:
         # Of the side that leaves from the vertex, the angle to the incoming ray.
         turn: cython.double = atan2(-(a * dy - b * dx), -(a * dx + b * dy))
         # A ray that passes the vertex very near may come from beyond either side.
-        if turn < 0.5 * self.tables.angle[p.f, corner % 3] - PI:
+        if turn < 0.5 * self.angle[p.f, corner % 3] - PI:
             turn += 2.0 * PI
         if half > 0.0:
             self.leave_corner(corner, turn + half)
@@ -290,11 +277,11 @@ class _Tracer:
         p = cython.address(self.face)
         c: cython.int = (p.k + 1) % 3
         h: cython.longlong = 3 * p.f + (p.side + p.k) % 3
-        t: cython.longlong = self.tables.twin[h]
+        t: cython.longlong = self.twin[h]
         if t < 0:
             return False
-        a: cython.double = (p.x[c] - p.x[p.k]) / self.tables.l[p.f, h % 3]
-        b: cython.double = (p.y[c] - p.y[p.k]) / self.tables.l[p.f, h % 3]
+        a: cython.double = (p.x[c] - p.x[p.k]) / self.l[p.f, h % 3]
+        b: cython.double = (p.y[c] - p.y[p.k]) / self.l[p.f, h % 3]
         # The other face sees the side from head to tail.
         dx: cython.double = -(self.ray.dx * a + self.ray.dy * b)
         dy: cython.double = fabs(a * self.ray.dy - b * self.ray.dx)
@@ -319,7 +306,7 @@ class _Tracer:
 
 
 def trace(
-    tables: Triangles,
+    triangles,
     face: cython.longlong[::1],
     at: cython.double[:, ::1],
     turn: cython.double[::1],
@@ -332,13 +319,16 @@ def trace(
     faces: cython.longlong[::1],
     points: cython.double[:, :, ::1],
 ):
-    """Trace k geodesics: fill their ends, the lengths travelled and the numbers of their segments (k,).
+    """Trace k geodesics over triangles: fill their ends, the lengths travelled and the numbers of their segments (k,).
 
+    `triangles` are edge lengths (m, 3) > 0, areas (m,), angles (m, 3), twins (3 m,), and at each corner (m, 3) half the
+    sum of the angles around the vertex, negative on the boundary.
     If `first` has k entries, the segments of geodesic i are stored from `first[i]` on: faces (s,) and the barycentric
     coordinates of both ends (s, 2, 3).
     """
     tracer = _Tracer()
-    tracer.tables, tracer.faces, tracer.points = tables, faces, points
+    tracer.l, tracer.area, tracer.angle, tracer.twin, tracer.half = triangles
+    tracer.faces, tracer.points = faces, points
     tracer.stores = first.shape[0] > 0
     i: cython.Py_ssize_t
     with cython.nogil:

@@ -20,13 +20,13 @@ cdef struct Place:
     double c[3]
 
 
-cdef class Surface:
+cdef class FaceTable:
     cdef const Triangle[::1] triangle
     cdef const int[::1] first_side, side, first_corner, corner
 
 
 # The corner of face f at vertex v, -1 if it has none.
-cdef inline int corner_of(Surface s, int f, int v) noexcept nogil:
+cdef inline int corner_of(FaceTable s, int f, int v) noexcept nogil:
     cdef const Triangle* t = &s.triangle[f]
     if t.vertex[0] == v:
         return 0
@@ -36,12 +36,12 @@ cdef inline int corner_of(Surface s, int f, int v) noexcept nogil:
 
 
 # The other half-edge of the face of h at its vertex v.
-cdef inline int other_side(Surface s, int h, int v) noexcept nogil:
+cdef inline int other_side(FaceTable s, int h, int v) noexcept nogil:
     return 3 * (h // 3) + 3 - h % 3 - corner_of(s, h // 3, v)
 
 
 # The vertex at a point of face f, -1 if there is none.
-cdef inline int vertex_at(Surface s, int f, const Place* x) noexcept nogil:
+cdef inline int vertex_at(FaceTable s, int f, const Place* x) noexcept nogil:
     cdef int c
     for c in range(3):
         if x.c[c] > 1.0 - SNAP:
@@ -66,7 +66,7 @@ cdef inline Place at_corner(int c) noexcept nogil:
 
 
 # A point x in the face of half-edge h on that edge, in the face of half-edge g on the same edge.
-cdef inline Place moved(Surface s, int h, int g, const Place* x) noexcept nogil:
+cdef inline Place moved(FaceTable s, int h, int g, const Place* x) noexcept nogil:
     cdef Place there
     cdef int c
     there.c[0] = there.c[1] = there.c[2] = 0.0
@@ -111,9 +111,9 @@ cdef class Detour:
     cdef Crossing[::1] way
 
     cdef int find(
-        self, Surface s, int v, int h, Sides before, int goal, int end, Sides after, double limit
+        self, FaceTable s, int v, int h, Sides before, int goal, int end, Sides after, double limit
     ) noexcept nogil
-    cdef int turn_back(self, Surface s, int v, int h, double before, int end, double after, double limit) noexcept nogil
+    cdef int turn_back(self, FaceTable s, int v, int h, double before, int end, double after, double limit) noexcept nogil
     cdef bint _is_entered(self, int g, int n_steps) noexcept nogil
     cdef int _crossings(self, int last) noexcept nogil
 
@@ -143,7 +143,7 @@ cdef class Layout:
     cdef Corners first, last
     cdef double x, y
 
-    cdef int lay_out(self, Surface s, int face, const Place* start, Strip strip) except -1 nogil
+    cdef int lay_out(self, FaceTable s, int face, const Place* start, Strip strip) except -1 nogil
     cdef void pull_tight(self, double x, double y) noexcept nogil
     cdef void _bend_at(self, int count, int side, int at) noexcept nogil
     cdef double length(self) noexcept nogil

@@ -19,7 +19,7 @@ from cython.cimports.heat_igl.kernels.paths.strips import (
 )
 from cython.cimports.libc.math import hypot, sqrt
 
-__all__ = ["Detour", "Layout", "Strip", "Surface"]
+__all__ = ["Detour", "Layout", "Strip", "FaceTable"]
 
 _CROSSING = np.dtype([("leave", "i4"), ("enter", "i4")])
 _AROUND = np.dtype([("enter", "i4"), ("leave", "i4"), ("before", "i4")])
@@ -30,13 +30,17 @@ _BEND = np.dtype([("x", "f8"), ("y", "f8"), ("side", "i4"), ("first", "i4"), ("l
 
 @cython.final
 @cython.cclass
-class Surface:
-    """Views of the arrays of `heat_igl.curves.surface.Surface`."""
+class FaceTable:
+    """m faces on n vertices, which need not be oriented alike, and k edges.
 
-    def __init__(self, surface):
-        self.triangle = surface.triangle
-        self.first_side, self.side = surface.first_side, surface.side
-        self.first_corner, self.corner = surface.first_corner, surface.corner
+    `face` (m,) are structures as `heat_igl.curves.shortening` makes them. The half-edges of edge e are
+    ``side[first_side[e]:first_side[e + 1]]``, and the corners at vertex v, numbered like half-edges,
+    ``corner[first_corner[v]:first_corner[v + 1]]``.
+    """
+
+    def __init__(self, face, first_side, side, first_corner, corner):
+        self.triangle, self.first_side, self.side = face, first_side, side
+        self.first_corner, self.corner = first_corner, corner
 
 
 @cython.final
@@ -109,7 +113,7 @@ class Detour:
     @cython.exceptval(check=False)
     def find(
         self,
-        s: Surface,
+        s: FaceTable,
         v: cython.int,
         h: cython.int,
         before: Sides,
@@ -180,7 +184,7 @@ class Detour:
     @cython.exceptval(check=False)
     def turn_back(
         self,
-        s: Surface,
+        s: FaceTable,
         v: cython.int,
         h: cython.int,
         before: cython.double,
@@ -256,7 +260,7 @@ class Layout:
     @cython.nogil
     @cython.exceptval(-1, check=False)
     def lay_out(
-        self, s: Surface, face: cython.int, start: cython.pointer[cython.const[Place]], strip: Strip
+        self, s: FaceTable, face: cython.int, start: cython.pointer[cython.const[Place]], strip: Strip
     ) -> cython.int:
         """Lay out the strip that begins in a face, for paths from `start` there."""
         if strip.count > self.gate.shape[0]:
