@@ -47,6 +47,8 @@ TRIANGLES = {
     "points and blocks by number": SimpleNamespace(points=V, cells_dict={5: F}),
     "mesh set": MeshSet(),
     "GIFTI": Gifti(V, F),
+    "coordinates and faces": SimpleNamespace(coordinates=V, faces=F),
+    "wrapped": SimpleNamespace(VTKObject=SimpleNamespace(points=V, faces=padded(F), n_points=len(V))),
 }
 
 
@@ -56,6 +58,17 @@ def test_triangles_come_as_they_are(given: Any) -> None:
     assert isinstance(mesh, Mesh)
     np.testing.assert_array_equal(mesh.V, V)
     np.testing.assert_array_equal(mesh.F, F)
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [("Scene", r"pass \.to_mesh\(\)"), ("MultiBlock", r"pass \.combine"), ("SurfaceImage", "mesh.parts")],
+)
+def test_what_holds_several_meshes_is_refused_by_name(name: str, remedy: str) -> None:
+    with pytest.raises(MeshError, match=rf"mesh is .*{name}.*: .*{remedy}"):
+        as_mesh(type(name, (), {})())
+    with pytest.raises(MeshError, match=r"strips of triangles: pass mesh.triangulate\(\)"):
+        as_mesh(SimpleNamespace(points=V, faces=np.empty(0, int), n_points=len(V), n_strips=2))
 
 
 POLYGONS = {

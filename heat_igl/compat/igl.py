@@ -127,7 +127,7 @@ def exact_geodesic(
     SourceError
         If there are targets and no source, or a source is no vertex.
     ValueError
-        If another index is out of range.
+        If another index is out of range, or there are face sources and no targets, as in the order of older libigl.
 
     Notes
     -----
@@ -137,6 +137,10 @@ def exact_geodesic(
     vertex_sources, vertex_targets = _indices("VS", VS, mesh.n_vertices), _indices("VT", VT, mesh.n_vertices)
     face_sources, face_targets = _indices("FS", FS, mesh.n_faces), _indices("FT", FT, mesh.n_faces)
     if not len(vertex_targets) + len(face_targets):
+        if len(face_sources):
+            raise ValueError(
+                "there are no targets: libigl's older exact_geodesic(v, f, vs, vt) is called with VT=vt now"
+            )
         return np.empty(0)
     divided, place = np.unique(np.concatenate([face_sources, face_targets]), return_inverse=True)
     centroids = mesh.n_vertices + place

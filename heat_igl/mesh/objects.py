@@ -45,6 +45,9 @@ _TRIANGLES, _QUADS, _POLYGONS, _TETRAHEDRA = ("triangle", 5), ("quad", 9), ("pol
 _NOT_MESHES = {
     "Operators": "GeodesicSolver and HeatMethodSolver take operators, and the solver answers what is asked of a mesh",
     "Solver": "a solver is asked itself, as in solver.distance(sources)",
+    "Scene": "pass .to_mesh() of it",
+    "MultiBlock": "pass .combine().extract_surface() of it",
+    "SurfaceImage": "pass one of mesh.parts",
     **dict.fromkeys(
         ("StructuredGrid", "RectilinearGrid", "ImageData"),
         "pass .cast_to_unstructured_grid().triangulate() of it, tetrahedra, or triangles if it is flat",
@@ -174,6 +177,8 @@ def _converted(mesh: MeshLike, F: ArrayLike | None) -> Mesh | PolygonMesh | Poin
         raise MeshError(
             "faces F are missing: pass a mesh, positions V and faces F, or a pair (V, F); PointCloud(P) takes points"
         )
+    # In the wrapper of brainspace, whose other attributes may not be asked for by names that it does not know.
+    mesh = getattr(mesh, "__dict__", {}).get("VTKObject", mesh)
     for convert in _CONVERSIONS:
         found = convert(mesh)
         if found is not None:
@@ -258,12 +263,14 @@ def _poly_data(mesh: Any) -> Mesh | PolygonMesh | PointCloud | None:
         P, polygons = np.asarray(mesh.GetPoints().GetData()), _split(mesh.GetPolys())
     else:
         return None
+    if getattr(mesh, "n_strips", 0):
+        raise MeshError("the mesh holds strips of triangles: pass mesh.triangulate()")
     return (None if len(polygons) else cloud_of_poly_data(mesh)) or _of_polygons(P, [polygons])
 
 
 def _vertices_and_faces(mesh: Any) -> Mesh | PolygonMesh | None:
-    """Trimesh (faces), open3d (triangles) and vedo (cells): arrays of positions and of indices."""
-    for positions in ("vertices", "points"):
+    """Trimesh (faces), open3d (triangles), vedo (cells), nilearn (coordinates): arrays of positions and indices."""
+    for positions in ("vertices", "points", "coordinates"):
         for faces in ("faces", "triangles", "cells"):
             V, polygons = getattr(mesh, positions, None), getattr(mesh, faces, None)
             if V is not None and polygons is not None and not callable(V) and not callable(polygons):
