@@ -18,16 +18,10 @@ class PriorityQueue:
         self.key, self.heap, self.place = np.zeros(size), np.empty(size, np.int64), np.full(size, -1)
         self.count = 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def first(self) -> cython.longlong:
         """The number with the largest key; the queue must not be empty."""
         return self.heap[0]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def set_key(self, i: cython.longlong, key: cython.double) -> cython.void:
         """Give i another key, at least 0: insert it, move it, or remove it."""
         k: cython.longlong = self.place[i]
@@ -55,9 +49,6 @@ class PriorityQueue:
             self._lift(k)
             self._sink(self.place[last])
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _lift(self, k: cython.longlong) -> cython.void:
         """Restore the heap above index k, whose key may be too large for that place."""
         i: cython.longlong = self.heap[k]
@@ -71,9 +62,6 @@ class PriorityQueue:
         self.heap[k] = i
         self.place[i] = k
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _sink(self, k: cython.longlong) -> cython.void:
         """Restore the heap below index k, whose key may be too small for that place."""
         i: cython.longlong = self.heap[k]

@@ -13,9 +13,6 @@ _caught = []
 _thread = threading.local()
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def is_interrupted() -> cython.bint:
     """Whether a loop is to end: on the main thread if the handler of a signal has raised, on others as they `obey`."""
     with cython.gil:

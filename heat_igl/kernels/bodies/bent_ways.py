@@ -14,9 +14,6 @@ class BentWays:
     along the edge, and `beyond` by how much the way would miss the edge on a line through it.
     """
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def value(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """Distance at a point near vertex v, by the way to v; `x` becomes the point at which this way bends last."""
         if self.way[v] >= 0:
@@ -32,9 +29,6 @@ class BentWays:
             squared += (x[k] - self.x[k]) * (x[k] - self.x[k])
         return value + sqrt(squared)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def around(self, i: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """Length of the way to a point that bends around an edge last; sets `x`, `share` and `beyond`."""
         bend = cython.address(self.bends[i])
@@ -71,9 +65,6 @@ class BentWays:
             self.x[k] = self.positions[bend.a, k] + self.share * bend.length * bend.tangent[k]
         return best
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def away(self, v: cython.int) -> cython.double:
         """Distance of v from `x`."""
         k: cython.int

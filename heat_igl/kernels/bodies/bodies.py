@@ -60,9 +60,6 @@ class Body:
         """What it was made of."""
         return Body, self._arrays
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def across(self, t: cython.int, o: cython.int) -> cython.int:
         """The first other tetrahedron at the side of t opposite corner o, or -1."""
         a: cython.int = self.corners[t, (o + 1) % 4]
@@ -81,9 +78,6 @@ class Body:
                     return other
         return -1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def list_around(self, v: cython.int, mark: cython.int[::1], into: cython.int[::1], at: cython.int) -> cython.int:
         """Write the neighbours of v down from a place on; returns the place behind them."""
         k: cython.int
@@ -98,9 +92,6 @@ class Body:
                     at += 1
         return at
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def longest_edge(self, v: cython.int) -> cython.double:
         """The distance of v from its farthest neighbour."""
         k: cython.int

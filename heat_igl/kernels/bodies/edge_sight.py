@@ -14,9 +14,6 @@ class EdgeSight(BentWays):
     `stamp` is the number of the search.
     """
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def has_end(self, t: cython.int, i: cython.int) -> cython.bint:
         """Whether tetrahedron t is at the point of edge i at `share`."""
         bend = cython.address(self.bends[i])
@@ -28,9 +25,6 @@ class EdgeSight(BentWays):
             has_b = has_b or self.corners[t, c] == bend.b
         return has_a and has_b
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def sees(self, i: cython.int, v: cython.int) -> cython.bint:
         """Whether the line from v to `x` on edge i stays in the tetrahedra.
 
@@ -48,17 +42,11 @@ class EdgeSight(BentWays):
                 return True
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def arrives_from(self, v: cython.int, begin: cython.int, i: cython.int) -> cython.bint:
         """Whether the line from v to `x` that begins in the tetrahedron of a corner gets to edge i."""
         self.ray.aim(v, begin // 4, self.x, -1, NUDGE)
         return self.ray.enters(begin // 4, begin % 4) and self.arrives(i)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def arrives(self, i: cython.int) -> cython.bint:
         """Whether the ray gets to edge i before it leaves the body."""
         stamp: cython.int = self.stamp
@@ -75,9 +63,6 @@ class EdgeSight(BentWays):
                 return False
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def is_lit_from(
         self, v: cython.int, i: cython.int, x: cython.pointer[cython.const[cython.double]], share: cython.double
     ) -> cython.bint:

@@ -13,9 +13,6 @@ __all__ = ["FittedBends"]
 class FittedBends(EdgeSight):
     """Ways around edges, whose distances can be fitted again after those of the ends have changed."""
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def is_stale(self, i: cython.int) -> cython.bint:
         """Whether the ends of an edge have distances, and others than when it was fitted."""
         bend = cython.address(self.bends[i])
@@ -25,9 +22,6 @@ class FittedBends(EdgeSight):
             return False
         return bend.at[0] > to_a * (1 + GAIN) or bend.at[4] > to_b * (1 + GAIN)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def fit(self, i: cython.int) -> cython.void:
         """Find distance along an edge from the ways to its ends."""
         bend = cython.address(self.bends[i])
@@ -62,9 +56,6 @@ class FittedBends(EdgeSight):
                     bend.before[k] = self.x[k]
         self.lay_flat(i)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def lay_flat(self, i: cython.int) -> cython.void:
         """Find the point beside an edge from which distance along it is measured, and whether there is one."""
         bend = cython.address(self.bends[i])

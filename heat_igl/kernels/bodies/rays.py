@@ -25,9 +25,6 @@ class Ray:
         self.corners, self.first, self.incident = body.corners, body.first, body.incident
         self.positions, self.behind = body.positions, body.behind
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def cone(self, v: cython.int, goal: cython.pointer[cython.const[cython.double]]) -> cython.int:
         """The corner ``4 t + corner`` at v through whose tetrahedron the line to a point begins, well inside; else -1.
 
@@ -50,9 +47,6 @@ class Ray:
                     k = 4 * t + i
         return -1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def worst_side(self, k: cython.int) -> cython.int:
         """The side of the cone at corner k that the line is farthest behind: the corner opposite it in the tetrahedron.
 
@@ -77,9 +71,6 @@ class Ray:
             return (o + 1) % 4
         return (o + 2) % 4 if least == of_b else (o + 3) % 4
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def begins(self, k: cython.int, goal: cython.pointer[cython.const[cython.double]]) -> cython.bint:
         """Whether the line from corner k to a point leaves the tetrahedron of k through the opposite side."""
         t: cython.int = k // 4
@@ -90,9 +81,6 @@ class Ray:
         j: cython.int = self.corners[t, (o + 2) % 4]
         return self.leaves(v, i, j, self.corners[t, (o + 3) % 4], ON_SIDE) != 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def aim(
         self,
         v: cython.int,
@@ -119,9 +107,6 @@ class Ray:
                     q += 0.25 * nudge * self.positions[self.corners[into, c], i]
             self.p[i], self.w[i] = p, q - p
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def enters(self, t: cython.int, o: cython.int) -> cython.bint:
         """Find the triangle through which the line, which begins inside t, leaves it; opposite corner o at first."""
         i: cython.int
@@ -135,9 +120,6 @@ class Ray:
                 return True
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def cross(self) -> cython.int:
         """Go through abc; returns the fourth vertex of the tetrahedron behind it, or -1 on the boundary."""
         i: cython.int
@@ -153,9 +135,6 @@ class Ray:
                     return u
         return -1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def turn(self, o: cython.int) -> cython.bint:
         """Find the triangle at o through which the line leaves t, which it entered through abc."""
         of_a: cython.double = self.sign * self.side(o, self.a)
@@ -185,9 +164,6 @@ class Ray:
         bz: cython.double = self.positions[b, 2] - self.p[2]
         return self.w[0] * (ay * bz - az * by) + self.w[1] * (az * bx - ax * bz) + self.w[2] * (ax * by - ay * bx)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def leaves(self, o: cython.int, a: cython.int, b: cython.int, c: cython.int, part: cython.double) -> cython.int:
         """How the line leaves the tetrahedron oabc through abc: 0 if it does not, else the sign of its corners' order.
 

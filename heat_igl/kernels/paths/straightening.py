@@ -54,24 +54,15 @@ class Course:
         some = self.segment.base[: self.n_segments]
         return some["face"].astype(np.int64), np.stack([some["start"], some["end"]], axis=1)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def begin(self, face: cython.int, start: Place) -> cython.void:
         """Begin a strip."""
         self.face, self.start, self.strip.count = face, start, 0
         self.vertex = vertex_at(self.s, face, cython.address(start))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def last_face(self) -> cython.int:
         """The face that the strip ends in."""
         return self.strip.crossing[self.strip.count - 1].enter // 3 if self.strip.count > 0 else self.face
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def turn(self, v: cython.int, goal: cython.int) -> cython.bint:
         """Lead the strip, which ends at vertex v, around it to face `goal`, the shorter way; False if there is none."""
         f: cython.int = self.last_face()
@@ -84,9 +75,6 @@ class Course:
         self.strip.extend(self.detour.way, 0, count)
         return count >= 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def settle(self) -> cython.double:
         """Lead the strip until the shortest path in it is locally shortest; returns the length."""
         shortest: cython.double = INFINITY
@@ -100,9 +88,6 @@ class Course:
                 break
         return length
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def lay_out(self) -> cython.double:
         """Find the shortest path in the strip as it is; returns the length."""
         self._trim()
@@ -111,9 +96,6 @@ class Course:
         self.layout.pull_tight(weighted(end, self.layout.last.x), weighted(end, self.layout.last.y))
         return self.layout.length()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def _repair(self) -> cython.int:
         """Lead the strip the other way around the bends if that is shorter; 0 if there are none."""
         self.straighter.count = 0
@@ -137,9 +119,6 @@ class Course:
         self.strip.copy(self.straighter)
         return 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _shorter_way(self, i: cython.int) -> cython.int:
         """Find a shorter way around the i-th bend; returns the number of crossings in ``detour.way``, -1 if none."""
         bend = cython.address(self.layout.bend[i])
@@ -169,9 +148,6 @@ class Course:
                 return count
         return self.detour.find(self.s, v, h, before, e, g, after, M_PI - NEARLY_STRAIGHT)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _is_one_way(self, first: cython.int, last: cython.int, v: cython.int) -> cython.bint:
         """Whether these crossings at v neither close around it nor cross an edge at which ways branch.
 
@@ -185,9 +161,6 @@ class Course:
                 return False
         return last - first < self.s.first_corner[v + 1] - self.s.first_corner[v] - 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _trim(self) -> cython.void:
         """Drop crossings of edges on which the path starts or ends: rounding would put it on either side."""
         h: cython.int
@@ -221,9 +194,6 @@ class Course:
         if end_vertex >= 0:
             self.end = at_corner(corner_of(self.s, self.last_face(), end_vertex))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def emit(self) -> cython.int:
         """Append the segments of the path through the strip, without those of no length."""
         k: cython.int = self.strip.count
@@ -258,9 +228,6 @@ class Course:
                 x = self._on(j, f, share)
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _on(self, j: cython.int, f: cython.int, share: cython.double) -> Place:
         """The place in face f that lies `share` of the way from the right to the left end of crossing j."""
         gate = cython.address(self.layout.gate[j])
@@ -279,17 +246,11 @@ class Saved:
     def __init__(self):
         self.strip = Strip()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def save(self, course: Course) -> cython.int:
         """Save a course as it is now."""
         self.face, self.vertex, self.start, self.end = course.face, course.vertex, course.start, course.end
         return self.strip.copy(course.strip)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def restore(self, course: Course) -> cython.int:
         """Make a course equal to the saved one."""
         course.face, course.vertex, course.start, course.end = self.face, self.vertex, self.start, self.end
@@ -309,9 +270,6 @@ class Passing:
         self.kept, self.choice = Saved(), np.empty(MOST_CHOICES, _CHOICE)
         self.tried = np.empty(MOST_TRIED, np.int32)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def improve(self, length: cython.double) -> cython.double:
         """Lead a settled path past vertices on the other side while that makes it shorter; returns the length."""
         i: cython.int
@@ -332,9 +290,6 @@ class Passing:
                 self.course.settle()
         return length
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def propose(self) -> cython.int:
         """Keep the strip of a straightened path, and note the vertices not tried before; returns their number.
 
@@ -369,9 +324,6 @@ class Passing:
                         self.note(j, side, 2.0 * (product * cos(turn) - spanned) / squared)
         return self.count
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def note(self, j: cython.int, side: cython.int, saved: cython.double) -> cython.int:
         """Insert the vertex at a side of crossing j into the sorted choices."""
         v: cython.int = self.course.layout.gate[j].vertex[side]
@@ -396,9 +348,6 @@ class Passing:
         choice.saved, choice.vertex, choice.first, choice.last = saved, v, first, last
         return 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def is_tried(self, v: cython.int) -> cython.bint:
         """Whether the other side of v has been tried."""
         i: cython.int
@@ -407,9 +356,6 @@ class Passing:
                 return True
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def lead(self, i: cython.int) -> cython.int:
         """Lead the strip that was kept around the vertex of choice i the other way; 0 if no faces are there."""
         if self.n_tried == MOST_TRIED:

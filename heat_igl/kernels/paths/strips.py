@@ -51,9 +51,6 @@ class Strip:
     def __init__(self):
         self.crossing = np.empty(64, _CROSSING)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def push(self, leave: cython.int, enter: cython.int) -> cython.int:
         """Add a crossing; two over one edge are joined, and going back takes both away."""
         last: cython.int = self.count - 1
@@ -69,9 +66,6 @@ class Strip:
             self.count -= 1
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def extend(self, crossing: Crossing[::1], begin: cython.int, end: cython.int) -> cython.int:
         """Add crossings `begin` to `end`, exclusive."""
         j: cython.int
@@ -79,17 +73,11 @@ class Strip:
             self.push(crossing[j].leave, crossing[j].enter)
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def copy(self, other: Strip) -> cython.int:
         """Become a copy of another strip."""
         self.count = 0
         return self.extend(other.crossing, 0, other.count)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def drop(self, k: cython.int) -> cython.void:
         """Take away the first k."""
         i: cython.int
@@ -179,9 +167,6 @@ class Detour:
                 n_steps += 1
         return -1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def turn_back(
         self,
         s: FaceTable,
@@ -215,9 +200,6 @@ class Detour:
             leave = other_side(s, enter, v)
         return -1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _is_entered(self, g: cython.int, n_steps: cython.int) -> cython.bint:
         i: cython.int
         for i in range(n_steps):
@@ -225,9 +207,6 @@ class Detour:
                 return True
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _crossings(self, last: cython.int) -> cython.int:
         """The crossings of the way with this last step; returns how many."""
         count: cython.int = 0
@@ -256,9 +235,6 @@ class Layout:
     def __init__(self):
         self.gate, self.bend = np.empty(64, _GATE), np.empty(66, _BEND)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def lay_out(
         self, s: FaceTable, face: cython.int, start: cython.pointer[cython.const[Place]], strip: Strip
     ) -> cython.int:
@@ -310,9 +286,6 @@ class Layout:
         self.last = p
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def pull_tight(self, x: cython.double, y: cython.double) -> cython.void:
         """The shortest path to (x, y): `bend` 0 is the start and the last one the end."""
         k: cython.int = self.n_gates
@@ -369,9 +342,6 @@ class Layout:
         # Crossings before the last bend come before it, though this vertex may be in sight already.
         bend.first, bend.last = max(first, self.bend[count - 1].last), last
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def length(self) -> cython.double:
         """Length of the shortest path."""
         total: cython.double = 0.0
@@ -380,9 +350,6 @@ class Layout:
             total += hypot(self.bend[i].x - self.bend[i - 1].x, self.bend[i].y - self.bend[i - 1].y)
         return total
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def share(self, j: cython.int, i: cython.int) -> cython.double:
         """The share from right end (0) to left end (1) at which the path passes crossing j on the way to bend i."""
         gate = cython.address(self.gate[j])

@@ -28,9 +28,6 @@ class Facet:
         )
         return det < FLAT * m[0] * m[4] * m[8]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def along_edges(self) -> cython.double:
         """The least value along an edge to v; sets `share`."""
         i: cython.int
@@ -47,9 +44,6 @@ class Facet:
         self.share[at] = 1.0
         return best
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def length(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """|v - x|, with its derivatives `g` and `H` by the shares x, and `lean` by moving v towards each corner.
 
@@ -122,9 +116,6 @@ class Facet:
                 )
         return (near + middle + far) / 6.0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def value(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """T(x) + |v - x| for shares x of the corners, inf if there is none; sets its derivatives `g` and `H`."""
         i: cython.int
@@ -157,9 +148,6 @@ class Facet:
                 self.H[j][i] = self.H[i][j]
         return self.start + T + L
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def newton(self) -> cython.double:
         """The least value over the facet, by Newton's method from `share`, which is changed."""
         x: cython.double[3]

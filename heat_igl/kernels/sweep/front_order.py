@@ -38,9 +38,6 @@ class FrontOrder:
         self.n_ordered = self.n_passed = 0
         self.put_known(width)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def put_known(self, width: cython.double) -> cython.void:
         """Begin a front at the vertices whose distance is known."""
         v: cython.int
@@ -50,9 +47,6 @@ class FrontOrder:
                 self.key[v] = self.d[v]
                 put(cython.address(self.ahead), v, self.d[v])
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def advance(self, i: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.Py_ssize_t:
         """Go on until it is known which `count` vertices come from rank i on, or all are met; returns `n_ordered`."""
         v: cython.int

@@ -94,9 +94,6 @@ class HopfLax(Facet):
             self.sharpen(self.fixed, self.low)
         raise_caught()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def spread(self, low: cython.double) -> cython.void:
         """First order: Dijkstra's algorithm, in which a vertex comes again if its distance falls again."""
         v: cython.int
@@ -158,9 +155,6 @@ class HopfLax(Facet):
                 self.share[k] = 0.0
                 k += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def linear(self, s: cython.int, c: cython.int) -> cython.double:
         """The least value at corner c of simplex s with T linear; sets `side` and `share`."""
         self.face(c)
@@ -209,9 +203,6 @@ class HopfLax(Facet):
                 self.share[at], self.share[other] = 1.0 - place, place
         return best
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def across(
         self, s: cython.int, c: cython.int, da: cython.double, db: cython.double, dc: cython.double
     ) -> cython.double:
@@ -245,9 +236,6 @@ class HopfLax(Facet):
         self.share[0], self.share[1], self.share[2] = 1.0 - fb - fe, fb, fe
         return da + (db - da) * fb + (dc - da) * fe + far
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def sharpen(self, fixed: cython.const[cython.uchar][::1], low: cython.double) -> cython.void:
         """Second order: the nearest vertex next, until no distance around any has changed by more than is settled."""
         v: cython.int
@@ -289,9 +277,6 @@ class HopfLax(Facet):
                 break
             settled *= 0.1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it."""
         k: cython.int
@@ -336,9 +321,6 @@ class HopfLax(Facet):
                     return True
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
         """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
 
@@ -358,9 +340,6 @@ class HopfLax(Facet):
             return INFINITY
         return self.curved(s, c, linear)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """Fill `product`: of v's metric first, then of those of the corners of the facet."""
         k: cython.int
@@ -380,9 +359,6 @@ class HopfLax(Facet):
                         - sq[size * self.side[i] + self.side[j]]
                     )
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def curved(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
         """The least value at corner c of simplex s with T of second order, after that of first order; sets `share`."""
         i: cython.int
@@ -420,9 +396,6 @@ class HopfLax(Facet):
                 self.share[i] = x[i]
         return best
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def sag_between(
         self, s: cython.int, i: cython.int, j: cython.int, more: cython.double, trusted: cython.double
     ) -> cython.double:
@@ -491,9 +464,6 @@ class HopfLax(Facet):
                 square += self.inverse[s, at, i, j] * self.slope[v, i] * self.slope[v, j]
         return max(1.0 - fabs(log(square)), 0.0) if square > 0.0 else 0.0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
         """The derivative of the length of v - x by the position of v, at the best place x."""
         v: cython.int = self.corners[s, c]
