@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import re
 import shutil
 import subprocess
@@ -70,7 +69,8 @@ NO_HEADERS = (
 
 def extensions() -> list[Extension]:
     """The extensions to build; their sources are still Python."""
-    processor = platform.machine().lower()
+    # That of the target, which `_PYTHON_HOST_PLATFORM` names where another system compiles.
+    processor = sysconfig.get_platform().rpartition("-")[2].lower()
     vectors = list(VECTORS) if processor in ("x86_64", "amd64") else []
     found = [Extension(_module(SHARED), [])]
     for path in _sources():
