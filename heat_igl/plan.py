@@ -13,11 +13,27 @@ import numpy as np
 
 from heat_igl.errors import MeshError, is_number, require_choice, shown
 
-__all__ = ["DomainKind", "Engine", "Method", "Plan", "SurfaceMeasures", "distance_plan", "heat_plan", "sweep_plan"]
+__all__ = [
+    "NEAR_RADIUS",
+    "DomainKind",
+    "Engine",
+    "Method",
+    "Plan",
+    "SurfaceMeasures",
+    "distance_plan",
+    "heat_plan",
+    "sweep_plan",
+]
 
 Engine = Literal["windows", "sweep", "fronts", "heat"]
 Method = Literal["auto", "windows", "exact", "sweep"]
 DomainKind = Literal["triangles", "points", "tetrahedra", "separate simplices"]
+
+#: How far around points and curves distance is taken from windows, in mean edge lengths: the cost grows with the
+#: square. Mean error from points inside faces of the cow, the fandisk and the camel's head: 1.63, 0.75 and 0.77 % at 2;
+#: 1.46, 0.72 and 0.72 % at 6; 1.62, 0.66 and 0.66 % at 12. From a curve 2.56, 3.86 and 4.26 %; 1.86, 2.79 and 3.29 %;
+#: 1.53, 1.73 and 2.37 %.
+NEAR_RADIUS = 6.0
 
 
 @dataclass(frozen=True)

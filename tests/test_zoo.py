@@ -19,9 +19,10 @@ from heat_igl import (
     geodesic_distance,
     shapes,
 )
+from heat_igl.heat_method.assembly import SourceAssembler
 from heat_igl.heat_method.several_sources import drop_overtaken
 from heat_igl.intrinsic import mollify
-from heat_igl.sources import SourceAssembler, source_set
+from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
 from heat_igl.validation.domains import CASES, DomainCase, body_cases, solver_for, surface_cases
 from heat_igl.validation.zoo import FAMILIES, SHAPES

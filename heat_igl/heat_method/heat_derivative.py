@@ -17,11 +17,12 @@ from heat_igl.heat_method.known_values import KnownValues
 from heat_igl.heat_method.levels import FlowChange, LevelSlopes, PinnedLevels
 from heat_igl.heat_method.parts import SolverParts
 from heat_igl.heat_method.several_sources import drop_overtaken
+from heat_igl.heat_method.source_terms import right_hand_side
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels.heat import heat_adjoint as kernels
 from heat_igl.kernels.heat import heat_tangent as tangent
 from heat_igl.operators import ElementChange
-from heat_igl.sources import SourceSet, right_hand_side
+from heat_igl.sources import SourceSet
 from heat_igl.steps import FlowDerivative, MatrixSlopes
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding import Change, SideChange

@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
+from heat_igl.heat_method.assembly import take_shorter
+from heat_igl.heat_method.source_terms import Seeds, SourceTerm, right_hand_side
+from heat_igl.intrinsic import Adjacency
 from heat_igl.operators import Operators
 from heat_igl.runtime import LOWEST_HEAT, warn_caller
-from heat_igl.sources import NearField, Seeds, SourceTerm, right_hand_side, take_shorter
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["HEAT_ERROR", "Integration", "damped_field", "imposed_faces"]
 
-# A straight line that is longer than the integrated distance by more than this share of it comes from a source that is
+# A known distance that is longer than the integrated distance by more than this share of it comes from a source that is
 # not the nearest: integrated distance is wrong by less, by 1 to 4 % in the mean. It decides on the far corners of faces
 # much larger than the mean alone; from 0 to 1, errors on the cow, the fandisk and the camel's head are the same.
 HEAT_ERROR = 0.2
@@ -82,8 +84,8 @@ class Integration:
         theirs is known beforehand, as in the paper.
     fitted : bool
         Whether the heat flow is fitted to the lengths of edges.
-    edges : NearField, optional
-        Straight lines along the edges that are solved on; None without triangles.
+    edges : Adjacency, optional
+        The edges that are solved on; None without triangles.
     """
 
     def __init__(
@@ -94,7 +96,7 @@ class Integration:
         poisson: PoissonProblem,
         t: float | FloatArray | None,
         fitted: bool,
-        edges: NearField | None,
+        edges: Adjacency | None,
     ) -> None:
         self._domain, self._heat_flow, self.poisson = domain, heat_flow, poisson
         self._normalized_divergence = divergence

@@ -1,4 +1,4 @@
-"""The derivative of the distances known beside the sources: lengths of edges, and of straight lines over triangles."""
+"""The derivative of the distances known beside the sources: lengths of edges, and of exact paths."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.heat_method.assembly import SourceAssembler
+from heat_igl.heat_method.source_terms import SourceTerm
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.operators import Surface
-from heat_igl.sources import SourceAssembler, SourceTerm
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.unfolding import PathLengths, SideChange, from_lines
+from heat_igl.unfolding import PathLengths, SideChange, from_windows
 
 __all__ = ["GivenSlopes", "KnownValues", "Spokes", "spokes"]
 
@@ -154,8 +155,7 @@ class KnownValues:
 
     @cached_property
     def _lines(self) -> PathLengths | None:
-        """The straight lines over the faces before any flip; None if no value needs one."""
+        """The exact paths over the faces before any flip; None if no value needs one."""
         if not self._is_line.any():
             return None
-        sources = self._term.sources
-        return from_lines(self._triangulations[1], sources, self._assembler.lines(sources))
+        return from_windows(self._assembler.windows, self._triangulations[1], self._term.sources)

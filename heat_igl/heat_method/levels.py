@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.heat_method.assembly import take_shorter
 from heat_igl.heat_method.integration import HEAT_ERROR
 from heat_igl.heat_method.known_values import KnownValues, spokes
 from heat_igl.heat_method.parts import SolverParts
-from heat_igl.sources import SourceTerm, right_hand_side, take_shorter
+from heat_igl.heat_method.source_terms import SourceTerm, right_hand_side
 from heat_igl.steps import FlowDerivative, MatrixSlopes
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 

@@ -13,6 +13,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.heat_method.assembly import SourceAssembler
 from heat_igl.heat_method.checking import Checker, Comparisons
 from heat_igl.heat_method.element_slopes import ElementSlopes
 from heat_igl.heat_method.integration import Integration
@@ -29,7 +30,6 @@ from heat_igl.operators import (
 )
 from heat_igl.plan import RANDOM_SIDES, T_COEF_EVEN_POINTS, T_COEF_RANDOM_POINTS, Plan, heat_plan
 from heat_igl.runtime import in_order, n_threads, pool
-from heat_igl.sources import SourceAssembler
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from heat_igl.sources import SourceTerm, right_hand_side
+from heat_igl.heat_method.source_terms import SourceTerm, right_hand_side
 from heat_igl.steps import HeatFlow
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 

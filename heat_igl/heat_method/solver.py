@@ -17,11 +17,12 @@ from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.side_lengths import SideLengths
 from heat_igl.heat_method.solution import HeatSolution, LabelledDistance
+from heat_igl.heat_method.source_terms import SourceTerm, right_hand_side
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, as_mesh
 from heat_igl.operators import Laplacian, Operators
 from heat_igl.runtime import warn_caller
-from heat_igl.sources import Sources, SourceSet, SourceTerm, require_resolved, right_hand_side, source_set
+from heat_igl.sources import Sources, SourceSet, require_resolved, source_set
 from heat_igl.steps import Boundary
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 

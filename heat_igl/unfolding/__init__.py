@@ -10,7 +10,7 @@ from heat_igl.unfolding.guarded import GuardedEngine, contradicted, guarded_wind
 from heat_igl.unfolding.invariants import Invariants
 from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.path_derivatives import Change
-from heat_igl.unfolding.path_lengths import PathLengths, SideChange, from_lines
+from heat_igl.unfolding.path_lengths import PathLengths, SideChange, from_windows
 from heat_igl.unfolding.sweep import SweepEngine
 from heat_igl.unfolding.window_engine import WindowEngine
 from heat_igl.unfolding.within_store import read_distances_within, write_distances_within
@@ -40,7 +40,7 @@ __all__ = [
     "distances_within",
     "exact_distance",
     "exact_paths",
-    "from_lines",
+    "from_windows",
     "guarded_windows",
     "in_circle",
     "nearest_vertices",

@@ -8,12 +8,12 @@ import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.mesh import SurfacePoints
-from heat_igl.sources import SightLines, SourceSet
+from heat_igl.sources import SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.path_derivatives import Change, Paths, Places, Starts, Ways, half_edge_arrays
 
-__all__ = ["PathLengths", "SideChange", "from_lines", "from_windows"]
+__all__ = ["PathLengths", "SideChange", "from_windows"]
 
 
 class SideChange(NamedTuple):
@@ -123,17 +123,4 @@ def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, s
     length = triangulation.l.ravel()[origin.entered]
     ways = Ways(found.distance, origin.entered, origin.crossing / length, found.distance - begins[origin.root])
     paths = Paths(half_edge_arrays(triangulation), places, ways, is_source=origin.root == np.arange(n))
-    return PathLengths(triangulation, paths, starts.points)
-
-
-def from_lines(triangulation: IntrinsicTriangulation, sources: SourceSet, lines: SightLines) -> PathLengths:
-    """The straight lines from vertices to the vertices and points that they see."""
-    starts, places = Starts.of(sources), Places.none()
-    if starts.points is not None and starts.point_offsets is not None:
-        placed = ExactSurface(triangulation).located(starts.points)
-        places = Places(*placed, starts.point_offsets[placed[2]])
-    is_source = np.zeros(triangulation.n, bool)
-    is_source[starts.vertices] = True
-    ways = Ways(lines.value, lines.entered, lines.share, lines.reach)
-    paths = Paths(half_edge_arrays(triangulation), places, ways, is_source)
     return PathLengths(triangulation, paths, starts.points)

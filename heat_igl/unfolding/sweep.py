@@ -15,9 +15,9 @@ from heat_igl.intrinsic import lay_out, oriented
 from heat_igl.kernels.mesh.checking import largest_finite
 from heat_igl.kernels.sweep import sweeping
 from heat_igl.operators import share_on_large_triangles
-from heat_igl.plan import SurfaceMeasures
+from heat_igl.plan import NEAR_RADIUS, SurfaceMeasures
 from heat_igl.runtime import warn_caller
-from heat_igl.sources import NEAR_RADIUS, NearField, SourcePoints, SourceSet
+from heat_igl.sources import SourcePoints, SourceSet, samples
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.engine import Engine, Triangles
@@ -98,10 +98,6 @@ class SweepEngine(Engine):
         return Bounds(self._triangles.surface)
 
     @cached_property
-    def _near_field(self) -> NearField:
-        return NearField(self._triangles.faces)
-
-    @cached_property
     def _on_delaunay(self) -> ExactSurface:
         return ExactSurface(self._triangles.surface.unfolding)
 
@@ -141,8 +137,9 @@ class SweepEngine(Engine):
         sources = query.sources
         if not query.has_curves:
             return sources.points
-        samples, _ = self._near_field.samples(sources.segments, _SPACING * self._triangles.mean_edge_length)
-        return sources.points.joined(samples).joined(sources.segments.ends())
+        spacing = _SPACING * self._triangles.mean_edge_length
+        along, _ = samples(self._triangles.faces, sources.segments, spacing)
+        return sources.points.joined(along).joined(sources.segments.ends())
 
     def _near(self, query: Query) -> ExactSolution | None:
         """Exact distance up to some edges around points, curves and several vertices; None for one vertex."""

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
+from heat_igl.heat_method.source_terms import Seeds, SourceTerm
+from heat_igl.intrinsic import Adjacency
+from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Operators
+from heat_igl.plan import NEAR_RADIUS
 from heat_igl.runtime import SOURCE_HEAT
-from heat_igl.sources.near_field import NearField, Seeds, SightLines
-from heat_igl.sources.source_sets import SourcePoints, SourceSegments, SourceSet
-from heat_igl.sources.source_terms import SourceTerm
+from heat_igl.sources import SourceSegments, SourceSet, samples
 from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.unfolding import ExactSurface
 
-__all__ = ["NEAR_RADIUS", "SourceAssembler", "take_shorter"]
+__all__ = ["SourceAssembler", "take_shorter"]
 
-# How far around points and curves distance is taken from straight lines, in mean edge lengths: the cost grows with the
-# square. Mean error from points inside faces of the cow, the fandisk and the camel's head: 1.63, 0.75 and 0.77 % at 2;
-# 1.46, 0.72 and 0.72 % at 6; 1.62, 0.66 and 0.66 % at 12. From a curve 2.56, 3.86 and 4.26 %; 1.86, 2.79 and 3.29 %;
-# 1.53, 1.73 and 2.37 %.
-NEAR_RADIUS = 6.0
 # So many mean edge lengths of a curve give as much heat as a point, so that both are equally warm some edges away. What
 # matters is the order of magnitude: from 1 to 16, errors from a point and a curve change by less than 0.06 points.
 _EDGES_PER_POINT = 4.0
@@ -45,8 +44,8 @@ class SourceAssembler:
 
     Attributes
     ----------
-    edges : NearField or None
-        Straight lines along the edges of the triangulation that is solved on.
+    edges : Adjacency or None
+        The edges of the triangulation that is solved on.
     """
 
     def __init__(
@@ -62,35 +61,37 @@ class SourceAssembler:
         # Of each component, if each has a time step.
         self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
         surface = domain.surface
-        self.edges = None if surface is None else NearField(surface.triangulation)
+        self.edges = None if surface is None else Adjacency(surface.triangulation)
         given = domain.given_surface
-        self._faces = None if given is None or given.faces is None else NearField(given.faces)
-        self._visible = self._faces
-        n_faces = domain.n if surface is None or surface.faces is None else surface.faces.n
-        if surface is not None and n_faces < domain.n and not surface.triangulation.is_cover:
-            # Added vertices see sources too.
-            self._visible = self.edges
+        self._faces = None if given is None else given.faces
         # In edges of the mesh: if vertices were added, the operators have shorter ones.
         self._radius = NEAR_RADIUS
-        if surface is not None and surface.faces is not None and n_faces < domain.n:
+        if surface is not None and surface.faces is not None and surface.faces.n < domain.n:
             self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
         # Triangulations on which the edges are straight lines: one, if none was flipped; on polygons, their triangles.
-        self._straight = [field for field in (self.edges, self._faces) if field is not None]
-        if surface is not None and surface.faces is surface.triangulation:
-            self._straight = self._straight[:1]
-        if surface is not None and surface.uncovered is not None and surface.uncovered is not surface.faces:
-            self._straight.append(NearField(surface.uncovered))
+        straight = [] if self._faces is None else [self._faces]
+        if surface is not None:
+            straight += [each for each in (surface.triangulation, surface.uncovered) if each is not None]
+        different = {id(each): each for each in straight}
+        self._straight = [Adjacency(each) for each in different.values()]
+
+    @cached_property
+    def windows(self) -> ExactSurface:
+        """Exact distance on the faces before any flip, in which points and curves lie."""
+        if self._faces is None:
+            raise ValueError("windows need triangles")
+        return ExactSurface(self._faces)
 
     def term(self, sources: SourceSet) -> SourceTerm:
         """Initial heat of `sources`, and the distances known around them."""
         sources = self._carried(sources)
         rim = self._rim(sources)
         ring = self._ring(sources, rim)
-        lines, far = self._straight_lines(sources, rim)
-        near = Seeds.nearest(_joined(ring, lines))
+        found, far = self._known_by_windows(sources, rim)
+        near = Seeds.nearest(_joined(ring, found))
         seen = np.zeros(len(near.vertex), bool)
-        if len(lines.vertex):
-            seen = np.isin(near.vertex, lines.vertex) & ~np.isin(near.vertex, sources.vertices)
+        if len(found.vertex):
+            seen = np.isin(near.vertex, found.vertex) & ~np.isin(near.vertex, sources.vertices)
         vertex, share, label, offset = self._initial_heat(sources, rim)
         return SourceTerm(
             sources=sources,
@@ -156,36 +157,43 @@ class SourceAssembler:
             found.append(Seeds(ends, offset[which] + lengths, label[which]))
         return _joined(*found)
 
-    def _straight_lines(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
-        """Distance of the vertices that see a source in a straight line, as `NearField.seeds` has it.
+    def _known_by_windows(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
+        """Exact distance of the vertices within the radius, and of the corners of the sources' own faces beyond.
 
         Only if there are points or curves; for vertices alone, the ring of edges is enough, but beside an edge of
         more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
         """
         surface = self._domain.given_surface
-        if surface is None or self._faces is None or self._visible is None:
+        if surface is None or self._faces is None:
             return _NONE, _NONE
         if sources.on_vertices_alone:
             is_covered = surface.uncovered is not None and not self._plain
-            if not (is_covered and self._faces.meets_shared_edge(sources.vertices[rim])):
+            if not (is_covered and self._straight[0].meets_shared_edge(sources.vertices[rim])):
                 return _NONE, _NONE
-        return self._visible.seeds(*self._in_sight(sources, rim, self._visible))
-
-    def lines(self, sources: SourceSet) -> SightLines:
-        """The straight lines whose lengths are `SourceTerm.near` and `SourceTerm.far`."""
-        if self._visible is None:
-            raise ValueError("straight lines need triangles")
-        sources = self._carried(sources)
-        return self._visible.lines(*self._in_sight(sources, self._rim(sources), self._visible))
-
-    def _in_sight(
-        self, sources: SourceSet, rim: BoolArray, visible: NearField
-    ) -> tuple[SourcePoints, SourceSegments, FloatArray, Seeds]:
-        """Arguments of `NearField.seeds`."""
-        vertices = Seeds(sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim])
-        points = sources.points.joined(sources.segments.ends())
-        radius = self._radius * self._h_at(np.arange(visible.triangulation.n))
-        return points, sources.segments, radius, vertices
+        vertices, points, segments = sources.vertices[rim], sources.points, sources.segments
+        begin = sources.offsets.min()
+        radius = self._radius * self._h_at(np.arange(self._faces.n))
+        # The corners of the sources' own faces are known, too, however far they are.
+        places = points.joined(segments.ends())
+        own, _ = self._faces.locate(places.faces, places.barycentric)
+        reach = max(float(radius.max()), float(self._faces.l[own].max(initial=0.0)))
+        found = self.windows.solve(
+            vertices,
+            sources.vertex_offset[rim] - begin,
+            SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
+            points.offset - begin if len(points.faces) else None,
+            replace(segments, offset=segments.offset - begin) if len(segments.faces) else None,
+            cutoff=reach + float(sources.offsets.max() - begin),
+        )
+        offset = np.concatenate([sources.vertex_offset[rim], points.offset, segments.offset])[found.origin.label]
+        label = np.concatenate([sources.vertex_label[rim], points.label, segments.label])[found.origin.label]
+        value = found.distance + begin
+        is_near = value - offset <= radius
+        is_far = np.zeros(len(value), bool)
+        is_far[self._faces.F[own]] = True
+        is_far &= np.isfinite(value) & ~is_near
+        all_of_them = Seeds(np.arange(len(value)), value, label)
+        return all_of_them.at(is_near), all_of_them.at(is_far)
 
     def _initial_heat(self, sources: SourceSet, rim: BoolArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
@@ -195,10 +203,10 @@ class SourceAssembler:
         if sources.on_vertices_alone or surface is None or surface.given_faces is None or self._faces is None:
             return of_vertices
         h = self._h_at(surface.given_faces[sources.segments.faces, 0])
-        samples, lengths = self._faces.samples(sources.segments, h * _SPACING)
-        h = self._h_at(surface.given_faces[samples.faces, 0])
+        along, lengths = samples(self._faces, sources.segments, h * _SPACING)
+        h = self._h_at(surface.given_faces[along.faces, 0])
         amount = np.concatenate([np.ones(len(sources.points.faces)), lengths / (h * _EDGES_PER_POINT)])
-        points = sources.points.joined(samples)
+        points = sources.points.joined(along)
         # On a cover, half of the heat goes to the back.
         sides = (False, True) if surface.triangulation.is_cover else (False,)
         parts = [of_vertices]

@@ -8,11 +8,29 @@ from functools import cached_property
 
 import numpy as np
 
-from heat_igl.sources.near_field import Seeds
-from heat_igl.sources.source_sets import SourceSet
+from heat_igl.sources import SourceSet, nearest_first
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["SourceTerm", "right_hand_side"]
+__all__ = ["Seeds", "SourceTerm", "right_hand_side"]
+
+
+@dataclass(frozen=True, eq=False)
+class Seeds:
+    """Exactly known distances: `value` (k,) at distinct vertices `vertex` (k,), from the source `label` (k,)."""
+
+    vertex: IntArray
+    value: FloatArray
+    label: IntArray
+
+    @classmethod
+    def nearest(cls, several: Seeds) -> Seeds:
+        """The smallest of several values at each vertex."""
+        kept = nearest_first(several.vertex, several.value, several.label)
+        return cls(several.vertex[kept], several.value[kept], several.label[kept])
+
+    def at(self, chosen: BoolArray) -> Seeds:
+        """Some of the seeds, by a mask (k,)."""
+        return Seeds(self.vertex[chosen], self.value[chosen], self.label[chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +54,8 @@ class SourceTerm:
     near : Seeds
         Known distances that the result takes over: at the sources and around them.
     seen : (g,) bool
-        Which of `near` see a point or a curve in a straight line. On faces with such corners, the field of step 2 is
-        the gradient of these distances.
+        Which of `near` have their distance by windows. On faces with such corners, the field of step 2 is the gradient
+        of these distances.
     far : Seeds
         Known distances of corners of the sources' own faces that are too far away to be among `near`.
     """
