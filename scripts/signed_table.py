@@ -18,7 +18,7 @@ vertices farther than half a mean edge from them.
 times: medians of paired runs by the clock; potpourri3d's precomputation includes its first query, which factors.
 volumes: a sphere, a box and a torus in a unit cube: closed, with 20 % of the faces removed one by one, or 20 % of the
 area in patches. Truth is libigl's distance with the winding number. Mean error in cells within a cell of the surface,
-and in brackets at all points; the largest of several seeds. docs/signed.md shows the tables.
+and in brackets at all points; the largest of several seeds. docs/signed_theory.md shows the tables.
 """
 
 from __future__ import annotations

@@ -138,9 +138,7 @@ def exact_geodesic(
     face_sources, face_targets = _indices("FS", FS, mesh.n_faces), _indices("FT", FT, mesh.n_faces)
     if not len(vertex_targets) + len(face_targets):
         if len(face_sources):
-            raise ValueError(
-                "there are no targets: libigl's older exact_geodesic(v, f, vs, vt) is called with VT=vt now"
-            )
+            raise ValueError("no targets: libigl's older exact_geodesic(v, f, vs, vt) is called with VT=vt now")
         return np.empty(0)
     divided, place = np.unique(np.concatenate([face_sources, face_targets]), return_inverse=True)
     centroids = mesh.n_vertices + place

@@ -31,7 +31,7 @@ from heat_igl.unfolding import ExactSurface, MeshTriangles
 __all__ = ["Level", "SignedHeatSolver"]
 
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
-# alike (docs/signed.md).
+# alike (docs/signed_theory.md).
 _T_COEF = 0.25
 
 
@@ -65,7 +65,7 @@ class SignedHeatSolver:
     Notes
     -----
     The paper diffuses vectors at edges. Here they are at vertices, with weights fitted to the lengths of edges
-    (`fitted_laplacian`): a third of the unknowns, and no more error (docs/signed.md). The solver is immutable, and
+    (`fitted_laplacian`): a third of the unknowns, and no more error (docs/signed_theory.md). The solver is immutable, and
     threads may share it.
 
     Examples
@@ -133,7 +133,7 @@ class SignedHeatSolver:
         level : {"zero", "constant", "none"}, optional
             Asks for the integrated distance, with this level. "zero" subtracts from each vertex the
             value at the place on the curves that its heat comes from, so that all curves are near 0: within 0.03 mean
-            edge lengths (root mean square) on coarse meshes, and exactly at vertices on them, see docs/signed.md.
+            edge lengths (root mean square) on coarse meshes, and exactly at vertices on them, see docs/signed_theory.md.
             "constant" makes the value nearly constant along each curve, with a different level for each, and 0 in the
             mean over all. "none" only makes the mean 0. Where the integrated distance is meant and no level is given,
             it is "zero".
