@@ -11,9 +11,6 @@ from cython.cimports.libc.math import sqrt
 __all__ = ["flip"]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def _move(ring: cython.int[::1], old: cython.int, new: cython.int) -> cython.void:
     """Let another half-edge take the place of one that stands among those of an edge of more than two faces."""
     h: cython.int = old
@@ -73,23 +70,6 @@ def flip(
 class _Flips:
     """A triangulation of which edges are being flipped, and the edges that wait to be looked at again."""
 
-    vertex: cython.int[::1]
-    twin: cython.int[::1]
-    ring: cython.int[::1]
-    length: cython.double[::1]
-    area: cython.double[::1]  # twice that of each face
-    is_obtuse: cython.uchar[::1]  # the angle opposite each half-edge; between two that are not, no edge is flipped
-    waiting: cython.int[::1]
-    is_waiting: cython.uchar[::1]
-    n_waiting: cython.int
-    # Of the flip that was found to improve: the new edge, and twice the areas of both new faces.
-    diagonal: cython.double
-    area_of_f: cython.double
-    area_of_g: cython.double
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def compare(self, h: cython.int) -> cython.void:
         """Which angles of a face are obtuse, that begins with half-edge h: the terms are those of `improves`."""
         a: cython.double = self.length[h] * self.length[h]
@@ -99,9 +79,6 @@ class _Flips:
         self.is_obtuse[h + 1] = c + a < b
         self.is_obtuse[h + 2] = a + b < c
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def wait(self, h: cython.int) -> cython.void:
         """Let the edge of half-edge h wait, unless it does already or has one face."""
         if self.twin[h] > h:
@@ -111,9 +88,6 @@ class _Flips:
             self.waiting[self.n_waiting] = h
             self.n_waiting += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def improves(self, h: cython.int, tolerance: cython.double) -> cython.bint:
         """Whether the edge of half-edge h is to be flipped; keeps the measures of the new faces."""
         t: cython.int = self.twin[h]
@@ -144,9 +118,6 @@ class _Flips:
         self.area_of_g = twice_area(qb, bp, self.diagonal)
         return self.area_of_f > 0.0 and self.area_of_g > 0.0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def flip(self, h: cython.int) -> cython.void:
         """Flip the edge of half-edge h, and let the four edges around it wait."""
         t: cython.int = self.twin[h]
@@ -171,9 +142,6 @@ class _Flips:
         self.wait(t)
         self.wait(previous_half_edge(t))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def glue(self, old: cython.int, new: cython.int, twin: cython.int) -> cython.void:
         """Give half-edge `new` what half-edge `old` was glued to."""
         self.twin[new] = twin

@@ -39,15 +39,6 @@ class GrowingTriangulation:
     aligned twin. Two sides of one face may be twins.
     """
 
-    F: cython.longlong[:, ::1]
-    l: cython.double[:, ::1]
-    twin: cython.longlong[::1]
-    kind: cython.longlong[:, ::1]
-    numbers: cython.double[:, ::1]
-    n_faces: cython.longlong
-    n_vertices: cython.longlong
-    n_moves: cython.longlong
-
     def __init__(self, F, l, twin, n_vertices, most_new):
         """Copy the triangulation, with room for `most_new` more vertices."""
         m, rows = len(F), len(F) + 2 * most_new
@@ -70,16 +61,10 @@ class GrowingTriangulation:
         """Copies of `kind` and `numbers`, as far as they are in use."""
         return np.asarray(self.kind)[: self.n_moves].copy(), np.asarray(self.numbers)[: self.n_moves].copy()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def is_full(self) -> cython.bint:
         """Whether there is no room for another move."""
         return self.n_moves == self.kind.shape[0]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def is_delaunay(self, h: cython.longlong) -> cython.bint:
         """Whether the cotangents opposite the edge of half-edge h sum to 0 or more, up to rounding.
 
@@ -105,9 +90,6 @@ class GrowingTriangulation:
         rounding: cython.double = 1e-12 * ((ab * ab + bp * bp + pa * pa) / one + (ab * ab + aq * aq + qb * qb) / other)
         return not cotangents < -1e-7 - rounding
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def flip(self, h: cython.longlong) -> cython.void:
         """Flip edge ab, half-edge h: its faces f = (p, a, b) and g = (q, b, a) become (p, a, q) and (q, b, p)."""
         t: cython.longlong = self.twin[h]
@@ -150,9 +132,6 @@ class GrowingTriangulation:
         self._glue(3 * g + e, beyond_bp)
         self._glue(3 * f + c1, 3 * g + e1)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def split(self, f: cython.longlong, u: cython.double, v: cython.double, w: cython.double) -> cython.void:
         """Split face f at barycentric coordinates u, v, w, which sum to 1: a new vertex, and two faces at the end."""
         a: cython.double = self.l[f, 0]
@@ -195,17 +174,11 @@ class GrowingTriangulation:
         self._glue(3 * f + 2, 3 * k + 0)
         self._glue(3 * g + 2, 3 * k + 1)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _glue(self, h: cython.longlong, t: cython.longlong) -> cython.void:
         """Make two half-edges twins."""
         self.twin[h] = t
         self.twin[t] = h
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _append_move(self, kind: cython.longlong, h: cython.longlong, mate: cython.longlong) -> cython.longlong:
         """Append a move and return the row of it; the caller fills in the numbers."""
         i: cython.longlong = self.n_moves
@@ -221,17 +194,6 @@ class GrowingTriangulation:
 class _Refinement:
     """A triangulation that is being refined, its bad triangles by priority, and edges that may have to be flipped."""
 
-    triangles: GrowingTriangulation
-    bad: PriorityQueue
-    unit: cython.double[::1]
-    stack: cython.longlong[::1]
-    is_sharp: cython.uchar[::1]
-    least_sine: cython.double
-    largest_radius: cython.double
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def run(self, most_vertices: cython.longlong) -> cython.void:
         """Refine until no triangle is bad, there are `most_vertices`, or there is no more room."""
         f: cython.longlong
@@ -247,16 +209,10 @@ class _Refinement:
             elif not self.insert(center):
                 break
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def judge(self, f: cython.longlong) -> cython.void:
         """Move a triangle that has changed to the right place in the queue, or out of it."""
         self.bad.set_key(f, self.badness(f))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def badness(self, f: cython.longlong) -> cython.double:
         """Circumradius of a bad triangle in the unit of the face, 0 of another."""
         a: cython.double = self.triangles.l[f, 0]
@@ -281,9 +237,6 @@ class _Refinement:
         tip: cython.longlong = self.triangles.F[f, shortest]
         return 0.0 if tip < self.is_sharp.shape[0] and self.is_sharp[tip] else badness
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def insert(self, at: Location) -> cython.bint:
         """Make a location a vertex and flip edges until all are Delaunay; false if there is no more room."""
         if self.triangles.is_full():
@@ -303,9 +256,6 @@ class _Refinement:
         self.stack[0], self.stack[1], self.stack[2] = 3 * f, 3 * g + 1, 3 * k + 2
         return self.make_delaunay(3)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def make_delaunay(self, n_stack: cython.longlong) -> cython.bint:
         """Flip edges, beginning with those on the stack, until all are Delaunay; false if there is no more room."""
         k: cython.int
@@ -334,9 +284,6 @@ class _Refinement:
         return True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def _find_sharp(t: GrowingTriangulation, seen: cython.uchar[::1], is_sharp: cython.uchar[::1]) -> cython.void:
     """Mark vertices with a fan of faces whose angles sum to less than `SHARPEST`: no split or flip changes that."""
     first: cython.longlong
@@ -357,9 +304,6 @@ def _find_sharp(t: GrowingTriangulation, seen: cython.uchar[::1], is_sharp: cyth
             is_sharp[t.F[first // 3, first % 3]] = True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def _circumcenter(t: GrowingTriangulation, f: cython.longlong) -> Location:
     """Locate the circumcenter of a triangle, in the triangle or straight on from it; face -1 if it is not found."""
     a: cython.double = t.l[f, 0]
@@ -397,9 +341,6 @@ def _circumcenter(t: GrowingTriangulation, f: cython.longlong) -> Location:
     return _walk(t, ray, Exit(3 * f + side, px[i], py[i], px[j], py[j]))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def _walk(t: GrowingTriangulation, ray: Ray, way: Exit) -> Location:
     """Locate the end of a ray that leaves a face, by unfolding the faces that it crosses into the plane."""
     for _ in range(MOST_STEPS):

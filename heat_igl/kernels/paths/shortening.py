@@ -18,7 +18,6 @@ from cython.cimports.heat_igl.kernels.paths.shortening import (
     MOST_BASES,
     SAME_ANGLE,
     SHORTEST_SLIDE,
-    Joint,
 )
 from cython.cimports.heat_igl.kernels.paths.straightening import (
     GAIN,
@@ -30,7 +29,6 @@ from cython.cimports.heat_igl.kernels.paths.straightening import (
 )
 from cython.cimports.heat_igl.kernels.paths.strips import (
     SNAP,
-    Crossing,
     FaceTable,
     Place,
     Strip,
@@ -64,26 +62,11 @@ class Joints:
     `total` (n,) is the sum of the angles around each vertex, negative on the boundary.
     """
 
-    total: cython.const[cython.double][::1]
-    # Joints, the numbers that are free, how many joints there are, and the number of one of them.
-    joint: Joint[::1]
-    free: cython.int[::1]
-    n_free: cython.int
-    count: cython.int
-    some: cython.int
-    # Joints with an angle below pi, by how much it is below.
-    queue: PriorityQueue
-    crossing: Crossing[::1]
-    n_crossings: cython.int
-
     def __init__(self, total):
         self.total = total
         self.crossing = np.empty(2 * _ROOM, _CROSSING)
         self.joint, self.free, self.queue = np.empty(_ROOM, _JOINT), np.empty(_ROOM, np.int32), PriorityQueue(_ROOM)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def clear(self, count: cython.int) -> cython.int:
         """Forget the last loop, and make room for more than so many joints."""
         i: cython.int
@@ -99,9 +82,6 @@ class Joints:
             self.free[i] = self.n_free - 1 - i
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def make(self, v: cython.int) -> cython.int:
         """A new joint at vertex v, the first with number 0."""
         self.n_free -= 1
@@ -110,9 +90,6 @@ class Joints:
         self.joint[k].vertex = v
         return k
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def remove(self, k: cython.int) -> cython.void:
         """Forget a joint."""
         self.queue.set_key(k, 0.0)
@@ -122,9 +99,6 @@ class Joints:
         if self.some == k:
             self.some = self.joint[k].before
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def remove_spur(self, p: cython.int, k: cython.int, q: cython.int) -> cython.bint:
         """Take away the way from joint p to joint k and back to joint q at the vertex of p.
 
@@ -147,9 +121,6 @@ class Joints:
         self.check(p)
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def sharpest(self) -> cython.int:
         """Take the joint with the smallest angle out of the queue; -1 if that is empty."""
         if self.queue.count == 0:
@@ -158,9 +129,6 @@ class Joints:
         self.queue.set_key(k, 0.0)
         return k
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def angle(self, k: cython.int, on_left: cython.pointer[cython.bint]) -> cython.double:
         """The smaller angle at joint k, and on which side it is."""
         total: cython.double = self.total[self.joint[k].vertex]
@@ -175,17 +143,11 @@ class Joints:
         on_left[0] = left < 0.5 * total
         return left if on_left[0] else total - left
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def check(self, k: cython.int) -> cython.void:
         """Put joint k into the queue if the angle there is below pi, or else take it out."""
         on_left: cython.bint = False
         self.queue.set_key(k, max(M_PI - NEARLY_STRAIGHT - self.angle(k, cython.address(on_left)), 0.0))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def set_crossings(self, k: cython.int, strip: Strip, begin: cython.int, end: cython.int) -> cython.int:
         """Let the part after joint k cross what a strip does from crossing `begin` to crossing `end`, exclusive."""
         j: cython.int
@@ -210,23 +172,12 @@ class Polyline:
     if the surface is not an oriented manifold: then nothing may be read.
     """
 
-    course: Course
-    s: FaceTable
-    polar: cython.const[cython.double][::1]
-    across: cython.const[cython.int][::1]
-    is_oriented: cython.bint
-    joints: Joints
-    part: Course  # that is made
-
     def __init__(self, course: Course, n_corners, polar, total, across):
         self.course, self.s, self.part = course, course.s, Course(course.s, n_corners)
         self.polar, self.across = polar, across
         self.is_oriented = len(polar) > 0
         self.joints = Joints(total)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def read(self) -> cython.bint:
         """Take the base of the loop of a course, a vertex, and the bends as joints; False if there are no bends."""
         n: cython.int = self.course.layout.n_bends - 1
@@ -252,9 +203,6 @@ class Polyline:
             self.joints.check(i)
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def relax(self) -> cython.int:
         """Shorten the loop at its joints until no angle is below pi, or one joint is left."""
         while self.joints.count > 1:
@@ -264,9 +212,6 @@ class Polyline:
             self.shorten(k)
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def shorten(self, k: cython.int) -> cython.int:
         """Lead the loop past joint k on the side of the smaller angle, if that makes it shorter."""
         joint = cython.address(self.joints.joint[k])
@@ -303,26 +248,17 @@ class Polyline:
         self.joints.check(q)
         return 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def begin(self, k: cython.int, face: cython.int) -> cython.int:
         """Begin a part at joint k in a face."""
         self.part.begin(face, at_corner(corner_of(self.s, face, self.joints.joint[k].vertex)))
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def lay_out(self, k: cython.int) -> cython.double:
         """Find the shortest path in the strip of the part, to joint k; returns the length."""
         f: cython.int = self.part.last_face()
         self.part.end = at_corner(corner_of(self.s, f, self.joints.joint[k].vertex))
         return self.part.lay_out()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def turn(self, v: cython.int, goal: cython.int, on_left: cython.bint, angle: cython.double) -> cython.bint:
         """Lead the part around v to face `goal`; False if the faces between span more than `angle`.
 
@@ -343,9 +279,6 @@ class Polyline:
                     return False
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def link(self, a: cython.int, b: cython.int) -> cython.int:
         """Make the path that is laid out the way from joint a to joint b, with new joints at the bends."""
         n: cython.int = self.part.layout.n_bends
@@ -362,9 +295,6 @@ class Polyline:
             a = k
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def set_part(self, a: cython.int, f: cython.int, begin: cython.int, end: cython.int, i: cython.int) -> cython.int:
         """Make the part after joint a the line to bend i of the layout: crossings `begin` to `end`, out of face f."""
         joint = cython.address(self.joints.joint[a])
@@ -392,9 +322,6 @@ class Polyline:
         joint.arrive = self.polar[h] + min(angle, self.s.triangle[h // 3].angle[h % 3])
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def write(self) -> cython.int:
         """Make the loop the strip of the course, based at a joint."""
         k: cython.int = self.joints.some
@@ -417,29 +344,16 @@ class Polyline:
 class Loop:
     """The loop of a course, whose strip leads back to the start, the base."""
 
-    course: Course
-    passing: Passing
-    polyline: Polyline
-    # The loop before the base slides, and its strip before the base moves.
-    kept: Saved
-    ring: Strip
-
     def __init__(self, passing: Passing, n_corners, polar, total, across):
         self.course, self.passing = passing.course, passing
         self.polyline = Polyline(passing.course, n_corners, polar, total, across)
         self.kept, self.ring = Saved(), Strip()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def shorten(self) -> cython.double:
         """Lead the strip to the shortest loop of its class that is found; returns the length."""
         self.relax()
         return self.tighten()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def relax(self) -> cython.int:
         """Shorten the loop as a polyline as far as that goes."""
         if not self.polyline.is_oriented:
@@ -455,9 +369,6 @@ class Loop:
             self.polyline.write()
         return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def tighten(self) -> cython.double:
         """Move the base until the loop is locally shortest; returns the length."""
         shortest: cython.double = INFINITY
@@ -474,9 +385,6 @@ class Loop:
                 break
         return length
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def slide(self, length: cython.double) -> cython.double:
         """Move the base of a settled loop without a bend along the edge that it is on; returns the length."""
         side: cython.int = side_of(cython.address(self.course.start))
@@ -518,9 +426,6 @@ class Loop:
             share = 0.5 * (share + here)
         return self.course.settle()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def place_base(
         self,
         f: cython.int,
@@ -543,9 +448,6 @@ class Loop:
         self.course.face = f
         self.course.vertex = vertex_at(self.course.s, f, cython.address(self.course.start))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def move_base(self) -> cython.int:
         """Base the loop elsewhere: at the middle one of its bends, or else on the middle one of its edges."""
         n_bends: cython.int = self.course.layout.n_bends
@@ -580,9 +482,6 @@ class Loop:
         )
         return 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def close(self) -> cython.int:
         """Lead the strip on past the base into the first face; 0 if no face leads there."""
         f: cython.int = self.course.last_face()
@@ -601,11 +500,6 @@ class Loop:
 @cython.cclass
 class Shortener:
     """Shortens curves on the same faces, one after another; see `heat_igl.curves.shortening.Shortener`."""
-
-    course: Course
-    passing: Passing
-    loop: Loop
-    length: cython.double
 
     def __init__(self, faces: FaceTable, half_turn, most_corners, directions):
         self.course = Course(faces, most_corners)
@@ -636,9 +530,6 @@ class Shortener:
                 self.course.emit()
         return stuck, self.length, *self.course.segments()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-2, check=False)
     def follow(
         self,
         face: cython.const[cython.int][::1],

@@ -33,3 +33,32 @@ cdef struct Layout:
     double x[3]
     double y[3]
     double start_x, start_y, share
+
+
+cdef class _Tracer:
+    cdef double[:, ::1] l
+    cdef double[::1] area
+    cdef double[:, ::1] angle
+    cdef long long[::1] twin
+    cdef double[:, ::1] half
+    cdef bint stores
+    cdef long long[::1] faces
+    cdef double[:, :, ::1] points
+    # Of the geodesic being traced: the ray, the face laid out around it, and where it enters and leaves that face in
+    # barycentric coordinates.
+    cdef Ray ray
+    cdef Layout face
+    cdef double entry[3], leave[3]
+
+    cdef long long trace_one(
+        self, long long face, double* at, double turn, double length, long long first, long long* end_face,
+        double* end, double* travelled
+    ) noexcept nogil
+    cdef bint start(self, long long f, double turn) noexcept nogil
+    cdef bint leave_corner(self, long long corner, double turn) noexcept nogil
+    cdef void lay_out(self) noexcept nogil
+    cdef double find_exit(self, double travelled) noexcept nogil
+    cdef double along(self, int c, double share) noexcept nogil
+    cdef bint pass_vertex(self) noexcept nogil
+    cdef bint cross_side(self) noexcept nogil
+    cdef void store(self, long long i, long long f) noexcept nogil

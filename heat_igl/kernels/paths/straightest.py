@@ -2,7 +2,7 @@
 
 import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot
-from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_SIDE, PI, Layout, Ray
+from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_SIDE, PI
 from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
 
 __all__ = ["trace"]
@@ -13,24 +13,6 @@ __all__ = ["trace"]
 class _Tracer:
     """Triangles, the geodesic being traced, and room for the segments of all, if they are stored."""
 
-    l: cython.double[:, ::1]
-    area: cython.double[::1]
-    angle: cython.double[:, ::1]
-    twin: cython.longlong[::1]
-    half: cython.double[:, ::1]
-    stores: cython.bint
-    faces: cython.longlong[::1]
-    points: cython.double[:, :, ::1]
-    # Of the geodesic being traced: the ray, the face laid out around it, and where it enters and leaves that face in
-    # barycentric coordinates.
-    ray: Ray
-    face: Layout
-    entry: cython.double[3]
-    leave: cython.double[3]
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def trace_one(
         self,
         face: cython.longlong,
@@ -85,9 +67,6 @@ class _Tracer:
             n = 1
         return n
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def start(self, f: cython.longlong, turn: cython.double) -> cython.bint:
         """Set the ray off in face f from `entry`; false if it leads out of the surface at once."""
         c: cython.int
@@ -110,9 +89,6 @@ class _Tracer:
         self.ray.is_inside, self.ray.is_at_tail = True, False
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def leave_corner(self, corner: cython.longlong, turn: cython.double) -> cython.bint:
         """Let the ray leave a vertex at the angle `turn` from the side that leaves from `corner`; false if it cannot.
 
@@ -154,9 +130,6 @@ class _Tracer:
         self.ray.is_inside, self.ray.is_at_tail = False, True
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def lay_out(self) -> cython.void:
         """Lay the face out: the tail of the base in the origin (0), the head on the first axis (1), the apex (2)."""
         p = cython.address(self.face)
@@ -176,9 +149,6 @@ class _Tracer:
             self.entry[(side + 1) % 3] = 1.0 - self.ray.s
             self.entry[(side + 2) % 3] = self.ray.s
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def find_exit(self, travelled: cython.double) -> cython.double:
         """Find the point at which the ray leaves the face; returns the length of the segment up to there.
 
@@ -240,9 +210,6 @@ class _Tracer:
         y: cython.double = p.y[p.k] + share * (p.y[c] - p.y[p.k]) - p.start_y
         return max(x * self.ray.dx + y * self.ray.dy, 0.0)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def pass_vertex(self) -> cython.bint:
         """Go on past the vertex that the ray meets, with equal angles on both sides; false if the surface ends."""
         p = cython.address(self.face)
@@ -269,9 +236,6 @@ class _Tracer:
             self.leave_corner(corner, turn - PI)
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def cross_side(self) -> cython.bint:
         """Go on in the face across the side that the ray meets; false on the boundary."""
         p = cython.address(self.face)
@@ -291,9 +255,6 @@ class _Tracer:
         self.ray.is_inside, self.ray.is_at_tail = False, False
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def store(self, i: cython.longlong, f: cython.longlong) -> cython.void:
         """Store the segment from `entry` to `leave` of face f as number i."""
         c: cython.int
