@@ -4,14 +4,16 @@
     python scripts/clouds_table.py distances bunny.obj ...     # the vertices of meshes instead
     python scripts/clouds_table.py clock [--repeats 15]        # times by the clock, as ratios
     python scripts/clouds_table.py log-maps bunny.obj ...
+    python scripts/clouds_table.py scans [--sizes 1000 5000 20000] [--sources 3]   # noise, outliers, uneven density
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4, a cylinder of radius 1 and height 3, and a square
 with sides of length 1; noise is Gaussian in all coordinates, of the given standard deviation. distances: the mean of
 |d - exact| / exact in percent, and seconds of all processors together to make the solver and for a query. clock: both
 solvers take turns; medians of ratios, of the solver with the first query, for which potpourri3d factors, of the solver,
 and of a later query. log-maps: on the vertices of meshes, against the exact one of the mesh: the median angle between
-them in degrees, and the mean of |v - exact| / |exact| in percent. Needs the extra ``bench``; docs/clouds.md shows the
-tables.
+them in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in percent at the points of the
+surface, of default / potpourri3d / the shortest path in the graph of 8 neighbours, which is what there is without a
+solver. Needs the extra ``bench``; docs/clouds.md shows the tables.
 """
 
 from __future__ import annotations
@@ -23,6 +25,9 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
 
 from heat_igl import (
     GeodesicSolver,
@@ -34,11 +39,12 @@ from heat_igl import (
     shapes,
     tangent_frames,
 )
-from heat_igl.typing import FloatArray
+from heat_igl.typing import FloatArray, IntArray
 
 from harness import Query, Row, Table, collected, drawn, mean_error, on_sphere, parsed, publish, seconds
 
 Points = tuple[FloatArray, Query]
+Scan = Callable[[FloatArray, np.random.Generator], tuple[FloatArray, IntArray]]
 
 
 def sphere(n: int, rng: np.random.Generator) -> Points:
@@ -79,12 +85,79 @@ def _peer(P: FloatArray) -> Query:
     return potpourri3d.PointCloudHeatSolver(P).compute_distance
 
 
+def _graph(P: FloatArray) -> Query:
+    """The shortest way along edges to the 8 nearest points."""
+    length, index = KDTree(P).query(P, 9)
+    rows = np.repeat(np.arange(len(P)), 8)
+    graph = csr_array((length[:, 1:].ravel(), (rows, index[:, 1:].ravel())), shape=(len(P), len(P)))
+    return lambda i: np.asarray(dijkstra(graph, directed=False, indices=i))
+
+
 METHODS: dict[str, Callable[[FloatArray], Query]] = {
     "heat": lambda P: HeatMethodSolver(PointCloud(P)).distance,
     "default": lambda P: GeodesicSolver(PointCloud(P)).distance,
     "windows": lambda P: GeodesicSolver(PointCloud(P), method="windows").distance,
     "potpourri3d": _peer,
 }
+
+
+def noisy(share: float) -> Scan:
+    """Gaussian noise in all coordinates, in shares of half the largest extent."""
+
+    def scan(P: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
+        return P + share * np.ptp(P, axis=0).max() / 2 * rng.standard_normal(P.shape), np.arange(len(P))
+
+    return scan
+
+
+def with_outliers(P: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
+    """2 % more points anywhere in the box around the others, a tenth larger on each side."""
+    low, size = P.min(axis=0), np.ptp(P, axis=0).max()
+    box = low - 0.1 * size + rng.random((len(P) // 50, 3)) * (np.ptp(P, axis=0) + 0.2 * size)
+    return np.concatenate([P, box]), np.arange(len(P))
+
+
+def graded(P: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
+    """The points that are left if the density falls by a factor of 100 along the first axis."""
+    chosen = np.flatnonzero(rng.random(len(P)) < 100.0 ** -((P[:, 0] - P[:, 0].min()) / np.ptp(P[:, 0])))
+    return P[chosen], chosen
+
+
+def with_copies(P: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
+    """A tenth of the points twice."""
+    return np.concatenate([P, P[rng.choice(len(P), len(P) // 10, replace=False)]]), np.arange(len(P))
+
+
+# From points of a surface, a scan of them, and which of them its first points are.
+SCANS: dict[str, Scan] = {
+    "clean": noisy(0.0),
+    "noise 1 %": noisy(0.01),
+    "noise 3 %": noisy(0.03),
+    "outliers 2 %": with_outliers,
+    "density 1:100": graded,
+    "copies 10 %": with_copies,
+}
+
+
+def scans(options: argparse.Namespace) -> Iterator[Row]:
+    for (name, scan), n in product(SCANS.items(), options.sizes):
+        row: Row = {"scan": name, "number": n}
+        for shape in options.shapes:
+            rng = np.random.default_rng(options.seed)
+            # Of a falling density a fifth is left.
+            P, truth = SHAPES[shape](5 * n if name.startswith("density") else n, rng)
+            points, kept = scan(P, rng)
+            sources = rng.choice(len(kept), options.sources, replace=False)
+            row[shape] = {}
+            for method in ("default", "potpourri3d", "graph"):
+                query, errors = (_graph if method == "graph" else METHODS[method])(points), []
+                for i in sources.tolist():
+                    exact, found = truth(int(kept[i]))[kept], query(i)[: len(kept)]
+                    there = (exact > 0) & np.isfinite(found)
+                    errors.append(np.mean(np.abs(found - exact)[there] / exact[there]))
+                    row[shape]["missing"] = max(row[shape].get("missing", 0), int((~np.isfinite(found)).sum()))
+                row[shape][method] = 100 * float(np.mean(errors))
+        yield row
 
 
 def clouds(options: argparse.Namespace) -> Iterator[tuple[Row, FloatArray, Query]]:
@@ -152,7 +225,7 @@ def log_maps(options: argparse.Namespace) -> Iterator[Row]:
 
 def main(argv: Sequence[str] | None = None) -> None:
     several = {"shapes": [*SHAPES], "sizes": [5000, 50000], "noise": [0.0, 0.01], "methods": [*METHODS]}
-    options = parsed(__doc__, argv, "*", ("distances", "clock", "log-maps"), sources=6, repeats=15, **several)
+    options = parsed(__doc__, argv, "*", ("distances", "clock", "log-maps", "scans"), sources=6, repeats=15, **several)
     head = {"points on": "{points on}", "number": "{number}", "noise": "{noise:g}"}
     if options.table == "distances":
         columns = head | {f"{m}, %": f"{{{m}[error]:.2g}}" for m in options.methods}
@@ -161,6 +234,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     elif options.table == "clock":
         columns = {"solver and first query": "{both:.2f}", "solver": "{solver:.2f}", "later query": "{later:.2f}"}
         table = Table(collected(clock(options)), head | columns)
+    elif options.table == "scans":
+        columns = {s: f"{{{s}[default]:.2g}} / {{{s}[potpourri3d]:.2g}} / {{{s}[graph]:.2g}}" for s in options.shapes}
+        table = Table(collected(scans(options)), {"scan": "{scan}", "number": "{number}"} | columns)
     else:
         columns = {f"{m}, degrees, %": f"{{{m}[0]:.2g}}, {{{m}[1]:.2g}}" for m in ("heat", "paths", "potpourri3d")}
         table = Table(collected(log_maps(options)), {"vertices of": "{vertices of}"} | columns)
