@@ -249,10 +249,11 @@ def _settle(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython
     high: cython.double = u.stop if u.stop < w.stop else w.stop
     until: cython.double[2]
     order: cython.int
-    first: cython.int = 4 if w.start < u.start and w.stop < u.stop else 0
-    if low >= high:
+    first: cython.int = 4 * ((w.start < u.start) & (w.stop < u.stop))
+    # One test for what touches and what overlaps by rounding: neighbours do either.
+    if high - low < sliver:
         return first
-    if high - low < sliver or (high - low < OVERLAP * (u.stop - u.start) and high - low < OVERLAP * (w.stop - w.start)):
+    if high - low < OVERLAP * (u.stop - u.start) and high - low < OVERLAP * (w.stop - w.start):
         return first
     order = _compare(u, w, low, high, until)
     if order == U_NEARER:
@@ -559,8 +560,7 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
     scale = w.depth * apex.cos_left
     # A line along the side meets it anywhere: so near a root on its extension, the quotient is that of two roundings.
     out.start = w.start * w.depth / (scale - lateral(w, w.start) * apex.sin_left)
-    if out.start < 0.0:
-        out.start = 0.0
+    out.start = max(out.start, 0.0)
     out.stop = apex.left_length
     if w.side == LEFT_OF_APEX:
         out.stop = w.stop * w.depth / (scale - lateral(w, w.stop) * apex.sin_left)
@@ -591,8 +591,7 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
         return False
     scale = w.depth * apex.cos_right
     out.stop = apex.right_length - (apex.length - w.stop) * w.depth / (scale + lateral(w, w.stop) * apex.sin_right)
-    if out.stop > apex.right_length:
-        out.stop = apex.right_length
+    out.stop = min(out.stop, apex.right_length)
     out.start = 0.0
     if w.side == RIGHT_OF_APEX:
         out.start = apex.right_length - (apex.length - w.start) * w.depth / (

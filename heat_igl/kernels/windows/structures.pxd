@@ -208,9 +208,9 @@ cdef extern from *:
 # Twice the scalar product of two sides p and q of a triangle, by the third side. The difference of squares is that of
 # the two longest sides: on needles too, the cosine is off by no more than rounding of one.
 cdef inline double twice_product(double p, double q, double opposite) noexcept nogil:
-    if p >= q:
-        return (p - opposite) * (p + opposite) + q * q
-    return (q - opposite) * (q + opposite) + p * p
+    cdef double longer = p if p > q else q
+    cdef double shorter = q if p > q else p
+    return (longer - opposite) * (longer + opposite) + shorter * shorter
 
 
 # Scalar product of two differences of barycentric coordinates, in a face with these sides opposite its corners.
