@@ -368,6 +368,29 @@ def test_the_order_of_vertices_and_faces_does_not_matter():
     np.testing.assert_allclose(distance[new], exact_distance(mesh.V, mesh.F, 7), rtol=1e-14)
 
 
+@pytest.mark.parametrize(
+    "mesh", [shapes.icosphere(3), shapes.grid(8), shapes.torus(9, 14)], ids=["sphere", "grid", "torus"]
+)
+def test_triangulations_in_which_faces_are_there_twice(mesh):
+    """Windows would go on in both copies and multiply: this would not end."""
+    F = np.concatenate([mesh.F, mesh.F[:, [1, 2, 0]], mesh.F[::2]])
+    once, often = (delaunay(each) for each in (mesh, Mesh(mesh.V, F)))
+    expected, found = (surface.solve(np.array([7])) for surface in (once, often))
+    np.testing.assert_allclose(found.distance, expected.distance, rtol=1e-13)
+    assert found.n_windows <= 2 * expected.n_windows
+    # The same places, in first and second copies.
+    rng = np.random.default_rng(0)
+    faces, barycentric = rng.integers(mesh.n_faces, size=9), rng.dirichlet(np.ones(3), 9)
+    first = SurfacePoints(faces, barycentric)
+    expected = once.solve(points=first, targets=first)
+    for places in (first, SurfacePoints(faces + mesh.n_faces, barycentric[:, [1, 2, 0]])):
+        found = often.solve(points=places, targets=first)
+        np.testing.assert_allclose(found.distance, expected.distance, rtol=1e-13)
+        np.testing.assert_allclose(found.target_distance, expected.target_distance, rtol=0, atol=1e-13)
+        found = often.solve(np.array([7]), targets=places)
+        np.testing.assert_allclose(found.target_distance, once.solve(np.array([7]), targets=first).target_distance)
+
+
 def test_straight_past_a_flat_vertex_next_to_the_source():
     """The way over that vertex is as long, to the last digit, as the straight line past it."""
     rng = np.random.default_rng(0)

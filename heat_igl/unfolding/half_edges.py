@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, lay_out
+from heat_igl.intrinsic import IntrinsicTriangulation, Merged, intrinsic_delaunay, intrinsic_triangulation, lay_out
 from heat_igl.kernels.mesh import numbering
 from heat_igl.kernels.windows.surface import shapes
-from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.mesh import Mesh, SurfacePoints, connectivity
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding.glued import TOO_MANY, glued, mean_exponent
@@ -198,7 +199,7 @@ class HalfEdges:
     def _on_all_faces(self, faces: IntArray, barycentric: FloatArray) -> Located:
         """Sets of places (k, e, 3), by new numbers; those on a side, once more for every other face there."""
         t = self.tables
-        new_face = np.empty(len(self.face), np.int64)
+        new_face = np.empty(self.face.max() + 1, np.int64)
         new_face[self.face] = np.arange(len(self.face))
         faces = new_face[faces]
         barycentric = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
@@ -262,17 +263,56 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
     m = len(triangulation.F)
     if 3 * m + triangulation.n >= TOO_MANY:
         raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
-    exponent = mean_exponent(triangulation.l)
-    numbered = numbering.breadth_first(
-        triangulation.F.ravel().astype(np.int32),
-        triangulation.twin.astype(np.int32),
-        rings(triangulation),
-        triangulation.aligned.astype(np.uint8),
-        np.ldexp(triangulation.l.ravel(), -exponent),
-        triangulation.n,
+    once, kept, merged = _without_copies(triangulation)
+    exponent = mean_exponent(once.l)
+    found = numbering.breadth_first(
+        once.F.ravel().astype(np.int32),
+        once.twin.astype(np.int32),
+        rings(once),
+        once.aligned.astype(np.uint8),
+        np.ldexp(once.l.ravel(), -exponent),
+        once.n,
         0,
     )
-    return HalfEdges(Numbered(*numbered), exponent, triangulation)
+    numbered = Numbered(*found)
+    located_in = replace(triangulation, history=(*triangulation.history, *merged))
+    return HalfEdges(numbered._replace(face=kept[numbered.face]), exponent, located_in)
+
+
+def _without_copies(
+    given: IntrinsicTriangulation,
+) -> tuple[IntrinsicTriangulation, IntArray, tuple[Merged, ...]]:
+    """The triangulation with one of the faces that share all edges, which faces those are, and where points move.
+
+    No shortest path crosses from one of them to another, and windows would multiply.
+    """
+    F, m = given.F, len(given.F)
+    order = np.argsort(F, axis=1)
+    first, which, _ = connectivity.unique_rows(np.take_along_axis(F, order, axis=1), given.n)
+    first = first[which]
+    # An edge of more than two faces was never flipped: its vertices tell it apart.
+    twin = given.twin.reshape(m, 3)
+    is_copy: BoolArray = ((twin == -2) | (twin // 3 == first[:, None])).all(axis=1) & (first < np.arange(m))
+    kept = np.flatnonzero(~is_copy)
+    if len(kept) == m:
+        return given, kept, ()
+    stands = np.where(is_copy, first, np.arange(m))
+    corner = np.empty((m, 3), np.int64)
+    np.put_along_axis(corner, order, order[stands], axis=1)
+    half_edge = (3 * kept[:, None] + np.arange(3)).ravel()
+    new = np.full(3 * m + 2, -1)
+    new[half_edge], new[-2] = np.arange(len(half_edge)), -2
+    once = replace(given, F=F[kept], l=given.l[kept], twin=new[given.twin[half_edge]], aligned=given.aligned[half_edge])
+    # Edges that have one or two faces now.
+    many = np.flatnonzero(once.twin == -2)
+    ends = np.sort(np.stack([once.tail(many), once.head(many)], axis=1), axis=1)
+    _, edge, count = connectivity.unique_rows(ends, given.n)
+    once.twin[many[count[edge] == 1]] = -1
+    many = many[np.argsort(edge, kind="stable")]
+    a, b = many[np.repeat(count, count) == 2].reshape(-1, 2).T
+    once.twin[a], once.twin[b] = b, a
+    once.aligned[a] = once.aligned[b] = once.tail(a) == once.head(b)
+    return once, kept, (Merged(stands, corner),)
 
 
 def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
