@@ -65,8 +65,8 @@ class SignedHeatSolver:
     Notes
     -----
     The paper diffuses vectors at edges. Here they are at vertices, with weights fitted to the lengths of edges
-    (`fitted_laplacian`): a third of the unknowns, and no more error (docs/signed_theory.md). The solver is immutable, and
-    threads may share it.
+    (`fitted_laplacian`): a third of the unknowns, and no more error (docs/signed_theory.md). The solver is immutable,
+    and threads may share it.
 
     Examples
     --------
@@ -133,8 +133,8 @@ class SignedHeatSolver:
         level : {"zero", "constant", "none"}, optional
             Asks for the integrated distance, with this level. "zero" subtracts from each vertex the
             value at the place on the curves that its heat comes from, so that all curves are near 0: within 0.03 mean
-            edge lengths (root mean square) on coarse meshes, and exactly at vertices on them, see docs/signed_theory.md.
-            "constant" makes the value nearly constant along each curve, with a different level for each, and 0 in the
+            edge lengths (root mean square) on coarse meshes, and exactly at vertices on them
+            (docs/signed_theory.md). "constant" makes the value nearly constant along each curve, with a different level for each, and 0 in the
             mean over all. "none" only makes the mean 0. Where the integrated distance is meant and no level is given,
             it is "zero".
 
