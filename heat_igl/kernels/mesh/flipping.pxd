@@ -1,9 +1,9 @@
 cdef class _Flips:
     cdef int[::1] vertex, twin, ring
     cdef double[::1] length
-    # twice that of each face
+    # Twice that of each face.
     cdef double[::1] area
-    # the angle opposite each half-edge; between two that are not, no edge is flipped
+    # The angle opposite each half-edge; between two that are not, no edge is flipped.
     cdef unsigned char[::1] is_obtuse
     cdef int[::1] waiting
     cdef unsigned char[::1] is_waiting

@@ -28,9 +28,6 @@ from cython.cimports.libc.stdlib import free, malloc, realloc
 from cython.cimports.libc.string import memcpy, memmove
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def allocate(s: cython.pointer(Search)) -> cython.void:
     """Room for a front."""
     s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
@@ -48,9 +45,6 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
         s.failed = True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
     """Room for n windows on each side of an apex."""
     s.n_out = 2 * n
@@ -62,9 +56,6 @@ def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
         s.failed = True
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def empty_front(s: cython.pointer(Search)) -> cython.void:
     """Drop all that waits; lists and queue keep their room."""
     i: cython.int
@@ -76,9 +67,6 @@ def empty_front(s: cython.pointer(Search)) -> cython.void:
     s.free_list = -1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def free_front(s: cython.pointer(Search)) -> cython.void:
     """Return the memory of a front."""
     i: cython.int
@@ -91,9 +79,6 @@ def free_front(s: cython.pointer(Search)) -> cython.void:
     free(s.ranked)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cython.void:
     """Add to the queue, a binary heap."""
     i: cython.int
@@ -119,9 +104,6 @@ def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cyt
     s.heap[i].what = what
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def pop(s: cython.pointer(Search)) -> Entry:
     """Take the entry with the smallest key."""
     heap: cython.pointer(Entry) = s.heap
@@ -151,9 +133,6 @@ def pop(s: cython.pointer(Search)) -> Entry:
     return top
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython.void:
     """Let the search from v be one for the distance of `goal` alone, and bound that by a path along edges.
 
@@ -191,9 +170,6 @@ def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython
     s.within = with_rounding(length)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int) -> cython.int:
     """Keep the windows over e through which a path to the goal may be as short as the one known; how many they are.
 
@@ -270,9 +246,6 @@ def relax(
         push(s, distance, s.n_half_edges + v)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root: cython.int) -> cython.void:
     """Lower the distance of target j to one along a straight line inside the face, if that is shorter."""
     if distance < s.target_distance[j]:
@@ -281,9 +254,6 @@ def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root
         s.target_entered[j] = -1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> cython.void:
     """Note a distance of vertex v for the other of two searches."""
     n: cython.int = s.n_news[s.parity]
@@ -379,9 +349,6 @@ def _mirrored(w: Window, length: cython.double) -> Window:
     return w
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def append(
     s: cython.pointer(Search),
     t: cython.int,
@@ -462,9 +429,6 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
     return place
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def add(
     s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int, in_front: cython.bint
 ) -> cython.void:

@@ -37,9 +37,6 @@ class Lines:
         self.distance, self.kind, self.entered, self.share, self.reach = ways
         self.gate = np.zeros(256, _GATE)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def follow(self, v: cython.int) -> cython.int:
         """Follow the line from vertex v to its `end`, through `gate`; 0 if it does not meet any."""
         h: cython.int = self.entered[v]
@@ -69,9 +66,6 @@ class Lines:
             return 0
         return self._cross()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-1, check=False)
     def _cross(self) -> cython.int:
         """Go on from gate to gate until the line ends; where more than two faces meet, try all of them."""
         while True:
@@ -81,9 +75,6 @@ class Lines:
             if met < 0 and not self._turn_back():
                 return 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _enter(self, j: cython.int, g: cython.int) -> cython.bint:
         """Enter the face behind gate j by half-edge g, or by the next around the edge; false if there is none."""
         gate = cython.address(self.gate[j])
@@ -93,9 +84,6 @@ class Lines:
         gate.enter = g
         return g >= 0
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _turn_back(self) -> cython.bint:
         """Take another face at the last edge of more than two; false if there is none."""
         j: cython.int
@@ -107,9 +95,6 @@ class Lines:
                     return self._enter(j, following)
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(-2, check=False)
     def _step(self) -> cython.int:
         """Cross the last gate: 1 if the line ends in the face behind it, -1 if it cannot go on there, else 0."""
         j: cython.int = self.n_gates - 1
@@ -153,9 +138,6 @@ class Lines:
         after.turns_left = turns_left
         return 0 if self._enter(j + 1, self.twin[after.leave]) else -1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _meets(self, x: cython.double, y: cython.double, f: cython.int, corner: cython.int) -> cython.bint:
         """Whether the line ends at, or passes through, the corner of face f / 3 that lies at (x, y)."""
         w: cython.int = self.vertex[f + corner]
@@ -168,9 +150,6 @@ class Lines:
         self.end.at.c[corner] = 1.0
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _is_on_way(
         self, x: cython.double, y: cython.double, apart: cython.double, behind: cython.double
     ) -> cython.bint:
@@ -222,16 +201,10 @@ class Lines:
             entry = self.following[entry]
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _row_of(self, entry: cython.int) -> cython.int:
         """Where the distance of an entry of the source points stands."""
         return self.distance.shape[0] - self.inside.shape[0] + entry
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _end_along(self, h: cython.int) -> cython.int:
         """End the line at the other end of half-edge h."""
         f: cython.int = h - h % 3
@@ -245,9 +218,6 @@ class Lines:
         self.end.at.c[head - f] = 1.0
         return 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def _end_inside(self, v: cython.int, corner: cython.double) -> cython.int:
         """End the line from a corner of a face at a source point in this face."""
         entry: cython.int = self.entered[v]
@@ -259,9 +229,6 @@ class Lines:
             self.end.at.c[c] = self.inside[entry, c]
         return 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def place_at(self, j: cython.int) -> cython.double:
         """The share of gate j, from its right end, at which the line to its exact end crosses it."""
         gate = cython.address(self.gate[j])

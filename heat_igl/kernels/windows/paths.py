@@ -23,9 +23,6 @@ class InnerSources:
         self.segment_face, self.segment = segments.faces, segments.barycentric
         self.segment_offset = starts.segment_offset
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def face(self, root: cython.int) -> cython.int:
         """The face that holds a source; -1 if the root is a vertex."""
         i: cython.int = root - self.n
@@ -33,9 +30,6 @@ class InnerSources:
             return -1
         return self.point_face[i] if i < self.n_points else self.segment_face[i - self.n_points]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def nearest(
         self,
         side: cython.pointer[cython.const[cython.double]],
@@ -66,9 +60,6 @@ class PathSegments:
     def __init__(self, face, place):
         self.face, self.place = face, place
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def append(self, f: cython.int, start: cython.p_double, end: cython.p_double) -> cython.bint:
         """Add a segment in face f; whether there was room."""
         k: cython.int

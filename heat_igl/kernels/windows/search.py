@@ -80,9 +80,6 @@ def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
         emit_vertex(s, v)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def run(s: cython.pointer(Search)) -> cython.void:
     """Carry lists, and let windows leave vertices, points and segments, in ascending order of their keys."""
     entry: Entry
@@ -107,9 +104,6 @@ def run(s: cython.pointer(Search)) -> cython.void:
         over_corners(s, j)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def narrow(s: cython.pointer(Search)) -> cython.void:
     """Lower the cutoff to a distance within which the requested number of vertices are known to lie."""
     i: cython.int
@@ -152,9 +146,6 @@ def narrow(s: cython.pointer(Search)) -> cython.void:
     s.n_next = s.n_touched + s.n_nearest // 4 + 1
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def forget(s: cython.pointer(Search)) -> cython.void:
     """Clear the entries that a search wrote, for the next search on the same front."""
     i: cython.int
@@ -217,9 +208,6 @@ def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int)
             s.upper[news[i].what] = news[i].key
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def run_beside(s: cython.pointer(Search)) -> cython.void:
     """As `run`, for one of two searches on two threads; both return at the same time."""
     o: cython.pointer(Search) = s.other

@@ -33,9 +33,6 @@ from cython.cimports.heat_igl.kernels.windows.surface import beyond, third, turn
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, label: cython.int) -> cython.void:
     """Let distance start at vertex v."""
     if s.failed or offset >= s.distance[v]:
@@ -52,9 +49,6 @@ def start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, la
     push(s, offset, s.n_half_edges + v)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     """Windows from a source inside a face over its three sides."""
     f: cython.int = s.point_face[p]
@@ -107,9 +101,6 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         j = s.next_target[j]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
     """Distances from source segment i inside its face, and windows over the sides of the face."""
     f: cython.int = s.segment_face[i]
@@ -306,9 +297,6 @@ def _fill(
         side = s.twin[side]
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     """Windows from vertex v into all directions in which a shortest path can go on."""
     k: cython.int

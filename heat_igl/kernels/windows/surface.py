@@ -90,17 +90,11 @@ def shapes(
     return is_delaunay
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def third(k: cython.int, side: cython.int) -> cython.int:
     """The half-edge of the face that is neither of two others."""
     return 9 * (k // 3) + 3 - k - side
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython.int:
     """The corner of the same vertex beyond a side of corner k; -1 where there is not just one face."""
     t: cython.int = s.twin[side]
@@ -112,9 +106,6 @@ def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython
     return next_half_edge(t) if is_tail else previous_half_edge(t)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray)) -> cython.void:
     """Turn a direction by the angle of corner k, which has the side `side`."""
     p: cython.double = s.length[side]
@@ -125,9 +116,6 @@ def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython
     ray.cosine, ray.sine = ray.cosine * cosine - ray.sine * sine, ray.cosine * sine + ray.sine * cosine
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
     """The kind of vertex v, by a walk around it: whether the faces are one fan, and whether the angles exceed 2 pi."""
     start: cython.int = s.corner_of_vertex[v]
