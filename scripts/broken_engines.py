@@ -4,9 +4,9 @@
 
 A test double takes the place of an engine's last step and makes its answer wrong: one vertex without a distance, one
 too far, one too near, all too short or too long, a source that is not 0. Over random members of the kinds of
-`heat_igl.validation.zoo.FAMILIES`, the table counts what became of the answers: warned about, repaired without a word
-(what leaves is within 2 % of the largest distance), or let through. ``contradictions`` counts those of all answers that
-violate edges or straight lines when they leave.
+`heat_igl.validation.zoo.FAMILIES`, the table counts what became of the answers: warned about, kept without a word since
+bounds left the mean error within what the engine promises (`PROMISED`), or let through. ``contradictions`` counts those
+of all answers that violate edges or straight lines when they leave.
 """
 
 from __future__ import annotations
@@ -46,6 +46,10 @@ BREAKS: dict[str, Break] = {
     "all long": lambda d, _: d.__imul__(1.5),
     "source": lambda d, source: d.__setitem__(source, 0.2 * d[far_vertex(d)]),
 }
+
+
+#: Mean relative error that an engine promises, or else a warning.
+PROMISED = {"windows": 1e-5, "sweep": 0.02, "heat": 0.05}
 
 
 @contextmanager
@@ -90,7 +94,8 @@ def fate(engine: str, mesh: heat_igl.Mesh, source: int, wrong: Break) -> tuple[s
         warnings.simplefilter("always")
         distance = heat_igl.geodesic_distance(mesh, source, method=engine)  # type: ignore[arg-type]
     there = np.isfinite(truth)
-    off = np.abs(distance[there] - truth[there]).max() / truth[there].max()
+    far = there & (truth > 0)
+    off = float(np.mean(np.abs(distance[far] - truth[far]) / truth[far]))
     # Heat may be steeper than an edge by 4 % of it.
     longest = np.linalg.norm(mesh.V[mesh.edges[:, 0]] - mesh.V[mesh.edges[:, 1]], axis=1).max()
     tolerance = 0.04 * longest / truth[there].max() if engine == "heat" else 1e-5
@@ -99,7 +104,7 @@ def fate(engine: str, mesh: heat_igl.Mesh, source: int, wrong: Break) -> tuple[s
     contradicts = invariants.contradiction(distance, sources, tolerance=tolerance) is not None
     if any(issubclass(each.category, AccuracyWarning) for each in caught):
         return "warned", contradicts
-    return "repaired" if off < 0.02 else "let through", contradicts
+    return "kept" if off <= PROMISED[engine] else "let through", contradicts
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -112,7 +117,7 @@ def main(argv: Sequence[str] | None = None) -> None:
                 for name, wrong in BREAKS.items():
                     became, contradicts = fate(engine, mesh, 7, wrong)
                     found.setdefault((engine, name), Counter()).update([became, *["contradictions"] * contradicts])
-    heads = ("engine", "break", "warned", "repaired", "let through", "contradictions")
+    heads = ("engine", "break", "warned", "kept", "let through", "contradictions")
     rows = [
         {"engine": engine, "break": name} | {h: counts[h] for h in heads[2:]}
         for (engine, name), counts in found.items()

@@ -284,23 +284,6 @@ def test_triangles_laid_out_have_their_lengths(bunny):
     assert (x.item(), y.item()) == pytest.approx((0, 4))
 
 
-def test_every_face_behind_the_spine_of_a_book():
-    """At the spine each half-edge has those of all other pages behind it, elsewhere its twin or nothing."""
-    triangulation = intrinsic_triangulation(shapes.book(4, 3))
-    which, other, aligned = Adjacency(triangulation).behind(np.arange(triangulation.F.size))
-    tail, head = (
-        triangulation.tail(np.arange(triangulation.F.size)),
-        triangulation.head(np.arange(triangulation.F.size)),
-    )
-    pairs = set(zip(which.tolist(), other.tolist(), strict=True))
-    ends = np.sort(np.stack([tail, head], axis=1), axis=1).tolist()
-    expected = {(a, b) for a in range(len(ends)) for b in range(len(ends)) if a != b and ends[a] == ends[b]}
-    assert len(pairs) == len(which)
-    assert pairs == expected
-    assert (aligned == (tail[which] == head[other])).all()
-    assert np.bincount(which).max() == 3
-
-
 def test_spokes_are_the_edges_at_a_vertex(cow):
     triangulation = intrinsic_triangulation(cow)
     vertices = np.array([11, 5, 700])

@@ -2,34 +2,36 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
-from heat_igl.heat_method.batches import checked_cutoff, cut_off
+from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
-from heat_igl.heat_method.construction import PreparedSolver
 from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_surface
 from heat_igl.heat_method.heat_derivative import HeatDerivative
 from heat_igl.heat_method.integration import damped_field
 from heat_igl.heat_method.options import Magnitude, SolverOptions
+from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.side_lengths import SideLengths
-from heat_igl.heat_method.solution import HeatSolution, LabelledDistance
+from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
 from heat_igl.heat_method.source_terms import SourceTerm, right_hand_side
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, as_mesh
-from heat_igl.operators import Laplacian, Operators
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh
+from heat_igl.operators import Laplacian, Operators, edge_length_operators
+from heat_igl.plan import Plan
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import Sources, SourceSet, require_resolved, source_set
 from heat_igl.steps import Boundary
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = ["HeatMethodSolver"]
 
 
-class HeatMethodSolver(PreparedSolver):
+class HeatMethodSolver(BatchedSolver):
     """Geodesic distance by the heat method (Crane, Weischedel, Wardetzky 2013): factor once, ask many times.
 
     Parameters
@@ -98,6 +100,10 @@ class HeatMethodSolver(PreparedSolver):
     (2, 2562)
     """
 
+    _mesh: Mesh | PointCloud | None = None
+    _parts: SolverParts
+    _part: MeshPart | None = None
+
     def __init__(
         self,
         mesh: MeshLike | Operators,
@@ -114,29 +120,166 @@ class HeatMethodSolver(PreparedSolver):
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
         self._set_up(mesh if isinstance(mesh, Operators) and F is None else as_mesh(mesh, F), options, region)
 
-    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
-        """Distance from the nearest source.
+    @classmethod
+    def from_options(
+        cls, mesh: MeshLike | Operators, options: SolverOptions, region: ArrayLike | None = None
+    ) -> HeatMethodSolver:
+        """A solver on `mesh` with options that were put together before."""
+        solver = cls.__new__(cls)
+        solver._set_up(mesh if isinstance(mesh, Operators) else as_mesh(mesh), options, region)
+        return solver
+
+    @classmethod
+    def from_edge_lengths(
+        cls,
+        F: ArrayLike,
+        lengths: ArrayLike,
+        *,
+        n: int | None = None,
+        twin: ArrayLike | None = None,
+        t_coef: float | None = None,
+        t: float | None = None,
+        laplacian: Laplacian = "auto",
+        boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
+        backend: Backend = "auto",
+    ) -> HeatMethodSolver:
+        """A solver on triangles that are known by their edge lengths alone; positions are not needed.
 
         Parameters
         ----------
-        sources : sources
-            A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`
-            where distance begins at other values than 0, or a list of such.
-        cutoff : float, optional
-            Distances beyond this are ``inf``.
-
-        Returns
-        -------
-        (n,) float64
-            In the mesh's unit: 0 at the sources (their offset where they have one, unless another source is nearer),
-            ``inf`` at vertices that no source reaches, never negative or NaN.
+        F : (m, 3) array_like of int
+            Vertices of each triangle.
+        lengths : (m, 3) array_like
+            ``lengths[f, c]`` is that of the side of triangle f opposite its corner c, as `igl.edge_lengths` gives it;
+            both triangles at an edge give it the same length.
+        n : int, optional
+            Number of vertices; one more than the largest in `F` if not given.
+        twin : (m, 3) array_like of int, optional
+            ``twin[f, c]`` is ``3 g + d`` where side c of triangle f is glued to side d of triangle g, and -1 on the
+            boundary. By default sides with the same ends are glued. It is needed where several edges join the same two
+            vertices, or a vertex with itself, as in intrinsic triangulations; then a triangle may repeat a vertex.
+        **options
+            As for the class. Where more than two triangles meet at an edge no tufted cover is made, which takes
+            positions: such edges are not flipped.
 
         Raises
         ------
-        SourceError
-            If `sources` does not describe places on the mesh.
+        MeshError
+            If `F`, `lengths` or `twin` cannot be used; the message names the first offender.
+        """
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
+        start = time.perf_counter()
+        domain = edge_length_operators(F, lengths, n, options.laplacian, twin)
+        return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
+
+    def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
+        """A new solver after the vertices have moved; this one stays as it is.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices.
+
+        Returns
+        -------
+        HeatMethodSolver
+            With the same faces and options, and the same results as one made anew. The time step follows `t_coef`,
+            unless `t` was given. What the faces alone say is shared: they are not validated, and edges, boundary and
+            components not found again; nor is the order of elimination, unless other edges are flipped.
+
+        Raises
+        ------
+        MeshError
+            If `V` cannot be used; the message names the first offender.
         ValueError
-            If `cutoff` is not positive.
+            If the solver was made from operators.
+        """
+        if self._mesh is None:
+            fans = self.operators.fans
+            if fans is None:
+                raise ValueError("this solver was made from operators and has no vertices to move: make it again")
+            positions = fans.polygons.triangles.with_vertices(V).V
+            return self._of(prepare_polygons(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
+        moved = self._mesh.with_vertices(V)
+        options, known = self._parts.options, self._parts.analysis
+        solver = self._of(prepare_mesh(moved, options, known), moved)
+        if self._part is not None and isinstance(moved, Mesh):
+            solver._part = replace(self._part, mesh=moved)
+        return solver
+
+    def _set_up(
+        self,
+        mesh: Mesh | PolygonMesh | PointCloud | Operators,
+        options: SolverOptions,
+        region: ArrayLike | None = None,
+    ) -> None:
+        if region is not None:
+            self._part = MeshPart.of(mesh, region)
+            mesh = self._part.mesh
+        if isinstance(mesh, Operators):
+            if options.laplacian != "auto":
+                raise ValueError(f"laplacian={options.laplacian!r} is for meshes: operators have a Laplacian already")
+            # Whoever made the operators chose the triangulation.
+            chosen = replace(options, laplacian="intrinsic-delaunay")
+            self._mesh, self._parts = None, prepare(mesh, chosen)
+        elif isinstance(mesh, PolygonMesh):
+            self._mesh, self._parts = None, prepare_polygons(mesh, options)
+        else:
+            self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
+
+    @classmethod
+    def _of(cls, parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> HeatMethodSolver:
+        solver = cls.__new__(cls)
+        solver._mesh, solver._parts = mesh, parts
+        return solver
+
+    def __repr__(self) -> str:
+        backend = self.diagnostics.backend
+        return f"HeatMethodSolver({self.n_vertices} vertices, t={self.t:.4g}, backend={backend!r})"
+
+    @property
+    def plan(self) -> Plan:
+        """The engine, which is heat, and what it runs on."""
+        return self._parts.plan
+
+    @property
+    def operators(self) -> Operators:
+        """L, M, G and D of the triangulation that is solved on."""
+        return self._parts.operators
+
+    @property
+    def t(self) -> float:
+        """The time step in use, a squared length; of several (`time_steps`), that of the largest component."""
+        return self.diagnostics.t
+
+    @property
+    def time_steps(self) -> FloatArray:
+        """The time step of each component, by their labels in ``operators.components``."""
+        return self._parts.time_steps
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """What the solver did and rests on."""
+        comparisons = self._parts.comparisons
+        return replace(self._parts.diagnostics, compared=None if comparisons is None else comparisons.worst)
+
+    @property
+    def n_vertices(self) -> int:
+        """Length of a distance array: the vertices of the mesh. The operators may have more."""
+        return self._parts.n_vertices
+
+    @property
+    def referenced(self) -> BoolArray:
+        """Mask (n,) of the vertices that a face uses."""
+        return self.operators.referenced[: self.n_vertices]
+
+    @property
+    def _n_faces(self) -> int:
+        return self._parts.n_faces
+
+    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
+        """Distance (n,) from the nearest source: arguments, values and errors as for `GeodesicSolver.distance`.
 
         Warns
         -----
@@ -223,19 +366,10 @@ class HeatMethodSolver(PreparedSolver):
         return last_steps.pin_levels(terms, phi, u)[:, : self.n_vertices]
 
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
-        """Distance, and which source is nearest: a geodesic Voronoi diagram.
+        """Distance, and which source is nearest: as `GeodesicSolver.voronoi`, with a heat solve for each source.
 
-        Parameters
-        ----------
-        sources, cutoff
-            As for `distance`, with its errors. Sources are counted as they are given: each vertex of a sequence, each
-            set entry of a mask, each point, a curve as one; over the entries of a list one after another.
-
-        Returns
-        -------
-        LabelledDistance
-            Labels say from which source most of the heat comes: a solve for each source, and right but for vertices
-            less than an edge from the border of two cells.
+        Labels say from which source most of the heat comes: right but for vertices less than an edge from the border of
+        two cells.
         """
         beyond = checked_cutoff(cutoff)
         (chosen,) = self._drawn([self._source_set(sources)])
