@@ -9,6 +9,7 @@ filled in space, and points in no triangle are inserted into the nearest one.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from itertools import product
 from typing import NamedTuple
 
@@ -336,26 +337,31 @@ def with_fans_joined(P: FloatArray, F: IntArray, is_settled: BoolArray) -> IntAr
     is_pinched = pinched_vertices(F, is_settled)
     if not is_pinched.any():
         return F
-    corners = group_by_label(F.ravel(), len(P))
+    is_near = np.zeros(len(P), bool)
+    is_near[F[is_pinched[F].any(axis=1)]] = True
+    # The other two corners of each triangle at a vertex.
+    sides: defaultdict[int, list[tuple[int, int]]] = defaultdict(list)
     added: list[tuple[int, int, int]] = []
 
-    def around(vertex: int) -> list[list[int]]:
-        """The other two corners of each triangle at a vertex."""
-        found, _ = corners.of(np.array([vertex]))
-        triangles = F[found // 3].tolist() + [row for row in added if vertex in row]
-        return [[corner for corner in row if corner != vertex] for row in triangles]
+    def add(a: int, b: int, c: int) -> None:
+        sides[a].append((b, c))
+        sides[b].append((c, a))
+        sides[c].append((a, b))
 
+    for row in F[is_near[F].any(axis=1)].tolist():
+        add(*row)
     for vertex in np.flatnonzero(is_pinched).tolist():
         while True:
-            joint = _between_fans(P, vertex, around(vertex))
-            free = [(a, b) for a, b in joint if sum(b in sides for sides in around(a)) < 2]
+            joint = _between_fans(P, vertex, sides[vertex])
+            free = [(a, b) for a, b in joint if sum(b in side for side in sides[a]) < 2]
             if not free:
                 break
             added.append((vertex, *free[0]))
+            add(*added[-1])
     return np.concatenate([F, np.array(added, F.dtype)]) if added else F
 
 
-def _between_fans(P: FloatArray, vertex: int, sides: list[list[int]]) -> list[tuple[int, int]]:
+def _between_fans(P: FloatArray, vertex: int, sides: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Ends of different fans, those with the smallest angle at the vertex first; `sides` are opposite to it."""
     fans: list[list[int]] = []
     for side in sides:
@@ -363,7 +369,9 @@ def _between_fans(P: FloatArray, vertex: int, sides: list[list[int]]) -> list[tu
         fans = [fan for fan in fans if fan not in touching] + [sum(touching, list(side))]
     ends = [[corner for corner in fan if fan.count(corner) == 1] for fan in fans]
     pairs = [pair for i in range(len(ends)) for j in range(i) for pair in product(ends[i], ends[j])]
-    ways = P[np.array(pairs, np.int64).reshape(-1, 2)] - P[vertex]
+    if not pairs:
+        return []
+    ways = P[np.array(pairs)] - P[vertex]
     lengths = np.linalg.norm(ways, axis=2).prod(axis=1)
     cosine = np.einsum("kx,kx->k", ways[:, 0], ways[:, 1]) / np.maximum(lengths, np.finfo(float).tiny)
     return [pairs[i] for i in np.argsort(-cosine, kind="stable")]
