@@ -22,8 +22,8 @@ Level = Literal["zero", "constant", "none"]
 # Each round takes a thirtieth of a query.
 _LEVEL_FACTORS = (1.0, 1.4, 1.8)
 # This share of the values on the curves is extended by a function of small gradient, the rest from the nearest place.
-# On 40 broken curves (docs/signed_theory.md), 31, 37, 38, 38 and 35 have at most the error of potpourri3d's better answer
-# for shares of 0, 1/2, 2/3, 0.8 and 1.
+# On 40 broken curves (docs/signed_theory.md), 31, 37, 38, 38 and 35 have at most the error of potpourri3d's better
+# answer for shares of 0, 1/2, 2/3, 0.8 and 1.
 _SMOOTH_SHARE = 2 / 3
 # The smooth function after so many steps of conjugate gradients; with eight, errors differ by 1 % at most.
 _SMOOTH_STEPS = 3

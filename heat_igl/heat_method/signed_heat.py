@@ -134,9 +134,9 @@ class SignedHeatSolver:
             Asks for the integrated distance, with this level. "zero" subtracts from each vertex the
             value at the place on the curves that its heat comes from, so that all curves are near 0: within 0.03 mean
             edge lengths (root mean square) on coarse meshes, and exactly at vertices on them
-            (docs/signed_theory.md). "constant" makes the value nearly constant along each curve, with a different level for each, and 0 in the
-            mean over all. "none" only makes the mean 0. Where the integrated distance is meant and no level is given,
-            it is "zero".
+            (docs/signed_theory.md). "constant" makes the value nearly constant along each curve, with a different
+            level for each, and 0 in the mean over all. "none" only makes the mean 0. Where the integrated distance is
+            meant and no level is given, it is "zero".
 
         Returns
         -------
