@@ -607,13 +607,6 @@ def test_triangles_are_oriented_like_the_normals(side):
     assert (np.sign(np.einsum("fx,fx->f", np.cross(second - first, third - first), first)) == side).all()
 
 
-def test_vectors_on_a_cloud():
-    """The log map of a sphere: as long as the great circles."""
-    P = heat_igl.shapes.icosphere(3).V
-    vectors = heat_igl.VectorHeatSolver(heat_igl.PointCloud(P), method="windows").log_map(0)
-    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), np.arccos(np.clip(P @ P[0], -1, 1)), atol=0.01)
-
-
 # The triangles fit together.
 
 
