@@ -109,7 +109,7 @@ def by_fermat(V: FloatArray, source: int, left: float, right: float) -> FloatArr
     """
     start, x, y = V[source], V[:, 0] - 0.5, V[:, 1]
     here, there = (left, right) if start[0] < 0.5 else (right, left)
-    beyond = x * (start[0] - 0.5) < 0
+    beyond = x > 0 if start[0] < 0.5 else x < 0  # a source on the border counts as right of it
     depth = abs(start[0] - 0.5)
     crossing = np.linspace(-0.5, 1.5, 8001)
     to_crossing = np.hypot(depth, start[1] - crossing) / here
