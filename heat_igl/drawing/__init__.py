@@ -1,4 +1,4 @@
-"""Pictures, interactive pages and windows of a distance on a surface."""
+"""Pictures and interactive pages of a distance on a surface."""
 
 from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES
 from heat_igl.drawing.plots import (
