@@ -185,7 +185,8 @@ class FrontSolver(Engine):
         is_continued = False
         for round_ in range(_MOST_ROUNDS):
             before = distance.copy()
-            look_around(order, self._body, vertices, offset, turns, self._nearest(vertices), distance, begin, label)
+            guess = self._nearest(vertices)
+            look_around(order, self._body, vertices, offset, turns, len(edges) > 0, guess, distance, begin, label)
             is_seen = distance < before
             way[is_seen] = _STRAIGHT
             if round_ and not is_seen.any() and not is_continued:

@@ -29,7 +29,7 @@ cdef class Ray:
     cdef int cone(self, int v, const double* goal) noexcept nogil
     cdef int worst_side(self, int k) noexcept nogil
     cdef bint begins(self, int k, const double* goal) noexcept nogil
-    cdef void aim(self, int v, int t, const double* goal, int into, double nudge) noexcept nogil
+    cdef void aim(self, int v, int t, const double* goal, int into, double nudge, int toward=*) noexcept nogil
     cdef bint enters(self, int t, int o) noexcept nogil
     cdef int cross(self) noexcept nogil
     cdef bint turn(self, int o) noexcept nogil

@@ -88,11 +88,12 @@ class Ray:
         goal: cython.pointer[cython.const[cython.double]],
         into: cython.int,
         nudge: cython.double,
+        toward: cython.int = -1,
     ) -> cython.void:
         """Take the line from v to a point, both ends moved by a part of the way to the middle of a tetrahedron.
 
         A line along edges and faces, as on a grid, would touch several tetrahedra at once. The end stays if `into` is
-        negative.
+        negative, and the beginning is moved towards one corner of t if `toward` names it.
         """
         i: cython.int
         c: cython.int
@@ -100,7 +101,8 @@ class Ray:
             p: cython.double = (1 - nudge) * self.positions[v, i]
             q: cython.double = goal[i]
             for c in range(4):
-                p += 0.25 * nudge * self.positions[self.corners[t, c], i]
+                part: cython.double = 0.25 if toward < 0 else 0.7 if c == toward else 0.1
+                p += part * nudge * self.positions[self.corners[t, c], i]
             if into >= 0:
                 q *= 1 - nudge
                 for c in range(4):

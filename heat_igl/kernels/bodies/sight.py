@@ -17,6 +17,7 @@ def look_around(
     sources: cython.const[cython.int][::1],
     offset: cython.const[cython.double][::1],
     turns: cython.const[cython.uchar][::1],
+    is_concave: cython.bint,
     guess: cython.int[::1],
     d: cython.double[::1],
     begin: cython.double[::1],
@@ -40,6 +41,8 @@ def look_around(
         Vertex of each source, and the value at which distance begins there.
     turns : (k,) uint8
         Whether ways bend at the source, so that not all tetrahedra there see the same.
+    is_concave : bool
+        Whether ways bend anywhere.
     guess : (n,) int32
         A source that each vertex looks for first, or -1; changed.
     d, begin, label : (n,) float64, (n,) float64, (n,) int32
@@ -50,6 +53,7 @@ def look_around(
     one.corners, one.first, one.incident, one.positions = body.corners, body.first, body.incident, body.positions
     one.first_neighbour, one.neighbours, one.ray = body.first_neighbour, body.neighbours, Ray(body)
     one.sources, one.offset, one.turns, one.guess = sources, offset, turns, guess
+    one.is_concave = is_concave
     one.d, one.begin, one.label = d, begin, label
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
     one.is_waiting = is_waiting
@@ -80,6 +84,7 @@ class _Sight:
     sources: cython.const[cython.int][::1]
     offset: cython.const[cython.double][::1]
     turns: cython.const[cython.uchar][::1]
+    is_concave: cython.bint
     guess: cython.int[::1]
     d: cython.double[::1]
     begin: cython.double[::1]
@@ -181,22 +186,39 @@ class _Sight:
         source: cython.int = self.sources[label]
         if self.first[v] == self.first[v + 1] or self.first[source] == self.first[source + 1]:
             return False
-        into: cython.int = -1 if self.turns[label] else self.incident[self.first[source]] // 4
         goal = cython.address(self.positions[source, 0])
         k: cython.int
         for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
             if self.neighbours[k] == source:
                 return True
         begin: cython.int = self.ray.cone(v, goal)
-        if begin < 0:
-            for k in range(self.first[v], self.first[v + 1]):
-                if self.ray.begins(self.incident[k], goal):
-                    begin = self.incident[k]
-                    break
-        if begin < 0:
-            return False
-        self.ray.aim(v, begin // 4, goal, into, NUDGE)
-        return self.ray.enters(begin // 4, begin % 4) and self.arrives(label)
+        if begin >= 0:
+            return self.arrives_from(v, begin, label)
+        # Along faces and edges, several tetrahedra are as good to begin with, and some may end at a wall.
+        for k in range(self.first[v], self.first[v + 1]):
+            if self.ray.begins(self.incident[k], goal) and self.arrives_from(v, self.incident[k], label):
+                return True
+        return False
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def arrives_from(self, v: cython.int, begin: cython.int, label: cython.int) -> cython.bint:
+        """Whether the line from v that begins in the tetrahedron of a corner gets to the source.
+
+        A line that touches a wall is moved to all sides, one of which is inside.
+        """
+        source: cython.int = self.sources[label]
+        into: cython.int = -1 if self.turns[label] else self.incident[self.first[source]] // 4
+        toward: cython.int
+        for toward in range(-1, 4 if self.is_concave else 0):
+            if toward == begin % 4:
+                continue
+            self.ray.aim(v, begin // 4, cython.address(self.positions[source, 0]), into, NUDGE, toward)
+            if self.ray.enters(begin // 4, begin % 4) and self.arrives(label):
+                return True
+            into = -1
+        return False
 
     @cython.cfunc
     @cython.nogil
@@ -204,12 +226,16 @@ class _Sight:
     def arrives(self, label: cython.int) -> cython.bint:
         """Whether the ray gets to the source before it leaves the body.
 
-        It does once it passes between three vertices that see the source.
+        Without concave walls it does once it passes between three vertices that see the source. The corner of a cavity
+        may stand between such vertices.
         """
         source: cython.int = self.sources[label]
         _steps: cython.int
         for _steps in range(MOST_STEPS):
-            if self.is_lit(self.ray.a, label) and self.is_lit(self.ray.b, label) and self.is_lit(self.ray.c, label):
+            a: cython.int = self.ray.a
+            b: cython.int = self.ray.b
+            c: cython.int = self.ray.c
+            if not self.is_concave and self.is_lit(a, label) and self.is_lit(b, label) and self.is_lit(c, label):
                 return True
             o: cython.int = self.ray.cross()
             if o < 0:
