@@ -64,7 +64,8 @@ def batch(folder: Path, store: Path, workers: int) -> float:
     with cluster.connected(n_workers=workers) as client:
         client.run(_warm)
         start = time.perf_counter()
-        report = cluster.distances(cluster.folder(folder), list(range(SOURCES)), store, client=client)
+        sources = list(range(SOURCES))
+        report = cluster.distances(cluster.folder(folder), sources, store, client=client, method="heat")
         took = time.perf_counter() - start
     if report.failed:
         raise RuntimeError(f"{report.failed[0].mesh}: {report.failed[0].reason}")
