@@ -25,7 +25,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
 from cython.cimports.heat_igl.kernels.windows.surface import classify, third
 from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdlib import free, malloc, realloc
-from cython.cimports.libc.string import memmove
+from cython.cimports.libc.string import memcpy, memmove
 
 
 def allocate(s: cython.pointer(Search)) -> cython.void:
@@ -389,8 +389,12 @@ def append(
     one.count += n
     s.n_windows += n
     s.n_waiting += n
+    if mirrored:
+        for i in range(n):
+            to[i] = _mirrored(run[n - 1 - i], length)
+    else:
+        memcpy(to, run, n * cython.sizeof(Window))
     for i in range(n):
-        to[i] = _mirrored(run[n - 1 - i], length) if mirrored else run[i]
         key = _key(s, to + i, length, bulge)
         if key < lowest:
             lowest = key
