@@ -105,7 +105,7 @@ def test_near_the_truth(name: str, method: str) -> None:
             assert error.mean() < largest_mean_error(name, method)
 
 
-@table(BOUNDED)
+@table([*BOUNDED, *((name, "heat") for name in BODIES if " on " not in name)])
 def test_not_shorter_than_a_straight_line(name: str, method: str) -> None:
     for source in sources(name):
         straight = domain(name).straight(source)

@@ -95,7 +95,7 @@ class SolverParts:
     @property
     def is_default(self) -> bool:
         """Whether answers are held to bounds: neither the paper's field, a time step nor a boundary was asked for."""
-        return _is_default(self.options, self.t_damping is not None)
+        return _is_default(self.options)
 
     @property
     def n_vertices(self) -> int:
@@ -217,7 +217,7 @@ def prepare(
         t_damping=t_damping,
         fitted=fitted,
         checker=Checker(domain.source_surface, domain.referenced[: domain.n_given], V),
-        comparisons=Comparisons(domain) if is_triangles and _is_default(options, damped) else None,
+        comparisons=Comparisons(domain) if is_triangles and _is_default(options) else None,
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,
     )
@@ -249,8 +249,9 @@ def _factored(
     return heat_flow, poisson, divergence
 
 
-def _is_default(options: SolverOptions, damped: bool) -> bool:
-    return damped and options.default_time_step and options.boundary == "neumann"
+def _is_default(options: SolverOptions) -> bool:
+    asked_for_unit = options.magnitude == "unit" or (options.magnitude == "auto" and options.laplacian == "cotan")
+    return not asked_for_unit and options.default_time_step and options.boundary == "neumann"
 
 
 def _of_largest(step: float | FloatArray, domain: Operators) -> float:
