@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -112,10 +113,12 @@ def with_copy(mesh: Mesh, V: np.ndarray, flipped: bool) -> Mesh:
 def test_a_sheet_on_another_is_left_alone(flipped: bool) -> None:
     sheet = shapes.grid(5)
     double = with_copy(sheet, sheet.V, flipped)
-    assert as_mesh(double, merge="seams") is double
+    with pytest.warns(heat_igl.AccuracyWarning, match="places: 20"):
+        assert as_mesh(double, merge="seams") is double
     assert double.report().seam_edges.size == 0
 
 
+@pytest.mark.filterwarnings("ignore:vertices of the boundary")  # rounding gives some of them equal positions
 @pytest.mark.parametrize("seed", range(50))
 def test_sheets_that_are_only_near_are_left_alone(seed: int) -> None:
     generator = np.random.default_rng(seed)
@@ -126,15 +129,41 @@ def test_sheets_that_are_only_near_are_left_alone(seed: int) -> None:
     assert as_mesh(moved, merge="seams") is moved
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_soups_are_measured_as_the_mesh(seed: int) -> None:
+    """Parts of random triangles that share random vertices: any edges may have three faces, any parts may touch."""
+    generator = np.random.default_rng(seed)
+    F = np.stack([generator.choice(30, 3, replace=False) for _ in range(generator.integers(2, 40))])
+    whole = Mesh(generator.normal(size=(30, 3)), F)
+    soup, was = Mesh(whole.V[F].reshape(-1, 3), np.arange(F.size).reshape(-1, 3)), F.ravel()
+    truth = heat_igl.geodesic_distance(whole, was[0])[was]
+    np.testing.assert_array_equal(heat_igl.geodesic_distance(as_mesh(soup, merge="vertices"), 0), truth)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        joined = as_mesh(soup, merge="seams")
+    if not any('merge="vertices"' in str(entry.message) for entry in said):
+        np.testing.assert_allclose(heat_igl.geodesic_distance(joined, 0), truth, rtol=1e-12)
+
+
+def test_merged_vertices_leave_out_collapsed_faces() -> None:
+    V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]])
+    assert as_mesh((V, [[0, 1, 2], [1, 3, 2]]), merge="vertices").n_faces == 1
+    with pytest.raises(heat_igl.MeshError, match="none is left"):
+        as_mesh((V, [[1, 3, 2]]), merge="vertices")
+
+
 def test_t_junctions_and_three_sheets_are_left_alone() -> None:
     V = np.array([[0, 0, 0], [2, 0, 0], [1, 2, 0], [0, 0, 0], [1, 0, 0], [2, 0, 0], [1, -2, 0]], float)
     tee = Mesh(V, [[0, 1, 2], [4, 3, 6], [5, 4, 6]])
-    assert as_mesh(tee, merge="seams") is tee
+    with pytest.warns(heat_igl.AccuracyWarning, match="places: 2"):
+        assert as_mesh(tee, merge="seams") is tee
     three = Mesh(
         [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 0], [0, -1, 0], [1, 0, 0], [0, 0, 0], [0, 0, 1]],
         [[0, 1, 2], [3, 4, 5], [6, 7, 8]],
     )
-    assert as_mesh(three, merge="seams") is three
+    with pytest.warns(heat_igl.AccuracyWarning, match="places: 2"):
+        assert as_mesh(three, merge="seams") is three
+    assert as_mesh(three, merge="vertices").report().nonmanifold_edges.shape == (1, 2)
     assert as_mesh((three.V[:6], three.F[:2]), merge="seams").referenced.sum() == 4
     for other in (shapes.box(1), heat_igl.PointCloud(three.V)):
         assert as_mesh(other, merge="seams") is other
@@ -150,7 +179,7 @@ def test_what_is_none_of_this_package_is_warned_of(tmp_path) -> None:
         assert len(said) == 1
         assert as_mesh(mesh, merge="seams").referenced.sum() == 162
     as_mesh(SimpleNamespace(vertices=shapes.grid(3).V, faces=shapes.grid(3).F))
-    with pytest.raises(ValueError, match="merge must be one of 'seams'"):
+    with pytest.raises(ValueError, match="merge must be one of 'seams', 'vertices'"):
         as_mesh(parts, merge="all")
     with pytest.raises(ValueError, match="none of which is a copy"):
         heat_igl.GeodesicSolver(as_mesh(parts, merge="seams")).distance_vjp(0)

@@ -16,7 +16,7 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.pixel_domain import ImageDomain
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh
-from heat_igl.mesh.seams import seam_originals, seam_pairs
+from heat_igl.mesh.seams import copies_apart, place_originals, seam_originals, seam_pairs
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
@@ -66,7 +66,7 @@ def read_paths_with(reader: Callable[[str | os.PathLike[str]], Mesh | PointCloud
 
 
 def as_mesh(
-    mesh: MeshLike, F: ArrayLike | None = None, *, merge: Literal["seams"] | None = None
+    mesh: MeshLike, F: ArrayLike | None = None, *, merge: Literal["seams", "vertices"] | None = None
 ) -> Mesh | PolygonMesh | PointCloud:
     """A mesh of any library as a mesh of this one.
 
@@ -81,16 +81,18 @@ def as_mesh(
         vtk. With `F`, the positions V (n, 3).
     F : (m, 3) or (m, 4) array_like of int, optional
         Triangles or tetrahedra, when `mesh` is V.
-    merge : {"seams"}, optional
-        Joins the boundary edges of a surface that lie on each other. Loaders of textured models split vertices where
-        the texture has a seam, so that distance across it is ``inf``, or leads around it.
+    merge : {"seams", "vertices"}, optional
+        "seams" joins the boundary edges of a surface that lie on each other. Loaders of textured models split vertices
+        where the texture has a seam, so that distance across it is ``inf``, or leads around it. "vertices" joins all
+        vertices in one place, as `read_mesh` does for STL: for triangles without common vertices.
 
     Returns
     -------
     Mesh, PolygonMesh or PointCloud
         In the vertices' own order and unit. Polygons with more than three corners give a `PolygonMesh`; a mesh with
         tetrahedra gives those, without the triangles of their boundary. With merged seams, all vertices are kept and
-        may be asked for, and those that became one have the same values; polygons with seams become triangles.
+        may be asked for, and those that became one have the same values; polygons with seams become triangles. With
+        merged vertices, triangles with two corners in one place are left out.
 
     Raises
     ------
@@ -100,7 +102,8 @@ def as_mesh(
     Warns
     -----
     AccuracyWarning
-        If boundary edges of a mesh that is none of this package lie on each other, and `merge` is not given.
+        If boundary edges of a mesh that is none of this package lie on each other, and `merge` is not given. If
+        vertices at the boundary lie on each other and are no seam, with ``merge="seams"``.
 
     Notes
     -----
@@ -127,11 +130,11 @@ def as_mesh(
     [0.0, 1.0, 1.0, 1.0, 1.414, 1.0]
     """
     if merge is not None:
-        require_choice("merge", merge, ("seams",))
+        require_choice("merge", merge, ("seams", "vertices"))
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", rf"\d+ {_SEAMS}", AccuracyWarning)
             found = _converted(mesh, F)
-        return found if isinstance(found, PointCloud) else _merged(found)
+        return found if isinstance(found, PointCloud) else _merged(found, merge)
     found = _converted(mesh, F)
     # The reader of a file has warned.
     if not isinstance(mesh, (Mesh, PolygonMesh, PointCloud, ImageDomain, str, os.PathLike)):
@@ -139,12 +142,24 @@ def as_mesh(
     return found
 
 
-def _merged(found: Mesh | PolygonMesh) -> Mesh | PolygonMesh:
+def _merged(found: Mesh | PolygonMesh, merge: str) -> Mesh | PolygonMesh:
     mesh = found if isinstance(found, Mesh) else found.triangles
-    originals = seam_originals(mesh)
+    originals = seam_originals(mesh) if merge == "seams" else place_originals(mesh)
+    apart = copies_apart(mesh, originals)
+    if apart:
+        warn_caller(
+            "vertices of the boundary that lie on each other are not joined where they are no seam (number of places: "
+            f"{apart}): parts touch in a point, three or more edges meet, or one face lies on another; "
+            'as_mesh(mesh, merge="vertices") joins all vertices in one place',
+            AccuracyWarning,
+        )
     if (originals == np.arange(mesh.n_vertices)).all():
         return found
-    return Mesh(mesh.V, originals[mesh.F]).with_originals(originals[mesh.originals])
+    F = originals[mesh.F]
+    F = F[(np.diff(np.sort(F, axis=1), axis=1) > 0).all(axis=1)]
+    if not len(F):
+        raise MeshError("all faces have two corners in one place, so none is left when vertices are merged")
+    return Mesh(mesh.V, F).with_originals(originals[mesh.originals])
 
 
 def warn_of_seams(mesh: Mesh | PolygonMesh | PointCloud) -> None:

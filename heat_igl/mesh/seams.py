@@ -13,7 +13,7 @@ from heat_igl.typing import IntArray
 if TYPE_CHECKING:
     from heat_igl.mesh.mesh import Mesh
 
-__all__ = ["seam_originals", "seam_pairs"]
+__all__ = ["copies_apart", "place_originals", "seam_originals", "seam_pairs"]
 
 
 def seam_pairs(mesh: Mesh) -> IntArray:
@@ -51,6 +51,20 @@ def seam_originals(mesh: Mesh) -> IntArray:
     _, label = sp.csgraph.connected_components(graph, directed=False)
     _, first = np.unique(label, return_index=True)
     return np.asarray(first[label], np.int64)
+
+
+def place_originals(mesh: Mesh) -> IntArray:
+    """The first vertex (n,) in the place of each."""
+    _, first, place = np.unique(_places(mesh, np.arange(mesh.n_vertices)), return_index=True, return_inverse=True)
+    return np.asarray(first[place.ravel()], np.int64)
+
+
+def copies_apart(mesh: Mesh, originals: IntArray) -> int:
+    """The number of places where vertices at the boundary have several `originals`."""
+    at_boundary = np.flatnonzero(mesh.boundary)
+    place = _places(mesh, at_boundary)[at_boundary]
+    pairs = np.unique(np.stack([place, originals[at_boundary]], axis=1), axis=0)
+    return int((np.bincount(pairs[:, 0], minlength=1) > 1).sum())
 
 
 def _places(mesh: Mesh, vertices: IntArray) -> IntArray:
