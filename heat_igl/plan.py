@@ -25,7 +25,7 @@ __all__ = [
     "sweep_plan",
 ]
 
-Engine = Literal["windows", "sweep", "fronts", "heat"]
+Engine = Literal["windows", "sweep", "lines", "hopf-lax", "heat"]
 Method = Literal["auto", "windows", "exact", "sweep"]
 DomainKind = Literal["triangles", "points", "tetrahedra", "separate simplices"]
 
@@ -42,7 +42,7 @@ class Plan:
 
     Attributes
     ----------
-    engine : {"windows", "sweep", "fronts", "heat"}
+    engine : {"windows", "sweep", "lines", "hopf-lax", "heat"}
         What finds the distance.
     tolerance : float or None
         The largest error over the distance; 0 for exact, None for engines without a bound.
@@ -79,12 +79,6 @@ _FLAT = 0.5
 # Where large triangles (`LARGE_SHARE` below) cover the surface, a sweep is wrong by up to 3 % in the mean, and by 17 %
 # of the largest distance at single vertices (CAD cylinders, thin plates, extruded polygons); elsewhere by at most 1.4
 # and 5 %, over 10 members each of 15 kinds of shapes.
-
-
-# Signed distance is measured by windows everywhere, not only near the curves, on so few vertices and with so much
-# curvature, for the same reasons.
-FRONTS_EVERYWHERE_EXACT = _FEW
-ROUGH_FOR_FRONTS = _ROUGH_FOR_SWEEP
 
 
 @dataclass(frozen=True)
@@ -130,11 +124,9 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
         if method in ("windows", "exact"):
             what = "the mesh holds tetrahedra" if kind == "tetrahedra" else "those of this metric do not fit together"
             raise MeshError(f"method={method!r} needs triangles that fit together, and {what}: take method='auto'")
-        return Plan(
-            "fronts",
-            None,
-            f"{kind} are passed by straight lines, and where the metric varies by a scheme that converges",
-        )
+        if kind == "tetrahedra":
+            return Plan("lines", None, "shortest paths through tetrahedra are straight lines that bend around edges")
+        return Plan("hopf-lax", None, "the metric changes between simplices, and the Hopf-Lax formula converges there")
     if method == "sweep":
         return Plan("sweep", None, "a sweep was asked for")
     if method == "auto" and kind == "points":

@@ -34,8 +34,8 @@ def table(cells: list[tuple[str, str]] = CELLS) -> pytest.MarkDecorator:
 
 
 def is_exact(name: str, method: str) -> bool:
-    """Windows and fronts follow straight lines; sweeps, heat and fronts that are refracted are approximations."""
-    return method in ("windows", "exact") or (method == "sweep" and name in BODIES)
+    """Windows and lines are straight; sweeps, heat and the Hopf-Lax formula are approximations."""
+    return solver(name, method).plan.engine in ("windows", "lines")
 
 
 def largest_mean_error(name: str, method: str) -> float:

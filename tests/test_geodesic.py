@@ -250,8 +250,8 @@ SMOOTH = SurfaceMeasures(n=5000, curvature=0.02, flatness=0.0, has_holes=False)
         ("triangles", "sweep", "sweep", None),
         ("points", "auto", "sweep", None),
         ("points", "windows", "windows", 1e-4),
-        ("tetrahedra", "auto", "fronts", None),
-        ("separate simplices", "sweep", "fronts", None),
+        ("tetrahedra", "auto", "lines", None),
+        ("separate simplices", "sweep", "hopf-lax", None),
     ],
 )
 def test_engines_by_kind_and_method(kind, method, engine, tolerance):
@@ -299,7 +299,7 @@ def test_solvers_carry_their_plan():
     assert (heat.engine, heat.tolerance) == ("heat", None)
     assert "t = 0.5 h^2" in heat.reason
     assert HeatMethodSolver(shapes.box(3)).plan.engine == "heat"
-    assert GeodesicSolver(shapes.box(3)).plan.engine == "fronts"
+    assert GeodesicSolver(shapes.box(3)).plan.engine == "lines"
     cloud = heat_igl.PointCloud(shapes.icosphere(4).V)
     assert GeodesicSolver(cloud).plan.engine == "sweep"
     assert HeatMethodSolver(cloud).plan.engine == "heat"

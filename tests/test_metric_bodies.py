@@ -105,7 +105,7 @@ def test_a_metric_at_the_vertices_of_triangles(k, has_windows):
 
 
 def test_thin_triangles_that_turn():
-    """Up to 1:102, with a metric per face, fronts alone are 14 % off in the mean."""
+    """Up to 1:102, with a metric per face, the Hopf-Lax formula on the given faces is 14 % off in the mean."""
     mesh, image, _ = twisted_disk(24, 10.0)
     centre = mesh.V[mesh.F].mean(axis=1)
     a, b = 10.0 * centre[:, 0], 10.0 * centre[:, 1]

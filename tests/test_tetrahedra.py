@@ -1,4 +1,4 @@
-"""Distance through tetrahedra: straight lines in convex bodies, ways around an edge, fronts of many sources."""
+"""Distance through tetrahedra: straight lines in convex bodies, ways around an edge, many sources."""
 
 from __future__ import annotations
 
@@ -209,7 +209,7 @@ def test_walls_behind_a_sharp_edge():
 
 @pytest.mark.parametrize("k", [2, 5, 40])
 def test_many_sources_around_an_edge(k):
-    """Lines that leave the body are not taken, and no front of two sources runs ahead of both."""
+    """Lines that leave the body are not taken, and no distance from two sources is shorter than from both."""
     mesh = l_shape(12, 0.25)
     sources = np.random.default_rng(k).choice(mesh.n_vertices, k, replace=False)
     exact = np.min([around_the_edge(mesh.V, int(i)) for i in sources], axis=0)

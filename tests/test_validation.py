@@ -263,7 +263,7 @@ def test_references_of_ones_own() -> None:
 
 
 def test_rows_of_other_domains() -> None:
-    """Methods of this package take the points of a cloud, not its triangles; fronts are right in a solid."""
+    """Methods of this package take the points of a cloud, not its triangles; lines are right in a solid."""
     P = np.random.default_rng(0).standard_normal((1500, 3))
     cloud = heat_igl.PointCloud(P / np.linalg.norm(P, axis=1, keepdims=True))
     report = validate(cloud, [[0], [9]], ["heat", "windows"], closed_forms.sphere)
@@ -273,10 +273,10 @@ def test_rows_of_other_domains() -> None:
     errors = [row.errors.mean for row in report.rows if row.errors is not None]
     assert errors[1] < 0.4 * errors[0] < 0.01
     box = shapes.box(6)
-    heat, fronts = validate(box, [[0], [100, 7]], ["heat", "sweep"], closed_forms.convex_solid).rows
+    heat, lines = validate(box, [[0], [100, 7]], ["heat", "sweep"], closed_forms.convex_solid).rows
     assert heat.errors is not None
-    assert fronts.errors is not None
-    assert fronts.errors.mean < 1e-6 < heat.errors.mean < 0.1
+    assert lines.errors is not None
+    assert lines.errors.mean < 1e-6 < heat.errors.mean < 0.1
 
 
 def test_unknown_repeated_and_no_methods_are_refused() -> None:

@@ -18,14 +18,15 @@ from heat_igl.intrinsic import TangentFrames, tangent_frames
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import MetricSimplices, Operators, edge_length_operators
-from heat_igl.plan import DomainKind, Method, Plan, distance_plan, sweep_plan
+from heat_igl.plan import Method, Plan, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources, SourceSet, named_vertices, require_resolved, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import (
     Engine,
-    FrontSolver,
     GuardedEngine,
+    HopfLaxEngine,
+    LineEngine,
     MeshTriangles,
     OperatorTriangles,
     SweepEngine,
@@ -46,8 +47,8 @@ class GeodesicSolver(BatchedSolver):
     method : {"auto", "windows", "exact", "sweep"}
         "windows" finds distance within `tolerance`, "exact" the polyhedral distance. "sweep" unfolds two triangles at a
         time: 0.06 to 0.3 % mean error on scans, without a bound, in a fraction of the time on large meshes. "auto" is
-        windows on triangles, and a sweep on a `PointCloud`. Tetrahedra, and simplices that see their common edges at
-        different lengths, are passed by fronts. `plan` says what was taken, and why.
+        windows on triangles, and a sweep on a `PointCloud`. Tetrahedra are passed by straight lines, and simplices that
+        see their common edges at different lengths by the Hopf-Lax formula. `plan` says what was taken, and why.
     tolerance : float
         Largest error over the distance; 0 is exact.
     region : (n,) or (m,) array_like of bool, optional
@@ -134,11 +135,12 @@ class GeodesicSolver(BatchedSolver):
                     f"F[{flat[0]}] = {domain.F[flat[0]].tolist()} has no volume ({len(flat)} of {domain.n_faces} "
                     "faces): remove these faces"
                 )
-            return distance_plan("tetrahedra", method, tolerance), FrontSolver(MetricSimplices.in_space(domain))
+            return distance_plan("tetrahedra", method, tolerance), LineEngine(MetricSimplices.in_space(domain))
         if isinstance(domain, Operators):
             if domain.simplices is not None:
-                kind: DomainKind = "tetrahedra" if domain.simplices.V is not None else "separate simplices"
-                return distance_plan(kind, method, tolerance), FrontSolver(domain.simplices)
+                if domain.simplices.V is not None:
+                    return distance_plan("tetrahedra", method, tolerance), LineEngine(domain.simplices)
+                return distance_plan("separate simplices", method, tolerance), HopfLaxEngine(domain.simplices)
             if domain.surface is None:
                 raise MeshError("distance is measured along simplices, and these operators know none: give the mesh")
             chosen = distance_plan("triangles", method, tolerance)
@@ -164,7 +166,7 @@ class GeodesicSolver(BatchedSolver):
             chosen = sweep_plan(sweep.measures, chosen)
             if chosen.engine == "sweep":
                 return chosen, sweep
-        # Sweeps and fronts are held to bounds where they are made.
+        # All other engines are held to bounds where they are made.
         domain = self._domain.distinct_triangles if isinstance(self._domain, PointCloud) else self._domain
         # Noisy points are measured where they were moved to.
         V = None if isinstance(domain, Operators) else domain.V
@@ -320,7 +322,7 @@ class GeodesicSolver(BatchedSolver):
         if isinstance(self._engine, GuardedEngine):
             return self._engine
         if self._triangles is None:
-            raise MeshError(f"{what} paths on triangles that fit together, and this domain is passed by fronts")
+            raise MeshError(f"{what} paths on triangles that fit together, and the engine here is {self._plan.engine}")
         raise ValueError(f"{what} paths, which a sweep does not find: make the solver with method='windows'")
 
     def _to_targets(self, sources: Sources, targets: Sources) -> FloatArray:

@@ -75,11 +75,11 @@ class Operators:
         The triangles, for exact distance near sources and for unfolding; None if distance is not measured along
         triangles. The three steps never read it.
     simplices : MetricSimplices or None
-        Tetrahedra, or triangles that do not fit together, for fronts that pass through them; None for other domains.
+        Tetrahedra, or triangles that do not fit together, for the engines that pass through them; else None.
     contrast : float
         Largest ratio between faces of the length in the metric per length in space; 1 without a metric.
     metric : MetricSides or None
-        The lengths of triangles in a metric, to be differentiated; None without one, and for fronts.
+        The lengths of triangles in a metric, to be differentiated; None without one, and for `simplices`.
     drawn_on : Surface or None
         The triangles that points and curves refer to, where these are not `surface`: those of polygons.
     fans : PolygonFans or None

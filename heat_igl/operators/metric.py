@@ -61,15 +61,15 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "
         cannot suit both.
 
         Where faces differ by more anywhere, as at a jump of the speed, no unfolding is straight: there is no `surface`,
-        flips end at such edges, sources are vertices, and `GeodesicSolver` takes the scheme for tetrahedra on
-        triangles: those after flips if most edges have one length.
+        flips end at such edges, sources are vertices, and `GeodesicSolver` takes the Hopf-Lax formula on
+        the triangles: those after flips if most edges have one length.
 
         With a metric at the vertices, the length of an edge is the integral along it. Where these are the sides of
         triangles, they are an intrinsic triangulation; if there is a face where they are not, since the metric turns
-        too far along an edge, distance is that of the scheme for tetrahedra, on triangles.
+        too far along an edge, distance is that of the Hopf-Lax formula.
 
-        Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of a scheme of first
-        order, sharpened to second where the metric and the distance are smooth, see `FrontSolver`. Where the tensors of
+        Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of the Hopf-Lax
+        formula, of first order, sharpened to second where the metric and the distance are smooth. Where the tensors of
         neighbours are those of a smooth field, they are carried to the vertices first.
 
     Raises

@@ -38,8 +38,6 @@ class MetricSimplices:
     tensors : (m, q, 3, 3) float64 or None
         A metric that is not the same everywhere: of each simplex (q = 1), or at each of its corners (q = p + 1), with
         logarithms of lengths that are linear in between.
-    flipped : MetricSimplices or None
-        The triangles after flips of edges, where they fit together; for fronts, which go on straight there.
     """
 
     corners: IntArray

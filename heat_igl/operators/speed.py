@@ -35,7 +35,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
         For `GeodesicSolver` and `HeatMethodSolver`, with every length a travel time. Where speeds of neighbours
         differ by at most 10 %, the mean is taken for the edge between them, and triangles with these travel
         times are an intrinsic triangulation, on which every method works. Where they jump, and on tetrahedra,
-        `GeodesicSolver` takes the Hopf-Lax formula on each simplex (`FrontSolver`), right at any contrast;
+        `GeodesicSolver` takes the Hopf-Lax formula on each simplex (`HopfLaxEngine`), right at any contrast;
         then sources are vertices.
 
     Raises

@@ -1,13 +1,14 @@
-"""Distance along simplices: windows, exact or to a tolerance, and sweeps and fronts in an order of their own."""
+"""Distance along simplices: windows, sweeps, straight lines in bodies, the Hopf-Lax formula."""
 
 from heat_igl.unfolding.directions import PathAngles, PathDirections, WindowWays, in_circle
 from heat_igl.unfolding.engine import Engine, MeshTriangles, OperatorTriangles, Triangles
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface, Origin, exact_distance
 from heat_igl.unfolding.exact_paths import ExactPaths, exact_paths
 from heat_igl.unfolding.from_vertex import vectors_from
-from heat_igl.unfolding.fronts import FrontSolver
 from heat_igl.unfolding.guarded import GuardedEngine, contradicted, guarded_windows
+from heat_igl.unfolding.hopf_lax import HopfLaxEngine
 from heat_igl.unfolding.invariants import Invariants
+from heat_igl.unfolding.lines import LineEngine
 from heat_igl.unfolding.local import blocks_within, distances_within, nearest_vertices, pair_distances
 from heat_igl.unfolding.path_derivatives import Change
 from heat_igl.unfolding.path_lengths import PathLengths, SideChange, from_windows
@@ -21,9 +22,10 @@ __all__ = [
     "ExactPaths",
     "ExactSolution",
     "ExactSurface",
-    "FrontSolver",
     "GuardedEngine",
+    "HopfLaxEngine",
     "Invariants",
+    "LineEngine",
     "MeshTriangles",
     "OperatorTriangles",
     "Origin",
