@@ -66,12 +66,7 @@ class SimplexEngine(Engine):
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
         """Lower distance (n,), which begins with the offsets of the vertices and ``inf``; label (n,) counts these."""
 
-    def labelled(
-        self,
-        sources: SourceSet,
-        cutoff: float = np.inf,  # noqa: ARG002
-        threads: int = 1,  # noqa: ARG002
-    ) -> tuple[FloatArray, IntArray]:
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:  # noqa: ARG002
         """Distance (n,), and the source (n,) that it is measured from."""
         n = self._simplices.n
         vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset

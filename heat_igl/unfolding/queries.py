@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from heat_igl.mesh import SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.sources import SourcePoints, SourceSet
-from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding.engine import Triangles
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.engine import Engine, Triangles
+from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 
-__all__ = ["Query", "labels_of", "starting_points"]
+__all__ = ["Query", "TriangleEngine", "labels_of", "starting_points"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +71,51 @@ class Query:
         """Where a search may end, in distances of this query."""
         return cutoff if self.begin is None else cutoff - float(self.begin[np.isfinite(self.begin)].min())
 
+    def solve(self, surface: ExactSurface, *, cutoff: float = np.inf, **options: Any) -> ExactSolution:
+        """Exact distance from the sources on triangles that hold them; options as for `ExactSurface.solve`."""
+        sources = self.sources
+        return surface.solve(
+            sources.vertices,
+            sources.vertex_offset,
+            self.points,
+            None if self.points is None else sources.points.offset,
+            sources.segments if self.has_curves else None,
+            cutoff=cutoff,
+            **options,
+        )
+
     def with_begin(self, distance: FloatArray) -> FloatArray:
         """Distances (n,) of the sources as they were given."""
         return distance if self.begin is None else distance + np.where(np.isfinite(distance), self.begin, 0.0)
+
+
+class TriangleEngine(Engine):
+    """An engine on triangles, with the exact surfaces that points and curves need.
+
+    Parameters
+    ----------
+    triangles : Triangles
+        The surface.
+    originals : (n,) int64, optional
+        The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
+    """
+
+    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
+        self._triangles, self._originals = triangles, originals
+
+    @cached_property
+    def _on_delaunay(self) -> ExactSurface:
+        """The triangles to which points are carried."""
+        return ExactSurface(self._triangles.surface.unfolding)
+
+    @cached_property
+    def _on_faces(self) -> ExactSurface:
+        """The faces before any flip, in which curves lie."""
+        return ExactSurface(self._triangles.faces)
+
+    def _with_copies(self, values: AnyArray) -> AnyArray:
+        """Values (n,) in which copies of points have those of their originals."""
+        return values if self._originals is None else values[self._originals]
 
 
 def labels_of(sources: SourceSet, points: SourcePoints | None = None) -> IntArray:

@@ -20,9 +20,9 @@ from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourcePoints, SourceSet, samples
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
-from heat_igl.unfolding.engine import Engine, Triangles
-from heat_igl.unfolding.exact import ExactSolution, ExactSurface
-from heat_igl.unfolding.queries import Query, labels_of
+from heat_igl.unfolding.engine import Triangles
+from heat_igl.unfolding.exact import ExactSolution
+from heat_igl.unfolding.queries import Query, TriangleEngine, labels_of
 from heat_igl.unfolding.spokes import numbered_spokes
 
 __all__ = ["SweepEngine"]
@@ -43,7 +43,7 @@ _SAMPLE = 10_000
 _MOVED = 0.02
 
 
-class SweepEngine(Engine):
+class SweepEngine(TriangleEngine):
     """Distance by planar unfolding over the triangles at each vertex, for any number of queries.
 
     Paths end at the boundary and at edges of more than two faces: they run along such edges, not across. A surface that
@@ -59,7 +59,7 @@ class SweepEngine(Engine):
     """
 
     def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
-        self._triangles, self._originals = triangles, originals
+        super().__init__(triangles, originals)
         triangulation = triangles.surface.unfolding
         self._triangulation = triangulation if triangulation.aligned.all() else oriented(triangulation)
         self._number, self._spokes = numbered_spokes(self._triangulation)
@@ -97,20 +97,7 @@ class SweepEngine(Engine):
     def _bounds(self) -> Bounds:
         return Bounds(self._triangles.surface)
 
-    @cached_property
-    def _on_delaunay(self) -> ExactSurface:
-        return ExactSurface(self._triangles.surface.unfolding)
-
-    @cached_property
-    def _on_faces(self) -> ExactSurface:
-        return ExactSurface(self._triangles.faces)
-
-    def labelled(
-        self,
-        sources: SourceSet,
-        cutoff: float = np.inf,  # noqa: ARG002
-        threads: int = 1,  # noqa: ARG002
-    ) -> tuple[FloatArray, IntArray]:
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:  # noqa: ARG002
         """Distance (n,), and the source (n,) that it is measured from."""
         query = Query.of(sources, self._triangles)
         points = self._points(query)
@@ -128,9 +115,7 @@ class SweepEngine(Engine):
         self._bounds.shorten(distance, labels)
         self._bounds.lengthen(distance, sources, points)
         _warn_if_moved(swept, distance, self._triangles.mean_edge_length)
-        if self._originals is not None:
-            distance, labels = distance[self._originals], labels[self._originals]
-        return distance, labels
+        return self._with_copies(distance), self._with_copies(labels)
 
     def _points(self, query: Query) -> SourcePoints:
         """The points of a query, and those that stand for its curves."""
@@ -148,15 +133,7 @@ class SweepEngine(Engine):
             return None
         edges = _KNOWN_RADIUS if sources.on_vertices_alone else NEAR_RADIUS
         cutoff = edges * self._triangles.mean_edge_length + float(sources.offsets.max())
-        surface = self._on_faces if query.has_curves else self._on_delaunay
-        return surface.solve(
-            sources.vertices,
-            sources.vertex_offset,
-            query.points,
-            None if query.points is None else sources.points.offset,
-            sources.segments if query.has_curves else None,
-            cutoff=cutoff,
-        )
+        return query.solve(self._on_faces if query.has_curves else self._on_delaunay, cutoff=cutoff)
 
     def _swept(self, query: Query, points: SourcePoints, near: ExactSolution | None) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the vertex or point (n,) that it is measured from, counted one after the other."""

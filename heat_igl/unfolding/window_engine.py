@@ -9,42 +9,24 @@ import numpy as np
 from heat_igl.mesh import SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.sources import SourceSet
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding.curve_directions import CurveDirections
 from heat_igl.unfolding.directions import PathAngles, PathDirections
-from heat_igl.unfolding.engine import Engine, Triangles
+from heat_igl.unfolding.engine import Triangles
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.path_lengths import PathLengths, from_windows
-from heat_igl.unfolding.queries import Query, labels_of, starting_points
+from heat_igl.unfolding.queries import Query, TriangleEngine, labels_of, starting_points
 
 __all__ = ["WindowEngine"]
 
 
-class WindowEngine(Engine):
-    """Distance by windows, directions and paths: all exact, which holds every tolerance.
-
-    Parameters
-    ----------
-    triangles : Triangles
-        The surface.
-    originals : (n,) int64, optional
-        The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
-    """
+class WindowEngine(TriangleEngine):
+    """Distance by windows, directions and paths: all exact, which holds every tolerance."""
 
     def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
-        self._triangles, self._originals = triangles, originals
+        super().__init__(triangles, originals)
         # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
         self._from_vertices = ExactSurface(triangles.half_edges())
-
-    @cached_property
-    def _on_delaunay(self) -> ExactSurface:
-        """The triangles to which points are carried."""
-        return ExactSurface(self._triangles.surface.unfolding)
-
-    @cached_property
-    def _on_faces(self) -> ExactSurface:
-        """The faces before any flip, in which curves lie."""
-        return ExactSurface(self._triangles.faces)
 
     @cached_property
     def _directions(self) -> PathDirections:
@@ -79,25 +61,13 @@ class WindowEngine(Engine):
         threads: int = 1,
     ) -> ExactSolution:
         """Distance and the paths from the sources of a query; see `ExactSurface.solve`."""
-        sources = query.sources
         if query.has_curves:
             surface = self._on_faces
         elif query.points is not None or targets is not None or directed:
             surface = self._on_delaunay
         else:
             surface = self._from_vertices
-        return surface.solve(
-            sources.vertices,
-            sources.vertex_offset,
-            query.points,
-            None if query.points is None else sources.points.offset,
-            sources.segments if query.has_curves else None,
-            cutoff=cutoff,
-            directed=directed,
-            targets=targets,
-            goals=goals,
-            threads=threads,
-        )
+        return query.solve(surface, cutoff=cutoff, directed=directed, targets=targets, goals=goals, threads=threads)
 
     def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
         """Distance (t,) of points or vertices; the search ends when all are known."""
@@ -132,8 +102,8 @@ class WindowEngine(Engine):
             starts = starting_points(self._corner_at[sources.vertices], sources.points, found.origin.label)
         labels = labels_of(sources)[found.origin.label]
         distance = query.with_begin(found.distance)
+        distance, labels = self._with_copies(distance), self._with_copies(labels)
         if self._originals is not None:
-            distance, labels = distance[self._originals], labels[self._originals]
             starts = unchecked_points(starts.faces[self._originals], starts.barycentric[self._originals])
             angles = PathAngles(*(angle[self._originals] for angle in angles))
         return distance, labels, angles, starts
@@ -148,7 +118,3 @@ class WindowEngine(Engine):
     def paths(self, sources: SourceSet) -> PathLengths:
         """The paths whose lengths are the exact distances from vertices and points."""
         return from_windows(self._on_delaunay, self._triangles.surface.unfolding, sources)
-
-    def _with_copies(self, values: AnyArray) -> AnyArray:
-        """Values (n,) in which copies of points have those of their originals."""
-        return values if self._originals is None else values[self._originals]

@@ -1,9 +1,20 @@
-"""Straight lines through tetrahedra, and ways that bend around edges of the body.
+"""Shortest paths through tetrahedra: chains of straight lines that bend around edges (`heat_igl.unfolding.lines`).
 
-`bodies` knows the tetrahedra behind sides and around vertices, and `rays` follows a line from one to the next.
+They bend at edges of the body with more than half a turn inside. Such an edge is a source like a given one, once its
+ends have distances.
 
-Vertices look for the sources of their neighbours along straight lines (`sight`). Edges around which ways bend are
-sources of further lines, in three steps that build on each other: lengths of ways around an edge (`bent_ways`), lines
-that end on an edge (`edge_sight`), and distance along an edge from the ways to its ends (`fitted_bends`). `bends`
-searches the vertices around each edge until no way gets shorter.
+- `bodies` lists the tetrahedron behind each side, and the neighbours of each vertex. `rays` follows a line through the
+  tetrahedra, until it leaves the body. `lines.pxd` is the length of a straight line.
+- `sight`: from near to far, each vertex looks for the sources of its neighbours, the nearest first, and takes the
+  shortest line that stays inside. Then neighbours that do not see this source look again, until nothing changes. A
+  vertex that sees no source stays at infinity.
+- `bends`: each edge, from near to far, whose ends have got shorter distances is fitted, and vertices around it take the
+  ways around it as far as they see it; until no end gets shorter. What it knows of an edge is made in three classes,
+  each derived from the one before:
+  `bent_ways`, the length of a way to a point that bends around the edge;
+  `edge_sight`, whether a vertex sees a point of the edge;
+  `fitted_bends`, distance along the edge: that from one point beside it, if this agrees at the middle and the quarters,
+  else the values there.
+
+Where tetrahedra touch in a point only, and in small bodies with several sources, lines and bends are found in turn.
 """

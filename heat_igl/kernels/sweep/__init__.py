@@ -1,9 +1,22 @@
-"""Distance from vertex to vertex, in an order that is found on the way.
+"""Distance from vertex to vertex: planar unfolding over triangles, and the Hopf-Lax formula on simplices.
 
-On the triangles of a surface, one pass (`sweeping`): a vertex takes the least that its triangles and those beyond them
-say (`planar_updates.pxd`), from tables of spokes (`half_edges`), in the order of a front of its own (`front_order`, and
-the queue in bands `front_queue.pxd`).
+*Unfolding* (`heat_igl.unfolding.sweep`). Two neighbours a and b of v that know their distances from one source place it
+in the plane of their triangle; the distance of v is that of the straight line to it, if this line crosses ab.
 
-On simplices in a metric that changes, the Hopf-Lax formula (`hopf_lax`): first order in the order of Dijkstra's
-algorithm, then second order until nothing changes. `facets` finds the least value over one facet.
+- `half_edges` fills a record per spoke, an edge seen from v: its length, the triangle to its left laid out flat, and
+  the corner w of the triangle beyond the side ab.
+- `front_order` finds the order of the vertices as Dijkstra's algorithm does, by lengths of edges; its queue sorts by
+  bands of distance, without a heap (`front_queue.pxd`).
+- `sweeping` visits v: each spoke proposes a value from a and b, the best is found again with w, which is nearer to the
+  source, and v keeps the least (formulas: `planar_updates.pxd`). If v falls below a vertex that came before, the sweep
+  goes back to that one.
+
+*Hopf-Lax formula* (`heat_igl.unfolding.hopf_lax`). The distance of a corner v of a simplex is the least of
+T(x) + |v - x| over the facet opposite, with T the distance on the facet and |v - x| in the metric of the simplex.
+
+- `hopf_lax`, first order: T is linear, and the least value has a closed form (`linear`). The nearest vertex comes next,
+  and again if its distance falls again.
+- `hopf_lax`, second order: the square of T is quadratic, with second differences from the slopes of distance at the
+  corners; vertices are visited until no distance changes. `facets` finds the least value over a facet, by Newton's
+  method from the place that first order gives.
 """
