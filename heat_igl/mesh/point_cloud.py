@@ -216,7 +216,7 @@ class PointCloud:
         return CloudReport(
             **{field.name: getattr(report, field.name) for field in fields(report)},
             boundary_points=np.flatnonzero(self.boundary),
-            doubtful_points=doubtful_points(self.triangles),
+            doubtful_points=doubtful_points(self.triangles.V, self.triangles.F),
             n_copies=self.n_vertices - len(self._distinct[0]),
             noise=float(np.sqrt(np.square(moved).sum(axis=1).mean())),
         )
