@@ -93,8 +93,10 @@ CALLS = {
     "a store": "write_distances_within(folder + '/near.zarr', mesh, 1.0)",
 }
 CHILD = """
-import sys, time, warnings
+import signal, sys, time, warnings
 from heat_igl import *
+# A shell that starts the tests in the background lets its processes ignore the signal.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 warnings.simplefilter("ignore")
 folder, large, mesh, each = sys.argv[1], shapes.icosphere(7), shapes.icosphere(6), [[i] for i in range(4000)]
 for line in sys.stdin:
