@@ -604,7 +604,7 @@ def test_refused_edge_lengths(F, lengths, options, message):
 
 
 def test_depth_in_a_ball():
-    """The surface of a ball as source: distance is the depth below it. The bounds of a default answer halve its error."""
+    """The surface of a ball as source: distance is the depth below it. Bounds halve the error of a default answer."""
     errors = []
     for n in (5, 10, 20):
         cube = shapes.box(n)
