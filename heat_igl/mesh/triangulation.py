@@ -32,12 +32,8 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[In
 
     Parameters
     ----------
-    V : (n, 3) float64
-        Positions.
-    corners : (sum of degree,) int64
-        Vertices of the polygons, one polygon after the other.
-    degree : (m,) int64
-        Number of corners of each polygon, at least three.
+    V, corners, degree
+        As for `PolygonMesh`, each degree at least three.
 
     Returns
     -------

@@ -17,18 +17,7 @@ __all__ = ["CurveDirections"]
 
 
 class CurveDirections:
-    """Angles of exact paths on the given faces, in which curves run.
-
-    Parameters
-    ----------
-    surface : Surface
-        An oriented manifold of triangles whose faces are known.
-
-    Raises
-    ------
-    MeshError
-        If the surface has no polar angles, see `polar_angles`.
-    """
+    """Angles of exact paths on the given faces, in which curves run; argument and errors as for `PathDirections`."""
 
     def __init__(self, surface: Surface) -> None:
         faces = surface.unfolding if surface.faces is None else surface.faces

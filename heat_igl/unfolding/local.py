@@ -144,14 +144,10 @@ def nearest_vertices(
 
     Parameters
     ----------
-    mesh : mesh
-        Triangles on n vertices: whatever `as_mesh` takes.
     k : int
         How many vertices; the vertex itself is the first of them.
-    sources : int, sequence of int, or (n,) mask of bool, optional
-        The s vertices that are asked, each for itself; all n if not given.
-    region : (n,) or (m,) array_like of bool, optional
-        What paths may enter, as for `GeodesicSolver`. Without sources, vertices elsewhere have no nearest ones.
+    mesh, sources, region
+        As for `distances_within`, s sources; without these, vertices outside the region have no nearest ones.
 
     Returns
     -------

@@ -77,25 +77,14 @@ def convex_solid(mesh: MeshLike, sources: Sources) -> FloatArray:
 def sphere(mesh: MeshLike, sources: Sources, *, center: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """Length of the great circle arc on the sphere around `center` whose radius is that of the vertices.
 
+    Sources, result and errors are those of `plane`, with a ReferenceSolverError if the vertices lie on no such sphere.
+
     Parameters
     ----------
     mesh : mesh
         Vertices on a sphere.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
     center : (3,) array_like
         Center of the sphere.
-
-    Returns
-    -------
-    (n,) float64
-
-    Raises
-    ------
-    ReferenceSolverError
-        If the vertices do not lie on a sphere around `center`.
-    SourceError
-        If the sources name no vertex of the mesh.
     """
     mesh = as_simplices(mesh)
     P = mesh.V - np.asarray(center, dtype=np.float64)
@@ -127,25 +116,14 @@ def cylinder(mesh: MeshLike, sources: Sources) -> FloatArray:
 def cone(mesh: MeshLike, sources: Sources, *, apex: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """Length of the straight line on the unrolled side of a circular cone around an axis parallel to z, without base.
 
+    Sources, result and errors are those of `plane`, with a ReferenceSolverError if the vertices lie on no such cone.
+
     Parameters
     ----------
     mesh : mesh
         Vertices on a cone, up to and including the apex: around a hole at the tip, paths would be longer.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
     apex : (3,) array_like
         Tip of the cone.
-
-    Returns
-    -------
-    (n,) float64
-
-    Raises
-    ------
-    ReferenceSolverError
-        If the vertices do not lie on such a cone.
-    SourceError
-        If the sources name no vertex of the mesh.
     """
     mesh = as_simplices(mesh)
     P = mesh.V - np.asarray(apex, dtype=np.float64)

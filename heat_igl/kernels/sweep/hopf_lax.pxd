@@ -47,12 +47,14 @@ cdef class HopfLax(Facet):
     # The corners of the facet in the simplex.
     cdef int side[3]
 
-    cdef void spread(self, double low) noexcept nogil
+    cdef void wait(self, int v) noexcept nogil
+    cdef int nearest_waiting(self) noexcept nogil
+    cdef void spread(self) noexcept nogil
     cdef int nearest_corner(self) noexcept nogil
     cdef void face(self, int c) noexcept nogil
     cdef double linear(self, int s, int c) noexcept nogil
     cdef double across(self, int s, int c, double da, double db, double dc) noexcept nogil
-    cdef void sharpen(self, const unsigned char[::1] fixed, double low) noexcept nogil
+    cdef void sharpen(self) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
     cdef bint rests_on(self, int v, int u) noexcept nogil

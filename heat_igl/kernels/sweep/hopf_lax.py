@@ -81,7 +81,7 @@ class HopfLax(Facet):
         self.queue = PriorityQueue(n)
         self.handed = np.full(n, np.inf)
         with cython.nogil:
-            self.spread(self.low)
+            self.spread()
         raise_caught()
 
     def second_order(self):
@@ -91,10 +91,27 @@ class HopfLax(Facet):
         self.facet = np.full(n, -1, np.int32)
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
-            self.sharpen(self.fixed, self.low)
+            self.sharpen()
         raise_caught()
 
-    def spread(self, low: cython.double) -> cython.void:
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def wait(self, v: cython.int) -> cython.void:
+        """Put v into the queue, by its distance."""
+        self.queue.set_key(v, 1.0 / (1.0 + (self.d[v] - self.low) / self.unit))
+
+    def nearest_waiting(self) -> cython.int:
+        """Take the nearest vertex out of the queue; -1 if it is empty, or after an interrupt."""
+        self.n_carried += 1
+        if self.queue.count == 0 or (self.n_carried % ASK == 0 and is_interrupted()):
+            return -1
+        v: cython.int = cython.cast(cython.int, self.queue.first())
+        self.queue.set_key(v, 0.0)
+        return v
+
+    def spread(self) -> cython.void:
         """First order: Dijkstra's algorithm, in which a vertex comes again if its distance falls again."""
         v: cython.int
         k: cython.int
@@ -104,13 +121,9 @@ class HopfLax(Facet):
         while True:
             for v in range(self.d.shape[0]):
                 if self.d[v] + gain * fabs(self.d[v]) < self.handed[v]:
-                    self.queue.set_key(v, 1.0 / (1.0 + (self.d[v] - low) / self.unit))
-            while self.queue.count > 0:
-                self.n_carried += 1
-                if self.n_carried % ASK == 0 and is_interrupted():
-                    return
-                v = cython.cast(cython.int, self.queue.first())
-                self.queue.set_key(v, 0.0)
+                    self.wait(v)
+            v = self.nearest_waiting()
+            while v >= 0:
                 self.handed[v] = self.d[v]
                 for k in range(self.first[v], self.first[v + 1]):
                     s: cython.int = self.incident[k] // size
@@ -123,8 +136,9 @@ class HopfLax(Facet):
                             self.label[u] = self.label[self.corners[s, self.nearest_corner()]]
                             self.d[u] = value
                             if value + gain * fabs(value) < self.handed[u]:
-                                self.queue.set_key(u, 1.0 / (1.0 + (value - low) / self.unit))
-            if not gain > GAIN:
+                                self.wait(u)
+                v = self.nearest_waiting()
+            if self.queue.count > 0 or not gain > GAIN:
                 break
             gain *= 0.1
 
@@ -236,7 +250,7 @@ class HopfLax(Facet):
         self.share[0], self.share[1], self.share[2] = 1.0 - fb - fe, fb, fe
         return da + (db - da) * fb + (dc - da) * fe + far
 
-    def sharpen(self, fixed: cython.const[cython.uchar][::1], low: cython.double) -> cython.void:
+    def sharpen(self) -> cython.void:
         """Second order: the nearest vertex next, until no distance around any has changed by more than is settled."""
         v: cython.int
         k: cython.int
@@ -245,25 +259,21 @@ class HopfLax(Facet):
         settled: cython.double = FIRST_SETTLED
         while True:
             for v in range(self.d.shape[0]):
-                if self.pending[v] > settled and not fixed[v] and self.n_visits[v] < MOST_VISITS:
-                    self.queue.set_key(v, 1.0 / (1.0 + (self.d[v] - low) / self.unit))
-            while self.queue.count > 0:
-                self.n_carried += 1
-                if self.n_carried % ASK == 0 and is_interrupted():
-                    return
-                v = cython.cast(cython.int, self.queue.first())
-                self.queue.set_key(v, 0.0)
+                if self.pending[v] > settled and not self.fixed[v] and self.n_visits[v] < MOST_VISITS:
+                    self.wait(v)
+            v = self.nearest_waiting()
+            while v >= 0:
                 self.pending[v] = 0.0
                 self.n_visits[v] += 1
                 old: cython.double = self.d[v]
                 change: cython.double = 0.0 if self.is_sloped[v] else INFINITY
                 self.visit(v)
-                change = max(change, fabs(self.d[v] - old) / max(fabs(old - low), fabs(self.d[v] - low)))
+                change = max(change, fabs(self.d[v] - old) / max(fabs(old - self.low), fabs(self.d[v] - self.low)))
                 for k in range(self.first[v], self.first[v + 1]):
                     s: cython.int = self.incident[k] // size
                     for c in range(size):
                         u: cython.int = self.corners[s, c]
-                        if u == v or fixed[u] or not change > self.pending[u]:
+                        if u == v or self.fixed[u] or not change > self.pending[u]:
                             continue
                         # Farther away, v matters to u if it now has a slope, and u gains by that.
                         if not (self.d[v] < self.d[u] or self.rests_on(u, v)) and not (
@@ -272,8 +282,9 @@ class HopfLax(Facet):
                             continue
                         self.pending[u] = change
                         if change > settled and self.n_visits[u] < MOST_VISITS:
-                            self.queue.set_key(u, 1.0 / (1.0 + (self.d[u] - low) / self.unit))
-            if not settled > SETTLED:
+                            self.wait(u)
+                v = self.nearest_waiting()
+            if self.queue.count > 0 or not settled > SETTLED:
                 break
             settled *= 0.1
 

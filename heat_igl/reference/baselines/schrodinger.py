@@ -39,10 +39,8 @@ def schrodinger(
 
     Parameters
     ----------
-    mesh : Mesh or Operators
-        The domain.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
+    mesh, sources
+        As for `varadhan`.
     hbar : float, optional
         Planck's constant as a length; 1.5 h by default. It is raised if phi would underflow.
     green : {"bessel", "exponential"}
@@ -124,10 +122,8 @@ def schrodinger_grid(sources: ArrayLike, spacing: ArrayLike = 1.0, *, hbar: floa
 
     Parameters
     ----------
-    sources : (n_0, ..., n_d) array_like of bool
-        Marks the points from which distance is measured.
-    spacing : float or (d,) array_like
-        Step of the grid along each axis.
+    sources, spacing
+        As for `fast_marching_grid`.
     hbar : float, optional
         Planck's constant as a length; a quarter of the smallest spacing by default. The cost grows with 1 / hbar.
 
