@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay
 from surfaces import moebius_strip
 
 from heat_igl import (
+    AccuracyWarning,
     Mesh,
     MeshError,
     OrientedPoints,
@@ -164,6 +165,31 @@ def test_broken_circles(removed):
     distance = SignedHeatSolver(mesh).distance(arcs)
     assert mean_error(distance, truth) < 0.04
     np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
+
+
+def test_a_border_that_is_mostly_gaps_warns():
+    """Heat closes the circle again; that smaller gaps do not warn is tested above."""
+    mesh, _, _ = plane(40)
+    arcs = [ring(mesh, start=angle, end=angle + 0.6) for angle in (0, np.pi)]
+    with pytest.warns(AccuracyWarning, match="of the border between the two sides runs through gaps") as caught:
+        SignedHeatSolver(mesh).distance(arcs)
+    told = float(str(caught[0].message).partition("%")[0]) / 100
+    assert told == pytest.approx(1 - 0.6 / np.pi, abs=0.05)
+
+
+def test_where_heat_contradicts_the_sides_these_are_taken_with_a_warning():
+    mesh, _, _ = plane(40)
+    # Heat does not resolve two curves in opposite directions nearer to each other than an edge, and sees none.
+    arcs = [ring(mesh, end=1.5 * np.pi), reversed_curve(ring(mesh, 0.31, end=np.pi))]
+    with pytest.warns(AccuracyWarning, match=r"at \d+ of the \d+ vertices beside the curves, first at vertex \d+"):
+        distance = SignedHeatSolver(mesh).distance(arcs)
+    x, y = (mesh.V - [0.5, 0.5, 0])[:, :2].T
+    radius, angle = np.hypot(x, y), np.arctan2(y, x)
+    off = np.minimum(np.abs(radius - 0.3), np.abs(radius - 0.31))
+    # So near that the nearest place is in a face of the vertex, and not within the polygons' error of a curve.
+    beside = (off < 0.2 / 40) & (off > 1e-4) & (angle > 0.1) & (angle < np.pi - 0.1)
+    assert beside.sum() > 10
+    np.testing.assert_array_equal(distance[beside] > 0, (radius[beside] > 0.3) & (radius[beside] < 0.31))
 
 
 def test_points_with_normals():
@@ -442,7 +468,7 @@ def test_regions_that_share_a_border():
 
 def test_an_open_curve_has_a_left_and_a_right_beside_it():
     mesh, _, truth = plane(34)
-    arc = ring(mesh, end=np.pi)
+    arc = ring(mesh, end=1.2 * np.pi)
     # A curve that only claims to be closed is open: the ends decide.
     claims = SurfaceCurve(arc.faces, arc.start, arc.end, is_closed=True)
     solver = SignedHeatSolver(mesh)

@@ -12,7 +12,7 @@ from heat_igl.mesh.grouping import next_in_run
 from heat_igl.sources import OrientedSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["has_gaps", "left_of_closed", "left_of_nearest", "vertices_on", "zero_curve_in_gaps"]
+__all__ = ["has_gaps", "left_of_closed", "left_of_nearest", "total_length", "vertices_on", "zero_curve_in_gaps"]
 
 # Ends of curves nearer to each other than this share of the mean edge length meet.
 _SAME_PLACE = 1e-6
@@ -34,10 +34,7 @@ def has_gaps(mesh: Mesh, sources: OrientedSet) -> bool:
     """Whether a curve ends, inside the mesh, at no place at which one begins; points always have gaps."""
     if len(sources.point_faces):
         return True
-    begin, end = (
-        np.einsum("sc,scx->sx", barycentric, mesh.V[mesh.F[sources.faces]])
-        for barycentric in (sources.start, sources.end)
-    )
+    begin, end = _ends(mesh, sources)
     tolerance = _SAME_PLACE * float(mesh.edge_lengths.mean())
     # Most segments are followed by the next of their curve, and the last by the first.
     following = next_in_run(np.arange(len(begin)), np.unique(sources.label, return_counts=True)[1])
@@ -54,6 +51,17 @@ def has_gaps(mesh: Mesh, sources: OrientedSet) -> bool:
     to_begin = cKDTree(begin[loose_begins]).query(end[loose_ends])[0]
     to_end = cKDTree(end[loose_ends]).query(begin[loose_begins])[0]
     return bool(max(to_begin.max(), to_end.max()) > tolerance)
+
+
+def total_length(mesh: Mesh, curves: OrientedSet | SurfaceCurve) -> float:
+    """Length of all segments, whether or not each begins where the one before ends."""
+    return float(np.linalg.norm(np.subtract(*_ends(mesh, curves)), axis=1).sum())
+
+
+def _ends(mesh: Mesh, curves: OrientedSet | SurfaceCurve) -> tuple[FloatArray, FloatArray]:
+    """Positions (s, 3) in space at which the segments begin and end."""
+    corners = mesh.V[mesh.F[curves.faces]]
+    return np.einsum("sc,scx->sx", curves.start, corners), np.einsum("sc,scx->sx", curves.end, corners)
 
 
 def _on_boundary(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> BoolArray:
@@ -168,9 +176,9 @@ def left_of_closed(
 
 
 def left_of_nearest(
-    triangulation: IntrinsicTriangulation, sources: OrientedSet, distance: FloatArray, otherwise: BoolArray
-) -> BoolArray:
-    """Which vertices (n,) are on the left of the nearest segment, where that is in one of their faces.
+    triangulation: IntrinsicTriangulation, sources: OrientedSet, distance: FloatArray
+) -> tuple[BoolArray, BoolArray]:
+    """Which vertices (n,) are on the left of the nearest segment, and which (n,) have that in one of their faces.
 
     Parameters
     ----------
@@ -180,8 +188,11 @@ def left_of_nearest(
         Curves.
     distance : (n,) float64
         Distance from them.
-    otherwise : (n,) bool
-        The answer at all other vertices.
+
+    Returns
+    -------
+    left, is_known : (n,) bool
+        Nothing is known of vertices that see the segment almost along it, nor of vertices on it.
     """
     seen = _seen(triangulation, sources)
     face, place = np.divmod(seen.place, 6)
@@ -191,9 +202,9 @@ def left_of_nearest(
     )
     # Of segments that meet in the nearest place, the one seen under the largest angle is written last.
     nearest = nearest[np.argsort(np.abs(seen.sine[nearest]), kind="stable")]
-    left = otherwise.copy()
-    left[vertex[nearest]] = seen.sine[nearest] > 0
-    return left
+    left, is_known = np.zeros((2, len(distance)), bool)
+    left[vertex[nearest]], is_known[vertex[nearest]] = seen.sine[nearest] > 0, True
+    return left, is_known
 
 
 class _Seen(NamedTuple):

@@ -6,12 +6,13 @@ from typing import get_args
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError, require_choice
+from heat_igl.errors import AccuracyWarning, MeshError, SourceError, require_choice
 from heat_igl.heat_method.curve_levels import Level
 from heat_igl.heat_method.curve_sides import (
     has_gaps,
     left_of_closed,
     left_of_nearest,
+    total_length,
     vertices_on,
     zero_curve_in_gaps,
 )
@@ -21,11 +22,11 @@ from heat_igl.heat_method.parts import prepare
 from heat_igl.heat_method.solver import HeatMethodSolver
 from heat_igl.intrinsic import IntrinsicTriangulation, oriented
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, one_sided
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, one_sided
 from heat_igl.operators import Operators, operators
-from heat_igl.runtime import both, n_threads
+from heat_igl.runtime import both, n_threads, warn_caller
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, require_resolved, source_set
-from heat_igl.typing import BoolArray, FloatArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.unfolding import ExactSurface, MeshTriangles
 
 __all__ = ["Level", "SignedHeatSolver"]
@@ -33,6 +34,11 @@ __all__ = ["Level", "SignedHeatSolver"]
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed_theory.md).
 _T_COEF = 0.25
+# Share of the border between the sides that heat may close without a warning: above it, most of that is not given.
+_CLOSED_BY_HEAT = 0.5
+# Share of the vertices beside curves that may be on the other side for the heat, whose zero curve is up to half an edge
+# off. It is 4 % at most on 48 broken levels (docs/signed_theory.md).
+_CONTRADICTED = 0.05
 
 
 class SignedHeatSolver:
@@ -151,6 +157,12 @@ class SignedHeatSolver:
         ValueError
             If there is no such `level`.
 
+        Warns
+        -----
+        AccuracyWarning
+            If more than half of the border between the sides runs through gaps, or the heat that closes them
+            contradicts the sides at more than 5 % of the vertices beside the curves; the sides are kept.
+
         Notes
         -----
         If no curve has a gap, the regions between curves have one sign each, that of the side on which the curves lie.
@@ -192,9 +204,32 @@ class SignedHeatSolver:
                 return size, left & np.isfinite(size)
             return size, np.where(is_known, left, self._integration.distance(chosen, level) < 0)
         size, phi = self._integration.distance_beside(lambda: self._from(sources), chosen, level)
-        left = left_of_nearest(self._faces, chosen, size, phi < 0)
+        left, is_known = left_of_nearest(self._faces, chosen, size)
         closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
+        self._warn_if_unsure(chosen, closing, np.flatnonzero(is_known & (left != (phi < 0))), int(is_known.sum()))
+        left = np.where(is_known, left, phi < 0)
         return size if closing is None else np.minimum(size, self._from([closing])), left
+
+    def _warn_if_unsure(
+        self, chosen: OrientedSet, closing: SurfaceCurve | None, contradicted: IntArray, n_beside: int
+    ) -> None:
+        """Warn if most of the border is the `closing`, or heat contradicts the sides at many vertices beside curves."""
+        closed = 0.0 if closing is None else total_length(self._mesh, closing)
+        share = closed / (closed + total_length(self._mesh, chosen))
+        if share > _CLOSED_BY_HEAT:
+            warn_caller(
+                f"{share:.0%} of the border between the two sides runs through gaps of the curves, where heat alone "
+                "decides the sign: give more of the curves where the sign matters",
+                AccuracyWarning,
+            )
+        if len(contradicted) > _CONTRADICTED * n_beside:
+            warn_caller(
+                f"at {len(contradicted)} of the {n_beside} vertices beside the curves, first at vertex "
+                f"{contradicted[0]}, the heat that closes the gaps has the other sign than the side of the nearest "
+                "curve, which is taken: direct all pieces alike, and refine the mesh where curves in opposite "
+                "directions are nearer to each other than an edge",
+                AccuracyWarning,
+            )
 
     def _from(self, sources: Sources) -> FloatArray:
         """Exact distance (n,) from sources without a side."""
