@@ -1,4 +1,4 @@
-"""Distance by sweeps over triangles in the order of their own front, and the bounds that it is moved inside."""
+"""Distance by sweeps over triangles in an order of their own, and the bounds that it is moved inside."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from heat_igl.unfolding.bounds import Bounds
 from heat_igl.unfolding.exact import exact_distance
 from heat_igl.validation import zoo
 
-# --- Distance by sweeps over triangles, in the order of their own front: exact on flat domains, near it on others
+# --- Distance by sweeps over triangles, in an order of their own: exact on flat domains, near it on others
 
 
 FLAT = {
@@ -89,7 +89,7 @@ def test_straight_over_an_edge_of_more_than_two_faces(k):
     np.testing.assert_allclose(swept(mesh, source)[first_row], truth[first_row], rtol=1e-9)
 
 
-def test_a_front_visits_few_vertices_again(bumpy, monkeypatch):
+def test_a_sweep_visits_few_vertices_again(bumpy, monkeypatch):
     visits = []
     sweep = sweeping.sweep
     monkeypatch.setattr(sweeping, "sweep", lambda *arguments: visits.append(sweep(*arguments)))

@@ -1,4 +1,4 @@
-"""`Sweep`: distance by unfolding two triangles at a time, in the order in which a front meets the vertices.
+"""`Sweep`: distance by unfolding two triangles at a time, in an order of the vertices that is found on the way.
 
 A vertex gets its distance from neighbours that are nearer to the source, by laying triangles out in the plane.
 docs/engines.md has the update and its error.
@@ -33,8 +33,8 @@ _SPACING = 0.125
 # Sweeps from several sources start with the exact distance up to so many mean edge lengths: next to a border of cells
 # they know no source from both ends of a side.
 _KNOWN_RADIUS = 4.0
-# Width of the bands of distance in which the front takes the next vertex, in units of the median edge. Wider bands let
-# a front go back more often, of narrower ones many are empty.
+# Width of the bands of distance in which the next vertex is taken, in units of the median edge. Wider bands
+# make a sweep go back more often, of narrower ones many are empty.
 _BAND = 0.1
 # Edges that are looked at for that median.
 _SAMPLE = 10_000

@@ -16,5 +16,5 @@ cdef enum:
     CACHED = 1 << 15
     # Sides of the triangles at a vertex that straight lines cross: more are held only for a moment.
     SIDES = 16
-    # A front knows so many vertices in advance, whose data can be fetched meanwhile.
+    # The order knows so many vertices in advance, whose data can be fetched meanwhile.
     AHEAD = 4

@@ -1,4 +1,4 @@
-"""Kernel of the sweep: distance by unfolding two triangles at a time, in the order of a front.
+"""Kernel of the sweep: distance by unfolding two triangles at a time, in an order found on the way.
 
 Seen from a vertex v, a source lies behind the side ab of a triangle at v, at the intersection of circles about a and b.
 The triangle beyond ab has the third corner w, which is nearer to the source and so places it more accurately:
@@ -9,7 +9,6 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
-from cython.cimports.heat_igl.kernels.sweep.front_order import FrontOrder
 from cython.cimports.heat_igl.kernels.sweep.half_edges import HalfEdges
 from cython.cimports.heat_igl.kernels.sweep.planar_updates import (
     across_side,
@@ -29,6 +28,7 @@ from cython.cimports.heat_igl.kernels.sweep.sweeping import (
     SIDES,
     SWEEP_ROUNDING,
 )
+from cython.cimports.heat_igl.kernels.sweep.visit_order import VisitOrder
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from heat_igl.kernels.signals import raise_caught
@@ -47,7 +47,7 @@ def sweep(
 ):
     """Lower `d` (n,) to the best planar unfolding over the triangles of each vertex, until nothing gives less.
 
-    A front finds the order of the vertices, in bands of distance of the given width, see `FrontOrder`. If a vertex
+    The order of the vertices is found in bands of distance of the given width, see `VisitOrder`. If a vertex
     turns out to be nearer than one that came before it, the sweep goes back to that one at once, before the error there
     spreads. Returns the number of visits per vertex. Vertices that are not in `is_stale` (n,) bool are visited only if
     a value that they depend on changes.
@@ -64,8 +64,8 @@ def sweep(
     one.is_large = one.t.spoke.shape[0] > CACHED
     one.d, one.is_stale, one.offset, one.group = d, is_stale, offset, group
     one.n_ordered = 0
-    one.front = FrontOrder(one.t, d, width)
-    one.order, one.rank = one.front.order, one.front.rank
+    one.visits = VisitOrder(one.t, d, width)
+    one.order, one.rank = one.visits.order, one.visits.rank
     one.is_flat = spokes.is_flat.view(np.uint8)
     one.has_labels = label is not None
     one.label = label if one.has_labels else np.empty(0, np.int32)
@@ -80,7 +80,7 @@ def sweep(
 class _Sweep:
     """Arrays that a sweep reads and writes; by vertex but for `order`, the vertices, and `offset`, by source.
 
-    The first `n_ordered` entries of `order` are known, and a `front` finds the others.
+    The first `n_ordered` entries of `order` are known, and `visits` finds the others.
     """
 
     t: HalfEdges
@@ -88,7 +88,7 @@ class _Sweep:
     rank: cython.int[::1]
     is_large: cython.bint
     n_ordered: cython.Py_ssize_t
-    front: FrontOrder
+    visits: VisitOrder
     is_flat: cython.const[cython.uchar][::1]
     is_stale: cython.uchar[::1]
     d: cython.double[::1]
@@ -111,7 +111,7 @@ class _Sweep:
         self.n_visits = 0
         while self.n_visits < GIVE_UP * n:
             if i + AHEAD > self.n_ordered and self.n_ordered < n:
-                self.n_ordered = self.front.advance(i, AHEAD)
+                self.n_ordered = self.visits.advance(i, AHEAD)
             if i == self.n_ordered:
                 if again == n:
                     break

@@ -1,18 +1,18 @@
-"""The order in which a front meets the vertices of a triangulation, found while their distances are."""
+"""The order in which a sweep visits the vertices of a triangulation, found while their distances are."""
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.sweep.front_queue import clear, put, take
+from cython.cimports.heat_igl.kernels.sweep.band_queue import clear, put, take
 from cython.cimports.libc.math import INFINITY
 
-__all__ = ["FrontOrder"]
+__all__ = ["VisitOrder"]
 
 _WAITING = np.dtype([("vertex", "i4"), ("following", "i4")])
 
 
 @cython.final
 @cython.cclass
-class FrontOrder:
+class VisitOrder:
     """The order of Dijkstra's algorithm, with distances that a sweep lowers: next comes the nearest along an edge.
 
     The first `n_ordered` entries of `order` are known, and vertices beyond them have rank n. The neighbours of the
@@ -24,7 +24,7 @@ class FrontOrder:
     t : HalfEdges
         The triangulation.
     d : (n,) float64
-        Distances, which are changed outside; the front begins at those that are finite.
+        Distances, which are changed outside; the order begins with those that are finite.
     width : float
         Of the bands.
     """
@@ -39,7 +39,7 @@ class FrontOrder:
         self.put_known(width)
 
     def put_known(self, width: cython.double) -> cython.void:
-        """Begin a front at the vertices whose distance is known."""
+        """Begin with the vertices whose distance is known."""
         v: cython.int
         clear(cython.address(self.ahead), cython.address(self.waiting[0]), width)
         for v in range(self.d.shape[0]):
@@ -69,7 +69,7 @@ class FrontOrder:
     @cython.nogil
     @cython.exceptval(check=False)
     def reach_neighbours(self) -> cython.void:
-        """Put the neighbours of the next vertex that the front has passed into the queue."""
+        """Put the neighbours of the next vertex that was passed into the queue."""
         k: cython.int
         v: cython.int = self.order[self.n_passed]
         self.n_passed += 1

@@ -1,4 +1,4 @@
-# The vertices ahead of a front, nearest first to within a band: a ring of queues, one for each band of distance.
+# The vertices to be visited, nearest first to within a band: a ring of queues, one for each band of distance.
 #
 # Keys beyond the last band of the ring wait in that one, and are put again when it comes. A vertex may be there several
 # times. The order inside a band is that in which vertices were put.
@@ -12,7 +12,7 @@ cdef struct Waiting:
     int vertex, following
 
 
-cdef struct FrontQueue:
+cdef struct BandQueue:
     Waiting* place  # room for all that is ever put
     int n_places
     int n_waiting
@@ -22,19 +22,19 @@ cdef struct FrontQueue:
     int last[BANDS]
 
 
-cdef inline void clear(FrontQueue* q, Waiting* place, double width) noexcept nogil:
+cdef inline void clear(BandQueue* q, Waiting* place, double width) noexcept nogil:
     cdef int i
     q.place, q.n_places, q.n_waiting, q.per_length, q.band = place, 0, 0, 1.0 / width, 0.0
     for i in range(BANDS):
         q.first[i] = -1
 
 
-cdef inline double band_of(FrontQueue* q, double key) noexcept nogil:
+cdef inline double band_of(BandQueue* q, double key) noexcept nogil:
     # Among those in the ring.
     return min(max(key * q.per_length, q.band), q.band + (BANDS - 1))
 
 
-cdef inline void append(FrontQueue* q, int place, double key) noexcept nogil:
+cdef inline void append(BandQueue* q, int place, double key) noexcept nogil:
     cdef int slot = <int> (<long long> band_of(q, key) & (BANDS - 1))
     q.place[place].following = -1
     if q.first[slot] < 0:
@@ -44,7 +44,7 @@ cdef inline void append(FrontQueue* q, int place, double key) noexcept nogil:
     q.last[slot] = place
 
 
-cdef inline void put(FrontQueue* q, int vertex, double key) noexcept nogil:
+cdef inline void put(BandQueue* q, int vertex, double key) noexcept nogil:
     # Add a vertex at a distance.
     q.place[q.n_places].vertex = vertex
     append(q, q.n_places, key)
@@ -52,7 +52,7 @@ cdef inline void put(FrontQueue* q, int vertex, double key) noexcept nogil:
     q.n_waiting += 1
 
 
-cdef inline void leap(FrontQueue* q, const double* key) noexcept nogil:
+cdef inline void leap(BandQueue* q, const double* key) noexcept nogil:
     # Go on to the nearest band in which a vertex waits: all of them are far ahead.
     cdef int slot, place, following
     cdef int left = -1
@@ -73,7 +73,7 @@ cdef inline void leap(FrontQueue* q, const double* key) noexcept nogil:
         left = following
 
 
-cdef inline int take(FrontQueue* q, const double* key) noexcept nogil:
+cdef inline int take(BandQueue* q, const double* key) noexcept nogil:
     # Take a vertex of the nearest band; -1 if none is left. `key` is the distance of each.
     cdef int slot, place
     cdef int n_passed = 0

@@ -1,14 +1,14 @@
-from heat_igl.kernels.sweep.front_queue cimport FrontQueue, Waiting
+from heat_igl.kernels.sweep.band_queue cimport BandQueue, Waiting
 from heat_igl.kernels.sweep.half_edges cimport HalfEdges
 
-cdef class FrontOrder:
+cdef class VisitOrder:
     cdef HalfEdges t
     cdef double[::1] d
     cdef int[::1] order
     cdef int[::1] rank
     cdef double[::1] key
     cdef Waiting[::1] waiting
-    cdef FrontQueue ahead
+    cdef BandQueue ahead
     cdef Py_ssize_t n_ordered, n_passed
 
     cdef Py_ssize_t advance(self, Py_ssize_t i, Py_ssize_t count) noexcept nogil
