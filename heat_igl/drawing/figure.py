@@ -95,7 +95,11 @@ def _colour_bar(axes: Any, seen: Scene, style: Style, table: Any, label: str) ->
     axes.yaxis.tick_right()
     axes.yaxis.set_label_position("right")
     every = step * next((k for k in (1, 2, 4, 5, 10, 20, 50, 100, 200) if (high - low) / (k * step) <= 6), 500)
-    axes.set_yticks(every * np.arange(np.ceil(low / every * (1 - 1e-12)), np.floor(high / every * (1 + 1e-12)) + 1))
+    ticks = every * np.arange(np.ceil(low / every * (1 - 1e-12)), np.floor(high / every * (1 + 1e-12)) + 1)
+    if len(ticks) > 2:  # lines may be so far apart that fewer would not tell the scale
+        axes.set_yticks(ticks)
+    else:
+        axes.locator_params(axis="y", nbins=6)
     axes.tick_params(labelsize=_FONT, length=2, width=0.4, pad=1.5)
     axes.yaxis.get_offset_text().set(fontsize=_FONT, horizontalalignment="left", x=1.0)
     axes.set_ylabel(label, fontsize=_FONT, labelpad=3)

@@ -23,12 +23,12 @@ __all__ = ["error_figure"]
 
 # Errors from 0.001 % to 10 %, the range in which methods differ. All panels share it, so that they can be compared.
 _LOWEST, _HIGHEST = 1e-5, 1e-1
-_ROW_INCHES = 2.6
-_COLUMNS, _LARGEST_ROWS = 800, 640  # of the picture of the surface
+_ACROSS, _ROW_INCHES = 3, 3.2
+_COLUMNS, _LARGEST_ROWS = 560, 450  # of the picture of the surface
 
 
 def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[str, FloatArray]) -> Figure:
-    """A figure with two panels for each method: its error on the surface, and against distance.
+    """A figure with two panels for each method: its error on the surface, and below that against distance.
 
     Parameters
     ----------
@@ -56,15 +56,22 @@ def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[s
         from matplotlib.figure import Figure
     except ImportError:
         raise MissingExtraError.of("a figure", "matplotlib", "view") from None
-    figure = Figure(figsize=(9, _ROW_INCHES * len(distances) + 0.6), layout="constrained")
+    across = min(_ACROSS, len(distances))
+    down = -(-len(distances) // across)
+    figure = Figure(figsize=(0.6 + 2.8 * across, _ROW_INCHES * down + 0.4), layout="constrained")
     figure.suptitle(title)
-    axes = figure.subplots(len(distances), 2, squeeze=False, width_ratios=(1, 1.2))
+    axes = figure.subplots(2 * down, across, squeeze=False)
+    surfaces, scatters = axes[::2].ravel(), axes[1::2].ravel()
+    for empty in (*surfaces[len(distances) :], *scatters[len(distances) :]):
+        empty.set_axis_off()
     norm = LogNorm(_LOWEST, _HIGHEST)
     reachable = np.isfinite(truth) & (truth > 0)
     limits = float(np.log10(_LOWEST)), float(np.log10(_HIGHEST))
     seen = scene(mesh, np.zeros(mesh.n_vertices), sources=np.flatnonzero(truth == 0), limits=limits)
     table = colours("viridis", is_trimmed=False)
-    for (surface, scatter), (method, distance) in zip(axes, distances.items(), strict=True):
+    for (surface, scatter), (method, distance) in zip(
+        zip(surfaces, scatters, strict=True), distances.items(), strict=False
+    ):
         error = np.nan_to_num(relative_error(distance, truth), nan=_HIGHEST)
         # A source has no relative error; it is drawn as if it had the smallest. Unreachable vertices have no colour.
         shown = np.where(reachable, np.clip(error, _LOWEST, _HIGHEST), np.where(truth == 0, _LOWEST, np.inf))
@@ -73,10 +80,13 @@ def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[s
         size = float(np.clip(60 / np.sqrt(reachable.sum()), 0.3, 3))
         errors = np.maximum(error[reachable], _LOWEST)
         scatter.plot(truth[reachable], errors, "o", ms=size, mew=0, color="tab:blue", rasterized=True)
-        scatter.set(yscale="log", ylim=(_LOWEST / 2, 1), xlim=(0, truth[reachable].max()), ylabel="relative error")
+        scatter.set(yscale="log", ylim=(_LOWEST / 2, 1), xlim=(0, truth[reachable].max()))
         scatter.grid(visible=True, alpha=0.3)
-        figure.colorbar(ScalarMappable(norm, table), ax=surface, extend="both")
-    axes[-1, 1].set_xlabel("distance")
+    figure.colorbar(ScalarMappable(norm, table), ax=axes, extend="both", label="relative error", shrink=0.5)
+    for row in axes[1::2]:
+        row[0].set_ylabel("relative error")
+    for scatter in axes[-1]:
+        scatter.set_xlabel("distance")
     return figure
 
 
