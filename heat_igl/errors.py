@@ -7,9 +7,12 @@ words.
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from difflib import get_close_matches
+from functools import wraps
+from inspect import signature
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +26,9 @@ __all__ = [
     "ReferenceSolverError",
     "SourceError",
 ]
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 class MeshError(ValueError):
@@ -140,6 +146,33 @@ class MissingExtraError(ImportError):
         """Raise this error if the module `package` is not installed. The module is not imported."""
         if importlib.util.find_spec(package) is None:
             raise cls.of(purpose, package, extra)
+
+
+def names_guessed(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, whose TypeError for an unknown argument names the nearest one, as Python does from 3.13 on.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> try:
+    ...     heat_igl.geodesic_distance(heat_igl.shapes.grid(2), 0, cut_off=1.0)
+    ... except TypeError as error:
+    ...     print(error)
+    ...
+    geodesic_distance() got an unexpected keyword argument 'cut_off'. Did you mean 'cutoff'?
+    """
+    known = [name for name in signature(function).parameters if name != "self"]
+
+    @wraps(function)
+    def checked(*args: P.args, **named: P.kwargs) -> R:
+        for name in named:
+            if name not in known:
+                close = "".join(f" Did you mean {guess!r}?" for guess in get_close_matches(name, known, n=1))
+                remedy = close or f" It takes {', '.join(known)}"
+                raise TypeError(f"{function.__qualname__}() got an unexpected keyword argument {name!r}.{remedy}")
+        return function(*args, **named)
+
+    return checked
 
 
 class AccuracyWarning(UserWarning):

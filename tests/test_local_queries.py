@@ -233,15 +233,23 @@ def test_distances_that_will_not_fit_into_memory_are_refused_early(monkeypatch):
 
 
 def test_a_terminal_is_told_how_long_a_search_takes(monkeypatch, capsys):
-    monkeypatch.setattr(local, "_PATIENCE", -1.0)
+    monkeypatch.setattr("heat_igl.runtime.progress._PATIENCE", -1.0)
     mesh = shapes.icosphere(2)
     distances_within(mesh, 0.3)
     assert not capsys.readouterr().err  # no terminal
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     distances_within(mesh, 0.3)
     lines = capsys.readouterr().err.splitlines()
-    assert re.fullmatch(r"distances from \d+ of 162 vertices, about .* in all: \d+ s left, .*", lines[0])
-    assert lines[-1].startswith("distances from 162 of 162")
+    assert re.fullmatch(r"\d+ of 162 sources are done: about \d+ s left for .* distances, .*", lines[0])
+    assert lines[-1].startswith("162 of 162 sources")
+    solver = heat_igl.GeodesicSolver(mesh)
+    for ask, last in (
+        (lambda: heat_igl.farthest_points(solver, 3), "3 of 3 points are found"),
+        (lambda: heat_igl.distance_matrix(solver, [0, 5]), "2 of 2 queries are done"),
+        (lambda: heat_igl.diameter(solver, rounds=1), "1 of 1 queries at most are done"),
+    ):
+        ask()
+        assert capsys.readouterr().err.splitlines()[-1] == f"{last}: about 0 s left"
 
 
 def test_radii_counts_and_pairs_that_make_no_sense_are_refused():

@@ -31,6 +31,24 @@ PHI = SOLVER.distance(0)
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
+        (
+            lambda: geodesic_distance(MESH, 0, cut_off=1.0),
+            r"geodesic_distance\(\) .* 'cut_off'. Did you mean 'cutoff'\?",
+        ),
+        (lambda: geodesic_distance(MESH, source=0), r"'source'. Did you mean 'sources'\?"),
+        (lambda: HeatMethodSolver(MESH, laplace="cotan"), r"HeatMethodSolver.*'laplace'. Did you mean 'laplacian'\?"),
+        (lambda: SOLVER.distances([[0]], radius=1.0), r"It takes source_sets, out, progress, dtype, cutoff$"),
+        (lambda: shortest_paths(MESH, target=3, sources=0), r"Did you mean 'targets'\?"),
+    ],
+)
+def test_unknown_arguments_name_the_nearest_one(ask, message):
+    with pytest.raises(TypeError, match=message):
+        ask()
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
         (lambda: shortest_paths(MESH, 162, 0), r"targets\[0\] = 162 is no vertex"),
         (lambda: shortest_paths(MESH, [3, -1], 0), r"targets\[1\] = -1 is no vertex"),
         (lambda: shortest_paths(MESH, [], 0), "targets is empty"),

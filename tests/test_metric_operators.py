@@ -71,7 +71,7 @@ def test_metrics_in_the_plane_of_each_face_and_in_space():
     base = rng.normal(size=(3, 3))
     in_space = (base.T @ base + 0.1 * np.eye(3)) * rng.choice([1, 4, 100], mesh.n_faces)[:, None, None]
     in_plane = axes @ in_space @ np.swapaxes(axes, 1, 2)
-    one, other = (metric_operators(mesh, metric, "cotan") for metric in (in_space, in_plane))
+    one, other = (metric_operators(mesh, metric, laplacian="cotan") for metric in (in_space, in_plane))
     assert abs(one.L - other.L).max() < 1e-9 * abs(one.L).max()
     assert abs(one.D @ one.G - one.L).max() < 1e-9 * abs(one.L).max()
     area = np.sqrt(np.linalg.det(in_plane)) * mesh.measures

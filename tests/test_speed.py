@@ -35,7 +35,7 @@ def test_operators_with_a_speed_satisfy_the_identities_of_the_laplacian(mesh):
     p = mesh.F.shape[1] - 1
     speed = np.random.default_rng(0).choice([0.5, 1, 3], mesh.n_faces)
     # On the mesh's own faces: those of one speed are flipped otherwise.
-    domain = metric_operators(mesh, np.eye(3) / speed[:, None, None] ** 2, "cotan")
+    domain = metric_operators(mesh, np.eye(3) / speed[:, None, None] ** 2, laplacian="cotan")
     assert abs(domain.D @ domain.G - domain.L).max() < 1e-12 * abs(domain.L).max()
     assert abs(domain.L - domain.L.T).max() < 1e-12 * abs(domain.L).max()
     assert domain.weights == pytest.approx(mesh.measures / speed**p)

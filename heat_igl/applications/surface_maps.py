@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, as_array, positive, real_numbers, require_choice, truth
+from heat_igl.errors import MeshError, as_array, names_guessed, positive, real_numbers, require_choice, truth
 from heat_igl.linear import factorize
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
 from heat_igl.operators import operators
@@ -26,6 +26,7 @@ _PAIRS = 2**20
 _STEPS = 8
 
 
+@names_guessed
 def parcel_distances(
     mesh: MeshLike,
     labels: ArrayLike,
@@ -136,6 +137,7 @@ def _centre(mesh: Mesh, vertices: IntArray) -> int:
     return int(vertices[np.argmin(np.concatenate(totals))])
 
 
+@names_guessed
 def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike | None = None) -> FloatArray:
     """Values smoothed along a surface, as by a Gaussian of geodesic distance.
 

@@ -74,8 +74,8 @@ def validate(
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=None)
         report = heat_igl.validate(
-            loaded, drawn_sources, [name.strip() for name in methods.split(",")], reference, name=mesh.stem,
-            timeout=timeout,
+            loaded, drawn_sources, [name.strip() for name in methods.split(",")], name=mesh.stem,
+            reference=reference, timeout=timeout,
             progress=lambda label, done, total: bar.update(task, description=label, completed=done, total=total),
         )  # fmt: skip
     if picture is not None and report.truths is None:

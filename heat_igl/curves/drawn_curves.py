@@ -6,7 +6,7 @@ import numpy as np
 
 from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.places import Waypoints, mixed_places
-from heat_igl.errors import SourceError, truth
+from heat_igl.errors import SourceError, names_guessed, truth
 from heat_igl.heat_method import SignedHeatSolver
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, closest_points
 from heat_igl.mesh.surface_points import unchecked_curve
@@ -15,6 +15,7 @@ from heat_igl.typing import ArrayLike, FloatArray
 __all__ = ["curve_through", "signed_distance"]
 
 
+@names_guessed
 def curve_through(mesh: MeshLike, points: Waypoints | ArrayLike, *, closed: bool = False) -> SurfaceCurve:
     """The curve that passes some places in their order, locally shortest from each to the next.
 

@@ -9,7 +9,7 @@ import numpy as np
 from heat_igl.curves.places import Waypoints, corners, mixed_places
 from heat_igl.curves.routes import Router
 from heat_igl.curves.shortening import Course, Shortened, Shortener, as_curve, course_of
-from heat_igl.errors import MeshError, SourceError, truth
+from heat_igl.errors import MeshError, SourceError, names_guessed, truth
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import FloatArray, IntArray
 
@@ -62,6 +62,7 @@ def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
     return GeodesicPathSolver(mesh).straighten(curve)
 
 
+@names_guessed
 def geodesic_path(mesh: MeshLike, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
     """The geodesic through waypoints, or the closed geodesic in the class of the loop through them.
 

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from heat_igl.errors import SourceError, require_choice
+from heat_igl.errors import SourceError, names_guessed, require_choice
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.heat_method import VectorHeatSolver
 from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices
@@ -19,6 +19,7 @@ __all__ = ["LogMapMethod", "log_map"]
 LogMapMethod = Literal["exact", "vector-heat"]
 
 
+@names_guessed
 def log_map(
     mesh: MeshLike | GeodesicSolver | VectorHeatSolver, source: Sources, *, method: LogMapMethod = "exact"
 ) -> FloatArray:

@@ -10,7 +10,7 @@ from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.paths import shortest_paths
 from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.straightest import Tracer
-from heat_igl.errors import AccuracyWarning, SourceError, is_number, real_numbers, shown
+from heat_igl.errors import AccuracyWarning, SourceError, is_number, names_guessed, real_numbers, shown
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh, as_simplices
 from heat_igl.runtime import warn_caller
@@ -33,6 +33,7 @@ _NEAREST = 1e-12
 _LARGEST_POWER = 64
 
 
+@names_guessed
 def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = None, p: float = 2) -> SurfacePoints:
     """The point x with the least sum of w_i d(x, p_i)^p: the mean for p = 2, the geometric median for p = 1.
 

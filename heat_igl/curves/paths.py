@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.curves.places import places
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, SourceError, names_guessed
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.sources import Sources, SourceSet, named_vertices, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -20,6 +20,7 @@ __all__ = ["shortest_path", "shortest_paths"]
 _WIDER_MARGIN = 1e-6
 
 
+@names_guessed
 def shortest_paths(
     mesh: MeshLike, targets: Sources, sources: Sources, *, region: ArrayLike | None = None
 ) -> list[SurfaceCurve]:
@@ -80,6 +81,7 @@ def shortest_paths(
     return [SurfaceCurve(part.faces[path.faces], path.start, path.end).on(mesh) for path in paths]
 
 
+@names_guessed
 def shortest_path(mesh: MeshLike, a: Sources, b: Sources, *, region: ArrayLike | None = None) -> SurfaceCurve:
     """The exact shortest path from one place to another.
 

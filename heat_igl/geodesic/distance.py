@@ -8,7 +8,7 @@ from typing import get_args
 import igl
 import numpy as np
 
-from heat_igl.errors import require_choice
+from heat_igl.errors import names_guessed, require_choice
 from heat_igl.geodesic.choice import DistanceMethod
 from heat_igl.geodesic.solver import GeodesicSolver
 from heat_igl.heat_method import HeatMethodSolver
@@ -21,6 +21,7 @@ from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 __all__ = ["geodesic_distance"]
 
 
+@names_guessed
 def geodesic_distance(
     mesh: MeshLike,
     sources: Sources,

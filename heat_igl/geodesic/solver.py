@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, names_guessed
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
 from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_surface
 from heat_igl.heat_method.directions import Directions, directions
@@ -81,6 +81,7 @@ class GeodesicSolver(BatchedSolver):
     ('windows', 1e-05)
     """
 
+    @names_guessed
     def __init__(
         self,
         mesh: MeshLike | Operators,
@@ -207,6 +208,7 @@ class GeodesicSolver(BatchedSolver):
         """Vertices (m, 3) of the triangles that points and curves refer to; None if sources are vertices alone."""
         return None if self._triangles is None else self._triangles.given_faces
 
+    @names_guessed
     def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
 
@@ -235,6 +237,7 @@ class GeodesicSolver(BatchedSolver):
         limit = np.inf if beyond is None else beyond
         return np.asarray(cut_off(self._engine.distance(self._source_set(sources), limit, n_threads()), beyond))
 
+    @names_guessed
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.
 

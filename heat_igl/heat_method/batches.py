@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence, Sized
 import numpy as np
 import numpy.typing as npt
 
-from heat_igl.errors import AccuracyWarning, SourceError, positive, shown, truth
+from heat_igl.errors import AccuracyWarning, SourceError, names_guessed, positive, shown, truth
 from heat_igl.runtime import (
     block_size,
     float_type,
@@ -54,6 +54,7 @@ class BatchedSolver(ABC):
         What is beyond the cutoff may be left ``inf``.
         """
 
+    @names_guessed
     def distances(
         self,
         source_sets: Sequence[Sources],

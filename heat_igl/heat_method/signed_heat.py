@@ -6,7 +6,7 @@ from typing import get_args
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning, MeshError, SourceError, require_choice
+from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, require_choice
 from heat_igl.heat_method.curve_levels import Level
 from heat_igl.heat_method.curve_sides import (
     has_gaps,
@@ -84,6 +84,7 @@ class SignedHeatSolver:
     [-0.5, -0.25, 0.0, 0.25, 0.5]
     """
 
+    @names_guessed
     def __init__(
         self,
         mesh: MeshLike,

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning
+from heat_igl.errors import AccuracyWarning, names_guessed
 from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_surface
@@ -104,6 +104,7 @@ class HeatMethodSolver(BatchedSolver):
     _parts: SolverParts
     _part: MeshPart | None = None
 
+    @names_guessed
     def __init__(
         self,
         mesh: MeshLike | Operators,
@@ -278,6 +279,7 @@ class HeatMethodSolver(BatchedSolver):
     def _n_faces(self) -> int:
         return self._parts.n_faces
 
+    @names_guessed
     def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance (n,) from the nearest source: arguments, values and errors as for `GeodesicSolver.distance`.
 
@@ -365,6 +367,7 @@ class HeatMethodSolver(BatchedSolver):
         phi = last_steps.poisson.solve(divergence)
         return last_steps.pin_levels(terms, phi, u)[:, : self.n_vertices]
 
+    @names_guessed
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: as `GeodesicSolver.voronoi`, with a heat solve for each source.
 

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError, real_numbers, require_choice
+from heat_igl.errors import MeshError, SourceError, names_guessed, real_numbers, require_choice
 from heat_igl.heat_method.heat_transport import HeatTransport
 from heat_igl.heat_method.options import SolverOptions
 from heat_igl.heat_method.outward_field import OutwardField
@@ -79,6 +79,7 @@ class VectorHeatSolver:
     True
     """
 
+    @names_guessed
     def __init__(
         self,
         mesh: MeshLike,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import MeshError, as_array, is_number, shown
+from heat_igl.errors import MeshError, as_array, is_number, names_guessed, shown
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.pixel_domain import ImageDomain, checked_spacing
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray
@@ -57,7 +57,8 @@ class Terrain(ImageDomain):
         return np.asarray(values[self.mesh.F].mean(axis=1))
 
 
-def terrain(heights: ArrayLike, spacing: float | Sequence[float] = 1.0, nodata: float | None = None) -> Terrain:
+@names_guessed
+def terrain(heights: ArrayLike, spacing: float | Sequence[float] = 1.0, *, nodata: float | None = None) -> Terrain:
     """The surface of a height raster, on which distance goes up and down the slopes.
 
     Parameters

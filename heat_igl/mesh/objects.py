@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning, MeshError, require_choice
+from heat_igl.errors import AccuracyWarning, MeshError, names_guessed, require_choice
 from heat_igl.mesh.cloud_objects import cloud_of_cells, cloud_of_points, cloud_of_poly_data, refuse_other_cells
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.pixel_domain import ImageDomain
@@ -65,6 +65,7 @@ def read_paths_with(reader: Callable[[str | os.PathLike[str]], Mesh | PointCloud
     _readers[:] = [reader]
 
 
+@names_guessed
 def as_mesh(
     mesh: MeshLike, F: ArrayLike | None = None, *, merge: Literal["seams", "vertices"] | None = None
 ) -> Mesh | PolygonMesh | PointCloud:

@@ -8,7 +8,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, real_numbers
+from heat_igl.errors import MeshError, names_guessed, real_numbers
 from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay, lay_out, mollify
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
@@ -31,7 +31,8 @@ _LARGEST = 1e120
 _ROUNDING = 1e-9
 
 
-def metric_operators(mesh: MeshLike, metric: ArrayLike, laplacian: Laplacian = "auto") -> Operators:
+@names_guessed
+def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian = "auto") -> Operators:
     """The operators of a mesh with a metric on each face, which may be longer in one direction than in another.
 
     A vector w in face f has the length sqrt(w^T g w), with g = ``metric[f]``: travel time, where g is the inverse

@@ -3,7 +3,7 @@
 from heat_igl.runtime.blocks import WORKING_MEMORY, block_size, in_blocks, in_order
 from heat_igl.runtime.heat_range import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT, SOURCE_HEAT
 from heat_igl.runtime.memory import PeakMemory, available_memory, release_free_memory, resident_memory
-from heat_igl.runtime.progress import progress_bar, rich_progress
+from heat_igl.runtime.progress import TimeLeft, progress_bar, rich_progress
 from heat_igl.runtime.rows import float_type, row_writer
 from heat_igl.runtime.threads import both, n_threads, over_rows, pool, side_by_side
 from heat_igl.runtime.warn import held_warnings, warn_caller
@@ -16,6 +16,7 @@ __all__ = [
     "SOURCE_HEAT",
     "WORKING_MEMORY",
     "available_memory",
+    "TimeLeft",
     "block_size",
     "both",
     "float_type",

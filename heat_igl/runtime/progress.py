@@ -1,14 +1,19 @@
-"""Progress bars on standard error, by rich."""
+"""Progress on standard error: bars, by rich, and lines with the time that is left."""
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from heat_igl.errors import MissingExtraError
 
-__all__ = ["progress_bar", "rich_progress"]
+__all__ = ["TimeLeft", "progress_bar", "rich_progress"]
+
+# Seconds before the first line on a terminal, and between lines.
+_PATIENCE = 5.0
 
 
 @contextmanager
@@ -28,6 +33,32 @@ def progress_bar(description: str, total: int, shown: bool = True) -> Iterator[C
     with rich_progress() as bar:
         task = bar.add_task(description, total=total)
         yield lambda n_rows: bar.advance(task, n_rows)
+
+
+class TimeLeft:
+    """Writes how long the rest of a long call takes, on standard error if that is a terminal.
+
+    Parameters
+    ----------
+    what : str
+        Ends the beginning "`done` of `total`".
+    total : int
+        Number of steps, of about the same cost.
+    """
+
+    def __init__(self, what: str, total: int) -> None:
+        self._what, self._total, self._done = what, total, 0
+        self._start = self._said = time.monotonic()
+
+    def __call__(self, steps: int = 1, note: str = "") -> None:
+        """Count `steps` as done; `note` ends the line, if one is due."""
+        # Threads may miss what others add: an estimate suffices.
+        self._done += steps
+        now = time.monotonic()
+        if now - self._said > _PATIENCE and sys.stderr.isatty():
+            self._said = now
+            left = (now - self._start) * (self._total / self._done - 1)
+            print(f"{self._done} of {self._total} {self._what}: about {left:.0f} s left{note}", file=sys.stderr)
 
 
 def rich_progress() -> Any:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from heat_igl.errors import names_guessed
 from heat_igl.geodesic import Solver
 from heat_igl.mesh import MeshLike
+from heat_igl.runtime import TimeLeft
 from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["diameter", "distance_matrix"]
 
 
+@names_guessed
 def diameter(solver: Solver | MeshLike, *, start: int = 0, rounds: int = 10) -> tuple[float, int, int]:
     """Two vertices that are far apart, found by repeatedly moving to the farthest vertex.
 
@@ -51,8 +54,10 @@ def diameter(solver: Solver | MeshLike, *, start: int = 0, rounds: int = 10) -> 
         raise ValueError(f"rounds must be a positive integer, not {rounds!r}")
     here = int(checked_vertices("start", start, solver.n_vertices)[0])
     best = (-1.0, here, here)
+    left = TimeLeft("queries at most are done", rounds)
     for _ in range(rounds):
         distance = solver.distance(here)
+        left()
         there = int(np.argmax(np.where(np.isfinite(distance), distance, -1.0)))
         if distance[there] <= best[0]:
             break

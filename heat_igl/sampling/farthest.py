@@ -6,9 +6,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from heat_igl.errors import shown
+from heat_igl.errors import names_guessed, shown
 from heat_igl.geodesic import Solver
 from heat_igl.mesh import MeshLike
+from heat_igl.runtime import TimeLeft
 from heat_igl.sampling.queries import as_solver
 from heat_igl.sampling.voronoi import VoronoiCells, claim_nearer
 from heat_igl.sources import vertex_sources
@@ -17,6 +18,7 @@ from heat_igl.typing import ArrayLike, IntArray
 __all__ = ["farthest_cells", "farthest_points"]
 
 
+@names_guessed
 def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -> IntArray:
     """`k` vertices, each as far as possible from those before (Gonzalez 1985; Moenning and Dodgson 2003).
 
@@ -51,6 +53,7 @@ def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) 
     return farthest_cells(solver, k, start=start).sites
 
 
+@names_guessed
 def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
     """The Voronoi cells of `farthest_points`, for the same queries; arguments and errors as there.
 
@@ -72,6 +75,7 @@ def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -
     distance = np.full(solver.n_vertices, np.inf)
     # Vertices that no face uses are infinitely far from all others, but are not to be sampled.
     open_to_choice = np.where(used, np.inf, -np.inf)
+    left = TimeLeft("points are found", k)
     for i in range(k):
         sites[i] = first[i] if i < len(first) else np.argmax(np.minimum(distance, open_to_choice))
         open_to_choice[sites[i]] = -np.inf
@@ -81,6 +85,7 @@ def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -
             claim_nearer(distance, labels, i, solver.distance(int(sites[i]), cutoff=float(reach)))
         else:
             labels[sites[i]] = i
+        left()
     return VoronoiCells(sites, labels, distance)
 
 

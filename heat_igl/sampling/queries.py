@@ -10,6 +10,7 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import GeodesicSolver, Solver
 from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.runtime import TimeLeft
 from heat_igl.sources import named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
@@ -54,5 +55,8 @@ def as_solver(solver: Solver | MeshLike) -> Solver:
 
 def distance_rows(solver: Solver, vertices: IntArray) -> Iterator[AnyArray]:
     """Distances (n,) from each of `vertices`, solved in blocks."""
+    left = TimeLeft("queries are done", len(vertices))
     for start in range(0, len(vertices), _BLOCK):
-        yield from solver.distances([[int(v)] for v in vertices[start : start + _BLOCK]])
+        block = vertices[start : start + _BLOCK]
+        yield from solver.distances([[int(v)] for v in block])
+        left(len(block))

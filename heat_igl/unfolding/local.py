@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from collections.abc import Iterator
 
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError, positive, shown
+from heat_igl.errors import MeshError, SourceError, names_guessed, positive, shown
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
-from heat_igl.runtime import available_memory, n_threads
+from heat_igl.runtime import TimeLeft, available_memory, n_threads
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.unfolding import local_searches
@@ -20,14 +18,13 @@ from heat_igl.unfolding.half_edges import HalfEdges, from_mesh
 
 __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]
 
-# Seconds after which a terminal is told how long a search will take, and again.
-_PATIENCE = 5.0
 # Bytes that each distance of a sparse array takes while the array is put together.
 _BYTES = 48
 # Where more are asked for than the mesh has vertices, the most entries of the result.
 _MOST_PADDED = 2**28
 
 
+@names_guessed
 def distances_within(
     mesh: MeshLike, radius: float, sources: Sources | None = None, *, region: ArrayLike | None = None
 ) -> sp.csr_array:
@@ -137,6 +134,7 @@ def _rows_within(triangles: Mesh, edges: HalfEdges, chosen: IntArray, limit: flo
     return found
 
 
+@names_guessed
 def nearest_vertices(
     mesh: MeshLike, k: int, sources: Sources | None = None, *, region: ArrayLike | None = None
 ) -> tuple[IntArray, FloatArray]:
@@ -218,6 +216,7 @@ def _unfilled(s: int, k: int, n: int) -> tuple[IntArray, FloatArray]:
     )
 
 
+@names_guessed
 def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None = None) -> FloatArray:
     """Exact distance between the two vertices of each of some pairs.
 
@@ -287,10 +286,9 @@ class _Count:
     def __init__(self, k: int, most: float) -> None:
         self._k, self._most = k, most
         self._sources = self._found = 0
-        self._start = self._said = time.monotonic()
+        self._left = TimeLeft("sources are done", k)
 
     def __call__(self, near: local_searches.Near) -> local_searches.Near:
-        # Threads may miss what others add: an estimate suffices.
         self._sources += len(near.counts)
         self._found += len(near.vertex)
         expected = self._found / self._sources * self._k
@@ -300,12 +298,7 @@ class _Count:
                 "do not fit into memory: take a smaller radius (in the unit of the mesh) or fewer sources, or write "
                 "rows to a file with write_distances_within"
             )
-        now = time.monotonic()
-        if now - self._said > _PATIENCE and sys.stderr.isatty():
-            self._said = now
-            left = (now - self._start) * (self._k / self._sources - 1)
-            done = f"distances from {self._sources} of {self._k} vertices, about {expected:.2g} in all"
-            print(f"{done}: {left:.0f} s left, less with a smaller radius", file=sys.stderr)
+        self._left(len(near.counts), f" for {expected:.2g} distances, less with a smaller radius")
         return near
 
 

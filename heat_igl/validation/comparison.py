@@ -12,6 +12,7 @@ from heat_igl.errors import (
     MissingExtraError,
     ReferenceSolverError,
     SourceError,
+    names_guessed,
     real_numbers,
     shown,
 )
@@ -27,12 +28,13 @@ from heat_igl.validation.report import ValidationReport, ValidationRow
 __all__ = ["METHODS", "Method", "Progress", "Solver", "draw_sources", "validate"]
 
 
+@names_guessed
 def validate(
     mesh: MeshLike,
     sources: Sources | Sequence[Sources],
     methods: Sequence[Method] = ("heat", "sweep", "windows", "meshlab", "igl"),
-    reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None = "exact",
     *,
+    reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None = "exact",
     name: str = "mesh",
     timeout: float = TIMEOUT,
     memory: float = MEMORY,
