@@ -14,9 +14,10 @@ from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices, Operators, Surface, unfolding_surface
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN, HalfEdges, from_mesh, from_triangulation
 
-__all__ = ["ROUNDING", "Engine", "MeshTriangles", "OperatorTriangles", "SimplexEngine", "Triangles"]
+__all__ = ["ROUNDING", "Engine", "MeshTriangles", "OperatorTriangles", "SimplexEngine", "TriangleEngine", "Triangles"]
 
 #: Share of a distance that is rounding.
 ROUNDING = 1e-9
@@ -199,6 +200,35 @@ class OperatorTriangles(Triangles):
     def half_edges(self) -> HalfEdges:
         """Tables for distance from vertices."""
         return from_triangulation(self._surface.unfolding)
+
+
+class TriangleEngine(Engine):
+    """An engine on triangles, with the exact surfaces that points and curves need.
+
+    Parameters
+    ----------
+    triangles : Triangles
+        The surface.
+    originals : (n,) int64, optional
+        The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
+    """
+
+    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
+        self._triangles, self._originals = triangles, originals
+
+    @cached_property
+    def _on_delaunay(self) -> ExactSurface:
+        """The triangles to which points are carried."""
+        return ExactSurface(self._triangles.surface.unfolding)
+
+    @cached_property
+    def _on_faces(self) -> ExactSurface:
+        """The faces before any flip, in which curves lie."""
+        return ExactSurface(self._triangles.faces)
+
+    def _with_copies(self, values: AnyArray) -> AnyArray:
+        """Values (n,) in which copies of points have those of their originals."""
+        return values if self._originals is None else values[self._originals]
 
 
 def _as_thin_as_given(surface: Surface) -> Surface:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,11 @@ import numpy as np
 from heat_igl.mesh import SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.sources import SourcePoints, SourceSet
-from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.unfolding.engine import Engine, Triangles
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.unfolding.engine import Triangles
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 
-__all__ = ["Query", "TriangleEngine", "labels_of", "starting_points"]
+__all__ = ["Query", "labels_of", "starting_points"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,35 +86,6 @@ class Query:
     def with_begin(self, distance: FloatArray) -> FloatArray:
         """Distances (n,) of the sources as they were given."""
         return distance if self.begin is None else distance + np.where(np.isfinite(distance), self.begin, 0.0)
-
-
-class TriangleEngine(Engine):
-    """An engine on triangles, with the exact surfaces that points and curves need.
-
-    Parameters
-    ----------
-    triangles : Triangles
-        The surface.
-    originals : (n,) int64, optional
-        The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
-    """
-
-    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
-        self._triangles, self._originals = triangles, originals
-
-    @cached_property
-    def _on_delaunay(self) -> ExactSurface:
-        """The triangles to which points are carried."""
-        return ExactSurface(self._triangles.surface.unfolding)
-
-    @cached_property
-    def _on_faces(self) -> ExactSurface:
-        """The faces before any flip, in which curves lie."""
-        return ExactSurface(self._triangles.faces)
-
-    def _with_copies(self, values: AnyArray) -> AnyArray:
-        """Values (n,) in which copies of points have those of their originals."""
-        return values if self._originals is None else values[self._originals]
 
 
 def labels_of(sources: SourceSet, points: SourcePoints | None = None) -> IntArray:

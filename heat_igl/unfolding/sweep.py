@@ -20,9 +20,9 @@ from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourcePoints, SourceSet, samples
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.bounds import Bounds
-from heat_igl.unfolding.engine import Triangles
+from heat_igl.unfolding.engine import TriangleEngine, Triangles
 from heat_igl.unfolding.exact import ExactSolution
-from heat_igl.unfolding.queries import Query, TriangleEngine, labels_of
+from heat_igl.unfolding.queries import Query, labels_of
 from heat_igl.unfolding.spokes import numbered_spokes
 
 __all__ = ["SweepEngine"]

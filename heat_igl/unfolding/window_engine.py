@@ -12,10 +12,10 @@ from heat_igl.sources import SourceSet
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.unfolding.curve_directions import CurveDirections
 from heat_igl.unfolding.directions import PathAngles, PathDirections
-from heat_igl.unfolding.engine import Triangles
+from heat_igl.unfolding.engine import TriangleEngine, Triangles
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
 from heat_igl.unfolding.path_lengths import PathLengths, from_windows
-from heat_igl.unfolding.queries import Query, TriangleEngine, labels_of, starting_points
+from heat_igl.unfolding.queries import Query, labels_of, starting_points
 
 __all__ = ["WindowEngine"]
 
