@@ -61,7 +61,7 @@ def from_edge_lengths(
     aligned = np.ones(F.size, bool)
     aligned[a] = aligned[b] = half_edge_tail(F, a) == half_edge_head(F, b)
     added = mollify(lengths, F, margin)
-    return IntrinsicTriangulation(F, lengths + added[:, None], twin, aligned, n, lengthening=float(added.max()))
+    return IntrinsicTriangulation(F, lengths + added, twin, aligned, n, lengthening=float(added.max()))
 
 
 def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> IntrinsicTriangulation:
@@ -109,7 +109,7 @@ def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> Intrinsic
         )
     _require_one_length(lengths, a, b)
     added = mollify(lengths, F)
-    return IntrinsicTriangulation(F, lengths + added[:, None], mate, aligned, n, lengthening=float(added.max()))
+    return IntrinsicTriangulation(F, lengths + added, mate, aligned, n, lengthening=float(added.max()))
 
 
 def _checked_lengths(l: ArrayLike, F: IntArray) -> FloatArray:

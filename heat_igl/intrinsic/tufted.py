@@ -63,7 +63,7 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     twin = np.empty(2 * F.size, np.int64)
     twin[a], twin[b] = b, a
     added = mollify(lengths, F)
-    lengths = lengths + added[:, None]
+    lengths = lengths + added
     return IntrinsicTriangulation(
         F=np.concatenate([F, F[:, BACK_CORNERS]]),
         l=np.concatenate([lengths, lengths[:, BACK_CORNERS]]),

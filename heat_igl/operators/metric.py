@@ -264,7 +264,7 @@ def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
 
 def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, laplacian: Laplacian) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
-    glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F)[:, None])
+    glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F))
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
     domain = intrinsic_operators(triangulation)
     pairs = np.concatenate([triangulation.F[:, pair] for pair in ([1, 2], [2, 0], [0, 1])])

@@ -48,7 +48,7 @@ class Glued(NamedTuple):
         sides = self.length.reshape(-1, 3)
         added = mollify(sides, F, margin)
         if added.any():
-            sides += added[:, None]
+            sides += added
         flipping.flip(
             self.vertex, self.twin, self.ring, self.length, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * len(F)
         )
