@@ -123,6 +123,17 @@ def test_exp_map_undoes_the_log_map_from_edges_that_were_flipped(seed, place):
     assert gap.max() < 1e-9 * np.hypot(*log.T).max()  # on a convex body no path bends
 
 
+@pytest.mark.parametrize("share", [1e-5, 1e-7, 1e-9])
+def test_log_maps_of_the_plane_from_points_beside_a_vertex(share):
+    mesh = flat_perturbed(shapes.grid(6))
+    for face in np.flatnonzero(~mesh.boundary[mesh.F].any(axis=1))[::5]:
+        point = SurfacePoints([face], [[1 - share, 0.3 * share, 0.7 * share]])
+        offset = (mesh.V - point.positions(mesh))[:, :2]
+        along = (mesh.V[mesh.F[face, 1]] - mesh.V[mesh.F[face, 0]])[:2]
+        turned = offset @ np.stack([along, [-along[1], along[0]]], axis=1) / np.linalg.norm(along)
+        np.testing.assert_allclose(log_map(mesh, point), turned, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     "mesh",
     [

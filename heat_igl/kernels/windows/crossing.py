@@ -469,12 +469,19 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
 @cython.nogil
 @cython.exceptval(check=False)
 def _arrive(
-    s: cython.pointer(Search), h: cython.int, w: cython.pointer(Window), distance: cython.double, at: cython.double
+    s: cython.pointer(Search),
+    h: cython.int,
+    w: cython.pointer(Window),
+    apex: cython.pointer(Apex),
+    distance: cython.double,
+    at: cython.double,
 ) -> cython.void:
-    """Take the distance of the corner opposite h by the line of a window through a point of h."""
-    x: cython.double = at - w.x
-    leaving_x: cython.double = x * w.turn_x - w.depth * w.turn_y
-    leaving_y: cython.double = x * w.turn_y + w.depth * w.turn_x
+    """Take the distance of the apex of h by the line of a window through a point of h."""
+    # The direction to the apex: near the root, that to the point of h would be a quotient of roundings.
+    x: cython.double = apex.x - w.x
+    y: cython.double = apex.y + w.depth
+    leaving_x: cython.double = x * w.turn_x - y * w.turn_y
+    leaving_y: cython.double = x * w.turn_y + y * w.turn_x
     if w.is_plane:
         leaving_x, leaving_y = w.turn_x + w.turn_y * w.depth * at, w.turn_y
     relax(s, s.vertex[h], distance, w.root, h, at, w.corner, leaving_x, leaving_y)
@@ -533,11 +540,11 @@ def _reach_apex(
         # same direction as a straight one.
         at = backward(w, apex.x, apex.y)
         at = 0.0 if at < 0.0 else apex.length if at > apex.length else at
-        _arrive(s, h, w, bent(w, b, apex.x, apex.y), at)
+        _arrive(s, h, w, apex, bent(w, b, apex.x, apex.y), at)
     if apex.best >= 0:
         w = windows + apex.best
         apex.best_at = backward(w, apex.x, apex.y)
-        _arrive(s, h, w, apex.nearest, apex.best_at)
+        _arrive(s, h, w, apex, apex.nearest, apex.best_at)
 
 
 @cython.cfunc
