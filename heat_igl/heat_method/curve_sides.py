@@ -129,27 +129,26 @@ def left_of_closed(
     is_divided[edge[sources.faces[is_along], opposite[is_along]]] = True
     is_whole = np.ones(m, bool)
     is_whole[sources.faces[~is_along]] = False
-    # Regions: the faces that are whole are numbered after the vertices.
-    free = ~vertices_on(mesh, sources)
-    tail, head = mesh.edges.T
-    f, c = np.nonzero(is_whole[:, None] & free[mesh.F])
-    half_edge = np.flatnonzero((twin > np.arange(3 * m)) & ~is_divided[edge.ravel()] & np.repeat(is_whole, 3))
+    # Regions: faces are numbered after the vertices. Whole ones away from the curves add nothing to their edges.
+    free, is_beside = ~vertices_on(mesh, sources), np.zeros(n, bool)
+    is_beside[mesh.F[sources.faces]] = True
+    a, b, c = mesh.F.T
+    near = np.flatnonzero(is_whole & (is_beside[a] | is_beside[b] | is_beside[c]))
+    at, corner = np.nonzero(free[mesh.F[near]])
+    half_edge = (3 * near[:, None] + np.arange(3)).ravel()
+    half_edge = half_edge[(twin[half_edge] > half_edge) & ~is_divided[edge[near].ravel()]]
     half_edge = half_edge[is_whole[twin[half_edge] // 3]]
+    tail, head = mesh.edges.T
     joined = np.concatenate(
         [
             mesh.edges[~is_met & free[tail] & free[head]],
-            np.column_stack([n + f, mesh.F[f, c]]),
+            np.column_stack([n + near[at], mesh.F[near[at], corner]]),
             n + np.column_stack([half_edge, twin[half_edge]]) // 3,
         ]
     )
     region = connectivity.connected_components(joined, n + m)
     # What each region sees: from corners, of the segments in the face the nearest, and of equally near ones that under
     # the largest angle; from the middles of sides of divided faces, on behalf of whole ones beyond.
-    side_is_open = ~(is_met | is_divided)[edge.ravel()] & (twin >= 0) & ~np.repeat(is_whole, 3)
-    side_is_open &= is_whole[twin // 3]
-    nodes = np.concatenate(
-        [np.where(free[mesh.F], mesh.F, -1), np.where(side_is_open, n + twin // 3, -1).reshape(m, 3)], axis=1
-    )
     seen = _seen(triangulation, sources)
     angle = np.abs(seen.sine)
     order = np.lexsort((-angle, seen.away, seen.place))
@@ -163,14 +162,16 @@ def left_of_closed(
     beside = np.flatnonzero(along.any(axis=1) & is_whole[faces])
     opposite = along[beside].argmax(axis=1)
     at_head = (opposite + 2) % 3
-    place = np.append(seen.place[is_seen], 6 * m + 3 * faces[beside] + opposite)
+    place, which = np.unique(np.append(seen.place[is_seen], 6 * m + 3 * faces[beside] + opposite), return_inverse=True)
     sine = np.append(seen.sine[is_seen], np.sign(end[beside, at_head] - start[beside, at_head]))
     # Segments that run along each other in opposite directions cancel.
-    net = np.clip(np.bincount(place, sine, 9 * m), -1, 1)
-    where = np.concatenate([nodes.ravel(), np.repeat(n + np.arange(m), 3)])
-    seen_at = np.flatnonzero((net != 0) & (where >= 0))
-    region_there = region[where[seen_at]]
-    total, most = (np.bincount(region_there, w, int(region.max()) + 1) for w in (net[seen_at], np.abs(net[seen_at])))
+    net = np.clip(np.bincount(which, sine), -1, 1)
+    face, k = np.divmod(place[: np.searchsorted(place, 6 * m)], 6)
+    vertex, beyond = mesh.F[face, k % 3], twin[3 * face + k % 3] // 3
+    is_open = ~(is_met | is_divided)[edge[face, k % 3]] & (beyond >= 0) & ~is_whole[face] & is_whole[beyond]
+    net[: len(face)] *= np.where(k < 3, free[vertex], is_open)
+    node = np.append(np.where(k < 3, vertex, n + beyond), n + (place[len(face) :] - 6 * m) // 3)
+    total, most = (np.bincount(region[node], w, int(region.max()) + 1) for w in (net, np.abs(net)))
     decided = np.abs(total) > _AGREED * most
     return total[region[:n]] > 0, decided[region[:n]] & free
 
