@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+import surfaces
 
 import heat_igl
 from heat_igl import (
@@ -274,6 +275,33 @@ def test_copies_have_the_distance_of_the_point(copies: str) -> None:
         np.testing.assert_array_equal(cells.labels, cells.labels[of])
     front_door = heat_igl.geodesic_distance(cloud, source)
     np.testing.assert_allclose(front_door, heat_igl.geodesic_distance(alone, int(of[source]))[of], atol=1e-5)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "Moebius strip"])
+def test_every_answer_at_a_copy_is_that_at_its_original(shape: str) -> None:
+    """Places in faces are the same for every solver, and for the cloud without copies: faces hold originals alone."""
+    distinct = sphere(300) if shape == "sphere" else surfaces.moebius_strip(40, 8).V
+    of = np.concatenate([np.arange(len(distinct)), np.arange(40), np.arange(10)])
+    cloud, alone = PointCloud(distinct[of]), PointCloud(distinct)
+    np.testing.assert_array_equal(cloud.F, alone.F)
+    assert (cloud.cover is None) == (shape == "sphere")
+    place, copy, original = heat_igl.SurfacePoints([3], [[0.2, 0.3, 0.5]]), len(distinct) + 5, 5
+    for make in (GeodesicSolver, HeatMethodSolver):
+        np.testing.assert_allclose(make(cloud).distance(place), make(alone).distance(place)[of], atol=1e-9)
+        np.testing.assert_allclose(make(cloud).distance(copy), make(alone).distance(original)[of], atol=1e-9)
+    for method in ("heat", "windows"):
+        found, expected = (heat_igl.VectorHeatSolver(given, method=method) for given in (cloud, alone))
+        np.testing.assert_allclose(found.log_map(copy), expected.log_map(original)[of], atol=1e-9)
+        np.testing.assert_allclose(
+            found.transport(copy, [[1, 0]]), expected.transport(original, [[1, 0]])[of], atol=1e-9
+        )
+    values = alone.P[:, 0]
+    drawn, expected_discs = discs(cloud, values[of])[0].V, discs(alone, values)[0].V
+    n, m = len(of), len(distinct)
+    rims, expected_rims = drawn[n:].reshape(n, -1, 3), expected_discs[m:].reshape(m, -1, 3)
+    np.testing.assert_allclose(rims[:, 0], expected_rims[of, 0], atol=1e-9)
+    traced = heat_igl.trace_geodesic(cloud, copy, [1.0, 0.5], 0.3)
+    np.testing.assert_allclose(traced.points, heat_igl.trace_geodesic(alone, original, [1.0, 0.5], 0.3).points)
 
 
 def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:

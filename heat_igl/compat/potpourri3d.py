@@ -261,7 +261,7 @@ class PointCloudLocalTriangulation:
         self._cloud = PointCloud(P)
 
     def get_local_triangulation(self) -> IntArray:
-        """Triangles (n, k, 3) that begin with the point, in order around it; rows of -1 fill up to the largest k."""
+        """Triangles (n, k, 3) that begin with the point, or the first equal one, and rows of -1 up to the largest k."""
         faces = self._cloud.triangles.F
         # Each triangle in three turns, one for each corner.
         turns = np.concatenate([np.roll(faces, -corner, axis=1) for corner in range(3)])
@@ -270,7 +270,7 @@ class PointCloudLocalTriangulation:
         first = np.cumsum(count) - count
         table = np.full((self._cloud.n_vertices, int(count.max()), 3), -1, np.int64)
         table[turns[:, 0], np.arange(len(turns)) - first[turns[:, 0]]] = turns
-        return table
+        return table[self._cloud.originals]
 
 
 class PolygonMeshHeatSolver(_OnVertices):

@@ -99,7 +99,7 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
         raise ValueError(f"rounds must be an integer of at least 0, not {rounds!r}")
     mesh = as_mesh(mesh)
     triangles = as_simplices(mesh)
-    chosen = named_vertices(sites, triangles.n_vertices, "sites")
+    chosen = triangles.originals[named_vertices(sites, triangles.n_vertices, "sites")]
     if len(np.unique(chosen)) < len(chosen):
         values, counts = np.unique(chosen, return_counts=True)
         raise SourceError(f"sites must be distinct, but vertex {values[counts > 1][0]} is there twice")

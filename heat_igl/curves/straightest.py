@@ -216,7 +216,7 @@ class Tracer:
             corner = self._surface.F[points.faces, weights.argmax(axis=1)]
             vertices = np.where((weights.max(axis=1) == 1) & in_frame, corner, -1)
             return _Starts(points.faces.copy(), np.ascontiguousarray(weights), vertices)
-        vertices = ordered_vertices(points, self._mesh.n_vertices, name)
+        vertices = self._surface.originals[ordered_vertices(points, self._mesh.n_vertices, name)]
         corner = self._frames.angles.first[vertices]
         if (corner < 0).any():
             first = int(np.argmax(corner < 0))

@@ -38,7 +38,7 @@ def discs(cloud: PointCloud, values: FloatArray, is_flat: bool = False) -> tuple
     triangles = cloud.triangles
     n, V = cloud.n_vertices, triangles.V
     k = _CORNERS if n <= _MANY else _FEW_CORNERS
-    normals = igl.per_vertex_normals(V, triangles.F) if cloud.normals is None else cloud.normals
+    normals = igl.per_vertex_normals(V, triangles.F)[cloud.originals] if cloud.normals is None else cloud.normals
     normals = np.where(
         np.isfinite(normals).all(axis=1, keepdims=True) & (normals != 0).any(axis=1)[:, None], normals, 1
     )
@@ -49,10 +49,11 @@ def discs(cloud: PointCloud, values: FloatArray, is_flat: bool = False) -> tuple
     number = np.bincount(ends, minlength=n)
     length = np.bincount(ends, np.repeat(triangles.edge_lengths, 2), n) / np.maximum(number, 1)
     length[number == 0] = triangles.edge_lengths.mean()
+    length = length[cloud.originals]
     angle = 2 * np.pi * np.arange(k) / k
     across = np.cos(angle)[:, None] * x[:, None] + np.sin(angle)[:, None] * y[:, None]
     rim = _RADIUS * length[:, None, None] * across
-    slope = np.zeros((n, 3)) if is_flat else _slopes(triangles, values)
+    slope = np.zeros((n, 3)) if is_flat else _slopes(triangles, values)[cloud.originals]
     finite = values[np.isfinite(values)]
     on_rim = values[:, None] + np.einsum("nkx,nx->nk", rim, slope)
     on_rim = np.where(np.isfinite(values)[:, None], np.clip(on_rim, finite.min(), finite.max()), values[:, None])

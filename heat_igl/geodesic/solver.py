@@ -149,7 +149,7 @@ class GeodesicSolver(BatchedSolver):
         if isinstance(domain, PointCloud):
             chosen = distance_plan("points", method, tolerance)
             # For a sweep, as for heat, slivers between points are lengthened a little.
-            triangles = MeshTriangles(domain.distinct_triangles, None)
+            triangles = MeshTriangles(domain.triangles, None)
             return self._on_triangles(triangles, chosen)
         chosen = distance_plan("triangles", method, tolerance)
         return self._on_triangles(MeshTriangles(domain), chosen)
@@ -168,7 +168,7 @@ class GeodesicSolver(BatchedSolver):
             if chosen.engine == "sweep":
                 return chosen, sweep
         # All other engines are held to bounds where they are made.
-        domain = self._domain.distinct_triangles if isinstance(self._domain, PointCloud) else self._domain
+        domain = self._domain.triangles if isinstance(self._domain, PointCloud) else self._domain
         # Noisy points are measured where they were moved to.
         V = None if isinstance(domain, Operators) else domain.V
         return chosen, guarded_windows(triangles, V, chosen.tolerance or 0.0, originals)
@@ -194,7 +194,7 @@ class GeodesicSolver(BatchedSolver):
         domain = self._domain
         if isinstance(domain, Operators):
             return domain.referenced[: domain.n_given]
-        return (domain.distinct_triangles if isinstance(domain, PointCloud) else domain).referenced
+        return (domain.triangles if isinstance(domain, PointCloud) else domain).referenced
 
     @property
     def _n_faces(self) -> int:
@@ -298,7 +298,7 @@ class GeodesicSolver(BatchedSolver):
         if isinstance(domain, Operators):
             raise ValueError("directions need the positions of a mesh, which this solver does not have")
         surface = tangent_surface(domain)
-        if isinstance(domain, PointCloud) and surface is not domain.distinct_triangles:
+        if isinstance(domain, PointCloud) and surface is not domain.triangles:
             engine = guarded_windows(MeshTriangles(surface), surface.V, 0.0, None)
         return engine, tangent_frames(surface)
 

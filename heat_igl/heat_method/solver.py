@@ -320,8 +320,8 @@ class HeatMethodSolver(BatchedSolver):
 
     @property
     def _originals(self) -> IntArray | None:
-        """The vertex (n,) whose values each takes, where seams were merged."""
-        return self._mesh.originals if isinstance(self._mesh, Mesh) and self._mesh.has_copies else None
+        """The vertex (n,) whose values each takes, where seams were merged or points are equal."""
+        return None if self._mesh is None or not self._mesh.has_copies else self._mesh.originals
 
     def _with_copies(self, values: AnyArray) -> AnyArray:
         """Values (..., n) in which copies have those of their originals."""

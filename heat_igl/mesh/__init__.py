@@ -1,6 +1,5 @@
 """What distance is measured on: meshes, images and point clouds, and points and curves on them."""
 
-from heat_igl.mesh.cloud_copies import nearest_copies
 from heat_igl.mesh.cloud_normals import usable_normals
 from heat_igl.mesh.cloud_orientation import is_oriented_manifold, two_sided_cover
 from heat_igl.mesh.edge_curves import edge_curve
@@ -71,7 +70,6 @@ __all__ = [
     "level_segments",
     "one_sided",
     "named_entries",
-    "nearest_copies",
     "read_paths_with",
     "region_boundary",
     "split_long_edges",

@@ -55,19 +55,20 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> IntArray
     Warns
     -----
     AccuracyWarning
-        If neighbours still contradict each other, and more than 1 in 50 of the points are doubtful.
+        If neighbours still contradict each other, mostly on folds, and more than 1 in 50 of the points are doubtful.
     """
     is_turned, part, pairs, folds = _turned(P, F)
     left_out = _in_pairs(pairs, len(F))
+    # On a surface with one side, neighbours contradict each other where it is flat.
     if 0 < len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(folds) > _FLAT:
         is_settled = np.ones(len(P), bool)
         is_settled[F[left_out]] = False
         is_settled[F[~is_settled[F].all(axis=1)]] = False
         F = np.delete(F, left_out, axis=0)
         F = with_fans_joined(P, with_one_fan(F, pinched_vertices(F, is_settled)), is_settled)
-        is_turned, part, pairs, _ = _turned(P, F)
+        is_turned, part, pairs, folds = _turned(P, F)
     F = np.where(is_turned[:, None], F[:, [0, 2, 1]], F)
-    if len(pairs):
+    if len(pairs) and np.median(folds) > _FLAT:
         _warn_of_doubtful_points(P, F)
     if normals is not None:
         area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])

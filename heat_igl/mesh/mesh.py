@@ -297,7 +297,7 @@ class Mesh:
 
     @cached_property
     def originals(self) -> IntArray:
-        """The vertex (n,) whose values each takes: its own number, or, where `as_mesh` merged seams, the first there.
+        """The vertex (n,) whose values each takes: its own number, or, of merged seams and equal points, the first.
 
         Faces hold first ones only. Sources may be any.
         """
@@ -305,7 +305,7 @@ class Mesh:
 
     @property
     def has_copies(self) -> bool:
-        """Whether seams were merged, so that some vertices take the values of others."""
+        """Whether some vertices take the values of others: seams that were merged, or equal points of a cloud."""
         return bool((self.originals != np.arange(self.n_vertices)).any())
 
     @cached_property

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError
-from heat_igl.mesh.cloud_copies import distinct_points, with_copies
+from heat_igl.mesh.cloud_copies import distinct_points
 from heat_igl.mesh.cloud_normals import oriented_normals
 from heat_igl.mesh.cloud_orientation import doubtful_points, is_oriented_manifold, oriented, two_sided_cover
 from heat_igl.mesh.cloud_triangles import cloud_triangles
@@ -137,18 +137,8 @@ class PointCloud:
     def triangles(self) -> Mesh:
         """The surface on which distance is measured: a mesh whose vertices are the points, with a boundary or without.
 
-        It is `distinct_triangles` with the copies of points put into them: a copy is at most a ten-millionth of an
-        edge away from the point. Without copies it is the same mesh.
-        """
-        found = self.distinct_triangles
-        if not self.has_copies:
-            return found
-        V = found.V.copy()
-        return Mesh(V, with_copies(V, found.F, *self._distinct))
-
-    @cached_property
-    def distinct_triangles(self) -> Mesh:
-        """The triangles on the points that are no copy of an earlier one; the copies are in none of them.
+        Its triangles hold no point that is a copy of an earlier one; a copy takes the values of the first, see
+        `Mesh.originals`.
 
         They are Delaunay in the tangent planes of their corners; an edge has at most two of them. The vertices
         are `P`, unless the points are noisy: if at half of them the neighbours deviate from a quadric by more than
@@ -182,7 +172,7 @@ class PointCloud:
             )
         F, V = number[oriented(tree.P, triangles, normals)], np.empty_like(self.P)
         V[number] = tree.P
-        return Mesh(V[distinct[original]], F)
+        return Mesh(V[distinct[original]], F).with_originals(distinct[original])
 
     @cached_property
     def cover(self) -> Mesh | None:
@@ -190,17 +180,23 @@ class PointCloud:
 
         Tangent vectors, and what follows them, live on it.
         """
-        return None if is_oriented_manifold(self.triangles) else two_sided_cover(self.triangles)
+        surface = self.triangles
+        if is_oriented_manifold(surface):
+            return None
+        cover, n = two_sided_cover(surface), len(self.P)
+        originals = np.arange(cover.n_vertices)
+        originals[: 2 * n] = np.concatenate([surface.originals, surface.originals + n])
+        return cover.with_originals(originals)
 
     @property
     def components(self) -> IntArray:
         """Component label (n,) of each point; a point in no triangle is a component of its own."""
-        return self.triangles.components
+        return self.triangles.components[self.originals]
 
     @property
     def boundary(self) -> BoolArray:
         """Which points (n,) lie on the boundary of `triangles`."""
-        return self.triangles.boundary
+        return self.triangles.boundary[self.originals]
 
     def with_vertices(self, P: ArrayLike) -> PointCloud:
         """A cloud of as many points at other positions, without normals: they would not be those of the new surface."""
@@ -212,7 +208,7 @@ class PointCloud:
     def report(self) -> CloudReport:
         """What the points tell: components, border, points left out, and where sheets may be joined wrongly."""
         report = self.triangles.report()
-        moved = self.distinct_triangles.V - self.P
+        moved = self.triangles.V - self.P
         return CloudReport(
             **{field.name: getattr(report, field.name) for field in fields(report)},
             boundary_points=np.flatnonzero(self.boundary),
