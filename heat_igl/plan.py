@@ -15,6 +15,7 @@ from heat_igl.errors import MeshError, is_number, require_choice, shown
 
 __all__ = [
     "NEAR_RADIUS",
+    "DistanceMethod",
     "DomainKind",
     "Engine",
     "Method",
@@ -27,6 +28,7 @@ __all__ = [
 
 Engine = Literal["windows", "sweep", "lines", "hopf-lax", "heat"]
 Method = Literal["auto", "windows", "exact", "sweep"]
+DistanceMethod = Literal["auto", "windows", "exact", "sweep", "heat"]
 DomainKind = Literal["triangles", "points", "tetrahedra", "separate simplices"]
 
 #: How far around points and curves distance is taken from windows, in mean edge lengths: the cost grows with the

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -78,7 +79,37 @@ def test_import_loads_what_a_distance_needs_and_little_else():
         for name in ("cluster", "reference", "reference.baselines", "validation", "validation.metrics")
     ] + ["ssl"]
     assert loaded("import heat_igl", others) == []
-    assert loaded("from heat_igl import *", others) == others[:-1]
+    assert loaded("from heat_igl import *", others[-1:]) == []
+
+
+def test_a_distance_by_windows_loads_no_other_engine():
+    others = [f"heat_igl.{name}" for name in ("heat_method.solver", "linear", "steps", "unfolding.sweep", "curves")]
+    V, F = [[0, 0, 0], [3, 0, 0], [3, 4, 0], [0, 4, 0]], [[0, 1, 3], [1, 2, 3]]
+    asked = f"import heat_igl; heat_igl.geodesic_distance(({V}, {F}), 0"
+    assert loaded(f"{asked})", others) == []
+    assert loaded(f"{asked}, method='heat')", others) == others[:-1]
+
+
+def test_no_name_of_a_package_is_that_of_another_of_its_modules():
+    """The import of the module would put it in place of the name."""
+    for stub in PACKAGE.rglob("__init__.pyi"):
+        for home, name in re.findall(r"^from (\S+) import (\w+)", stub.read_text(encoding="utf8"), re.MULTILINE):
+            module = stub.with_name(f"{name}.py")
+            assert not module.exists() or home.endswith(f".{stub.parent.name}"), module
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_any_public_name_may_be_the_first_to_be_asked_for():
+    """Each in a process of its own, so that imports in a circle would not find each other loaded."""
+    code = (
+        "import os, numpy, scipy.sparse, heat_igl\n"
+        "for name in heat_igl.__all__:\n"
+        "    if not os.fork():\n"
+        "        getattr(heat_igl, name); os._exit(0)\n"
+        "    assert not os.wait()[1], name"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_names_loaded_on_first_use_are_those_of_their_modules():

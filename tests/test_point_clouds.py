@@ -905,7 +905,7 @@ def test_vectors_on_both_sides_are_those_on_one(monkeypatch: pytest.MonkeyPatch)
     for method in ("heat", "windows"):
         with monkeypatch.context() as patch:
             one = heat_igl.VectorHeatSolver(cloud, method=method)
-            patch.setattr("heat_igl.mesh.point_cloud.is_oriented_manifold", lambda _: False)
+            patch.setattr("heat_igl.mesh.cloud_orientation.is_oriented_manifold", lambda _: False)
             both = heat_igl.VectorHeatSolver(PointCloud(cloud.P), method=method)
         assert both.operators.n == 2 * one.operators.n
         for name in ("x", "y", "normal"):

@@ -1,28 +1,5 @@
 """Pictures and interactive pages of a distance on a surface."""
 
-from heat_igl.drawing.output import PAGE_SUFFIXES, PICTURE_SUFFIXES
-from heat_igl.drawing.plots import (
-    Page,
-    Picture,
-    page,
-    picture,
-    plot,
-    plot_field,
-    plot_labels,
-    write_html,
-    write_line_drawing,
-)
+from heat_igl.lazy import attached
 
-__all__ = [
-    "PAGE_SUFFIXES",
-    "PICTURE_SUFFIXES",
-    "Page",
-    "Picture",
-    "page",
-    "picture",
-    "plot",
-    "plot_field",
-    "plot_labels",
-    "write_html",
-    "write_line_drawing",
-]
+__all__, __getattr__, __dir__ = attached(__name__, __file__)

@@ -1,7 +1,5 @@
 """`GeodesicSolver` and `geodesic_distance`: distance on every domain, by the engine that the plan names."""
 
-from heat_igl.geodesic.choice import DistanceMethod, Solver, SolverChoice
-from heat_igl.geodesic.distance import geodesic_distance
-from heat_igl.geodesic.solver import GeodesicSolver
+from heat_igl.lazy import attached
 
-__all__ = ["DistanceMethod", "GeodesicSolver", "Solver", "SolverChoice", "geodesic_distance"]
+__all__, __getattr__, __dir__ = attached(__name__, __file__)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 from heat_igl.errors import require_choice
 from heat_igl.geodesic.solver import GeodesicSolver
 from heat_igl.heat_method import HeatMethodSolver, SolverOptions
 from heat_igl.mesh import MeshLike
 from heat_igl.operators import Operators
+from heat_igl.plan import DistanceMethod
 from heat_igl.typing import ArrayLike
 
-__all__ = ["DistanceMethod", "Solver", "SolverChoice"]
+__all__ = ["Solver", "SolverChoice"]
 
 Solver = GeodesicSolver | HeatMethodSolver
-DistanceMethod = Literal["auto", "windows", "exact", "sweep", "heat"]
 _OPTIONS_OF_HEAT = tuple(option.name for option in fields(SolverOptions))
 
 

@@ -9,12 +9,10 @@ import igl
 import numpy as np
 
 from heat_igl.errors import names_guessed, require_choice
-from heat_igl.geodesic.choice import DistanceMethod
 from heat_igl.geodesic.solver import GeodesicSolver
-from heat_igl.heat_method import HeatMethodSolver
 from heat_igl.heat_method.batches import checked_cutoff, cut_off
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh
-from heat_igl.plan import MOST_WITHIN_REACH
+from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod
 from heat_igl.sources import OffsetSources, Sources, named_vertices, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 
@@ -87,6 +85,8 @@ def geodesic_distance(
     beyond = checked_cutoff(cutoff)
     given = as_mesh(mesh)
     if method == "heat":
+        from heat_igl.heat_method import HeatMethodSolver  # what follows needs none of its modules
+
         distance = HeatMethodSolver(given, region=region).distance(sources, cutoff=beyond)
         return distance if targets is None else distance[named_vertices(targets, len(distance), "targets")]
     if isinstance(given, PolygonMesh):

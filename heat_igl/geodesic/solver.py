@@ -4,35 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heat_igl.errors import MeshError, names_guessed
-from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
-from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_surface
-from heat_igl.heat_method.directions import Directions, directions
-from heat_igl.heat_method.side_lengths import SideLengths, SidesOfMesh
-from heat_igl.heat_method.solution import LabelledDistance
-from heat_igl.heat_method.two_sides import directions_from_one_side
-from heat_igl.intrinsic import TangentFrames, tangent_frames
+from heat_igl.heat_method.batches import BatchedSolver, LabelledDistance, checked_cutoff, cut_off
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
-from heat_igl.operators import MetricSimplices, Operators, edge_length_operators
+from heat_igl.operators import Operators
 from heat_igl.plan import Method, Plan, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources, SourceSet, named_vertices, require_resolved, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
-from heat_igl.unfolding import (
-    Engine,
-    GuardedEngine,
-    HopfLaxEngine,
-    LineEngine,
-    MeshTriangles,
-    OperatorTriangles,
-    SweepEngine,
-    Triangles,
-    guarded_windows,
-)
+from heat_igl.unfolding import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
+
+if TYPE_CHECKING:
+    from heat_igl.heat_method.derivatives import DistanceDerivative
+    from heat_igl.heat_method.directions import Directions
+    from heat_igl.heat_method.side_lengths import SidesOfMesh
+    from heat_igl.intrinsic import TangentFrames
 
 __all__ = ["GeodesicSolver"]
 
@@ -124,6 +115,8 @@ class GeodesicSolver(BatchedSolver):
         method, tolerance
             As for the class.
         """
+        from heat_igl.operators import edge_length_operators
+
         return cls(edge_length_operators(F, lengths, n, twin=twin), method=method, tolerance=tolerance)
 
     def _prepared(self) -> tuple[Plan, Engine]:
@@ -136,9 +129,14 @@ class GeodesicSolver(BatchedSolver):
                     f"F[{flat[0]}] = {domain.F[flat[0]].tolist()} has no volume ({len(flat)} of {domain.n_faces} "
                     "faces): remove these faces"
                 )
+            from heat_igl.operators import MetricSimplices
+            from heat_igl.unfolding import LineEngine
+
             return distance_plan("tetrahedra", method, tolerance), LineEngine(MetricSimplices.in_space(domain))
         if isinstance(domain, Operators):
             if domain.simplices is not None:
+                from heat_igl.unfolding import HopfLaxEngine, LineEngine
+
                 if domain.simplices.V is not None:
                     return distance_plan("tetrahedra", method, tolerance), LineEngine(domain.simplices)
                 return distance_plan("separate simplices", method, tolerance), HopfLaxEngine(domain.simplices)
@@ -163,6 +161,8 @@ class GeodesicSolver(BatchedSolver):
     def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:
         self._triangles, originals = triangles, self._originals
         if chosen.engine == "sweep":
+            from heat_igl.unfolding import SweepEngine
+
             sweep = SweepEngine(triangles, originals)
             chosen = sweep_plan(sweep.measures, chosen)
             if chosen.engine == "sweep":
@@ -279,11 +279,15 @@ class GeodesicSolver(BatchedSolver):
         ValueError
             If the engine is not windows, or the solver was made from operators.
         """
+        from heat_igl.heat_method.directions import directions
+
         chosen = self._source_set(sources)
         engine, frames = self._directed
         found = directions(*engine.directed(chosen), frames)
         if isinstance(self._domain, PointCloud):
             if self._domain.cover is not None:
+                from heat_igl.heat_method.two_sides import directions_from_one_side
+
                 found = directions_from_one_side(found, frames, self.n_vertices, self._domain.n_faces)
             return found if self._originals is None else found.of(self._originals)
         if self._part is None:
@@ -294,6 +298,8 @@ class GeodesicSolver(BatchedSolver):
     @cached_property
     def _directed(self) -> tuple[GuardedEngine, TangentFrames]:
         """The engine and the frames of directions: those of a cloud are on its copies too, and on both of its sides."""
+        from heat_igl.intrinsic import tangent_frames
+
         domain, engine = self._domain, self._windows("directions follow")
         if isinstance(domain, Operators):
             raise ValueError("directions need the positions of a mesh, which this solver does not have")
@@ -308,6 +314,9 @@ class GeodesicSolver(BatchedSolver):
         Arguments and errors as for `distance`; a ValueError also if the engine is not windows, and for what has no
         derivative, see `differentiable_surface`. The derivative is that of the exact paths.
         """
+        from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_surface
+        from heat_igl.heat_method.side_lengths import SideLengths
+
         engine, chosen, domain = self._windows("derivatives are those of"), self._source_set(sources), self._domain
         surface = differentiable_surface(
             None if self._triangles is None else self._triangles.surface,

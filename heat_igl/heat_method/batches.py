@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence, Sized
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +22,32 @@ from heat_igl.runtime import (
     warn_caller,
 )
 from heat_igl.sources import Sources, SourceSet
-from heat_igl.typing import AnyArray, FloatArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["BatchedSolver", "checked_cutoff", "cut_off"]
+__all__ = ["BatchedSolver", "LabelledDistance", "checked_cutoff", "cut_off"]
+
+
+class LabelledDistance(NamedTuple):
+    """Distance and the source that it is measured from.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        As `HeatMethodSolver.distance` returns it.
+    labels : (n,) int64
+        The nearest source of each vertex; -1 if none reaches it, or none within the cutoff.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(6, 1)
+    >>> found = heat_igl.HeatMethodSolver(mesh).voronoi([1, 6])
+    >>> found.labels[:7].tolist()
+    [0, 0, 0, 0, 1, 1, 1]
+    """
+
+    distance: FloatArray
+    labels: IntArray
 
 
 class BatchedSolver(ABC):

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from heat_igl.heat_method.checking import AnswerCheck, Comparison
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 
-__all__ = ["Diagnostics", "HeatSolution", "LabelledDistance"]
+__all__ = ["Diagnostics", "HeatSolution"]
 
 
 @dataclass(frozen=True)
@@ -72,29 +71,6 @@ class Diagnostics:
     def t_raised(self) -> bool:
         """Whether t was raised to keep the heat inside the double range."""
         return self.t > self.t_requested
-
-
-class LabelledDistance(NamedTuple):
-    """Distance and the source that it is measured from.
-
-    Attributes
-    ----------
-    distance : (n,) float64
-        As `HeatMethodSolver.distance` returns it.
-    labels : (n,) int64
-        The nearest source of each vertex; -1 if none reaches it, or none within the cutoff.
-
-    Examples
-    --------
-    >>> import heat_igl
-    >>> mesh = heat_igl.shapes.strip(6, 1)
-    >>> found = heat_igl.HeatMethodSolver(mesh).voronoi([1, 6])
-    >>> found.labels[:7].tolist()
-    [0, 0, 0, 0, 1, 1, 1]
-    """
-
-    distance: FloatArray
-    labels: IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, names_guessed
-from heat_igl.heat_method.batches import BatchedSolver, checked_cutoff, cut_off
+from heat_igl.heat_method.batches import BatchedSolver, LabelledDistance, checked_cutoff, cut_off
 from heat_igl.heat_method.checking import AnswerCheck
 from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_surface
 from heat_igl.heat_method.heat_derivative import HeatDerivative
@@ -17,7 +17,7 @@ from heat_igl.heat_method.options import Magnitude, SolverOptions
 from heat_igl.heat_method.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
 from heat_igl.heat_method.several_sources import drop_overtaken, warmest_sources
 from heat_igl.heat_method.side_lengths import SideLengths
-from heat_igl.heat_method.solution import Diagnostics, HeatSolution, LabelledDistance
+from heat_igl.heat_method.solution import Diagnostics, HeatSolution
 from heat_igl.heat_method.source_terms import SourceTerm, right_hand_side
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh

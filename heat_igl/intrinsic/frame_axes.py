@@ -8,10 +8,10 @@ import igl
 import numpy as np
 
 from heat_igl.errors import MeshError
+from heat_igl.intrinsic.frames import TangentFrames
 from heat_igl.intrinsic.gluing import intrinsic_triangulation
-from heat_igl.intrinsic.polar_angles import PolarAngles, polar_angles
-from heat_igl.intrinsic.tangent_frames import TangentFrames
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
+from heat_igl.intrinsic.vertex_angles import PolarAngles, polar_angles
 from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_simplices, tangent_surface
 from heat_igl.typing import FloatArray
 

@@ -1,12 +1,5 @@
 """Factor a symmetric positive definite matrix once, solve with it many times; knows matrices, never meshes."""
 
-from heat_igl.linear.backends import Backend, analyse, factorize
-from heat_igl.linear.protocols import Analysis, Factorization
+from heat_igl.lazy import attached
 
-__all__ = [
-    "Analysis",
-    "Backend",
-    "Factorization",
-    "analyse",
-    "factorize",
-]
+__all__, __getattr__, __dir__ = attached(__name__, __file__)

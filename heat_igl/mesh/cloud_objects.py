@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.mesh.cloud_normals import usable_normals
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.typing import AnyArray
 
@@ -80,4 +79,6 @@ def _active_normals(mesh: Any) -> AnyArray | None:
 
 
 def _cloud(P: Any, normals: Any = None) -> PointCloud:
+    from heat_igl.mesh.cloud_normals import usable_normals
+
     return PointCloud(np.asarray(P), None if normals is None else usable_normals(np.asarray(normals)))

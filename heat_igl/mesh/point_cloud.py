@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.mesh.cloud_copies import distinct_points
-from heat_igl.mesh.cloud_normals import oriented_normals
-from heat_igl.mesh.cloud_orientation import doubtful_points, is_oriented_manifold, oriented, two_sided_cover
-from heat_igl.mesh.cloud_triangles import cloud_triangles
 from heat_igl.mesh.connectivity import connected_components
 from heat_igl.mesh.mesh import Mesh, checked_positions
-from heat_igl.mesh.neighbourhoods import PointTree, neighbourhoods, point_tree, without_noise
 from heat_igl.mesh.report import CloudReport
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from heat_igl.mesh.neighbourhoods import PointTree
 
 __all__ = ["PointCloud"]
 
@@ -156,6 +156,10 @@ class PointCloud:
             If normals are left out, or if without normals two sheets that are nearer than the points in them are taken
             for one with noise.
         """
+        from heat_igl.mesh.cloud_normals import oriented_normals
+        from heat_igl.mesh.cloud_orientation import oriented
+        from heat_igl.mesh.neighbourhoods import point_tree, without_noise
+
         # Copies of a point would compete for the same triangles.
         distinct, original = self._distinct
         # From here to the triangles, points are numbered by the tree, in which neighbours are near in memory.
@@ -180,6 +184,8 @@ class PointCloud:
 
         Tangent vectors, and what follows them, live on it.
         """
+        from heat_igl.mesh.cloud_orientation import is_oriented_manifold, two_sided_cover
+
         surface = self.triangles
         if is_oriented_manifold(surface):
             return None
@@ -207,6 +213,8 @@ class PointCloud:
 
     def report(self) -> CloudReport:
         """What the points tell: components, border, points left out, and where sheets may be joined wrongly."""
+        from heat_igl.mesh.cloud_orientation import doubtful_points
+
         report = self.triangles.report()
         moved = self.triangles.V - self.P
         return CloudReport(
@@ -289,6 +297,9 @@ def _warn_of_two_sheets(given: FloatArray, moved: FloatArray) -> None:
 
 def _triangles(tree: PointTree, normals: FloatArray | None) -> IntArray:
     """The triangles (m, 3) int32 of points: of as few parts as those of neighbourhoods that are not made smaller."""
+    from heat_igl.mesh.cloud_triangles import cloud_triangles
+    from heat_igl.mesh.neighbourhoods import neighbourhoods
+
     near = neighbourhoods(tree, normals)
     F = cloud_triangles(tree.P, near, oriented=normals is not None)
     parts = _n_parts(F, len(tree.P)) if near.has_shrunk else 1

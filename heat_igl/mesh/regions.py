@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.errors import SourceError, as_array
-from heat_igl.mesh.level_segments import Segments, joined_segments, level_segments
+from heat_igl.mesh.contours import Segments, joined_segments, level_segments
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import SurfaceCurve, require_triangles

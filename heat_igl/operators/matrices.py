@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
-from heat_igl.mesh import PolygonFans
 from heat_igl.operators.elements import EdgeLengths, TriangleElements
-from heat_igl.operators.metric_derivatives import MetricSides
-from heat_igl.operators.metric_simplices import MetricSimplices
-from heat_igl.operators.surface import Surface
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from heat_igl.mesh import PolygonFans
+    from heat_igl.operators.metric_derivatives import MetricSides
+    from heat_igl.operators.metric_simplices import MetricSimplices
+    from heat_igl.operators.surface import Surface
 
 __all__ = ["Laplacian", "OnLaplacian", "Operators", "check_laplacian", "divergence_matrix", "laplacian_of_gradient"]
 

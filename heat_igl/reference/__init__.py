@@ -10,29 +10,6 @@ Examples
 [4.0, 3.0, 5.0]
 """
 
-from heat_igl.reference import baselines
-from heat_igl.reference.bounds import edge_paths, straight_lines
-from heat_igl.reference.exact_distance import exact
-from heat_igl.reference.guarded import MEMORY, TIMEOUT, close
-from heat_igl.reference.heat_methods import igl_heat, potpourri3d_heat
-from heat_igl.reference.measurement import EXACT_SOLVERS, Measured, exact_solver, measured
-from heat_igl.reference.meshlab_filters import meshlab, meshlab_border, meshlab_heat
+from heat_igl.lazy import attached
 
-__all__ = [
-    "EXACT_SOLVERS",
-    "MEMORY",
-    "Measured",
-    "TIMEOUT",
-    "baselines",
-    "close",
-    "edge_paths",
-    "exact",
-    "exact_solver",
-    "igl_heat",
-    "measured",
-    "meshlab",
-    "meshlab_border",
-    "meshlab_heat",
-    "potpourri3d_heat",
-    "straight_lines",
-]
+__all__, __getattr__, __dir__ = attached(__name__, __file__)

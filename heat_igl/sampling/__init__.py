@@ -10,21 +10,6 @@ Examples
 [0, 13]
 """
 
-from heat_igl.sampling.centre import geodesic_centre
-from heat_igl.sampling.dual import dual_triangulation
-from heat_igl.sampling.extent import diameter, distance_matrix
-from heat_igl.sampling.farthest import farthest_cells, farthest_points
-from heat_igl.sampling.queries import as_solver
-from heat_igl.sampling.voronoi import VoronoiCells, voronoi_cells
+from heat_igl.lazy import attached
 
-__all__ = [
-    "VoronoiCells",
-    "as_solver",
-    "diameter",
-    "distance_matrix",
-    "dual_triangulation",
-    "farthest_cells",
-    "farthest_points",
-    "geodesic_centre",
-    "voronoi_cells",
-]
+__all__, __getattr__, __dir__ = attached(__name__, __file__)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import igl
 import numpy as np
 
-from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels.mesh import bounds
 from heat_igl.mesh import Mesh
-from heat_igl.operators import MetricSimplices, Operators, Surface, unfolding_surface
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.unfolding.half_edges import MARGIN, HalfEdges, from_mesh, from_triangulation
+
+if TYPE_CHECKING:
+    from heat_igl.intrinsic import IntrinsicTriangulation
+    from heat_igl.operators import MetricSimplices, Operators, Surface
 
 __all__ = ["ROUNDING", "Engine", "MeshTriangles", "OperatorTriangles", "SimplexEngine", "TriangleEngine", "Triangles"]
 
@@ -159,6 +162,8 @@ class MeshTriangles(Triangles):
     @cached_property
     def surface(self) -> Surface:
         """The triangles with their history."""
+        from heat_igl.operators import unfolding_surface
+
         return unfolding_surface(self._mesh, self._margin)
 
     @property
@@ -239,6 +244,8 @@ def _as_thin_as_given(surface: Surface) -> Surface:
     given, faces = surface.given_faces, surface.faces
     if given is None or faces is None or surface.V is None or faces.lengthening == 0:
         return surface
+    from heat_igl.operators import unfolding_surface
+
     added = faces.l - igl.edge_lengths(surface.V, faces.F)
     if np.abs(added - 0.5 * faces.lengthening).max() > 0.51 * faces.lengthening:
         return surface  # lengths of another metric

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +13,12 @@ from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding.directions import PathAngles
 from heat_igl.unfolding.engine import Engine, MeshTriangles, Triangles
 from heat_igl.unfolding.invariants import Invariants
-from heat_igl.unfolding.sweep import SweepEngine
 from heat_igl.unfolding.window_engine import WindowEngine
+
+if TYPE_CHECKING:
+    from heat_igl.unfolding.directions import PathAngles
 
 __all__ = ["GuardedEngine", "contradicted", "distances_instead", "guarded_windows"]
 
@@ -120,7 +122,13 @@ def guarded_windows(
     else:
         invariants = Invariants(triangles.given_faces, components, V)
     windows = WindowEngine(triangles, originals)
-    return GuardedEngine(windows, invariants, tolerance, (partial(SweepEngine, triangles, originals),))
+    return GuardedEngine(windows, invariants, tolerance, (partial(_sweep, triangles, originals),))
+
+
+def _sweep(triangles: Triangles, originals: IntArray | None) -> Engine:
+    from heat_igl.unfolding.sweep import SweepEngine
+
+    return SweepEngine(triangles, originals)
 
 
 def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:

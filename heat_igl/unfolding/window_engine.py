@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,12 +11,14 @@ from heat_igl.mesh import SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.sources import SourceSet
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding.curve_directions import CurveDirections
-from heat_igl.unfolding.directions import PathAngles, PathDirections
 from heat_igl.unfolding.engine import TriangleEngine, Triangles
 from heat_igl.unfolding.exact import ExactSolution, ExactSurface
-from heat_igl.unfolding.path_lengths import PathLengths, from_windows
 from heat_igl.unfolding.queries import Query, labels_of, starting_points
+
+if TYPE_CHECKING:
+    from heat_igl.unfolding.curve_directions import CurveDirections
+    from heat_igl.unfolding.directions import PathAngles, PathDirections
+    from heat_igl.unfolding.path_lengths import PathLengths
 
 __all__ = ["WindowEngine"]
 
@@ -31,10 +34,14 @@ class WindowEngine(TriangleEngine):
     @cached_property
     def _directions(self) -> PathDirections:
         """Polar angles of the paths; a `MeshError` where vertices have no tangent plane."""
+        from heat_igl.unfolding.directions import PathDirections
+
         return PathDirections(self._triangles.surface)
 
     @cached_property
     def _curve_directions(self) -> CurveDirections:
+        from heat_igl.unfolding.curve_directions import CurveDirections
+
         return CurveDirections(self._triangles.surface)
 
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
@@ -105,7 +112,7 @@ class WindowEngine(TriangleEngine):
         distance, labels = self._with_copies(distance), self._with_copies(labels)
         if self._originals is not None:
             starts = unchecked_points(starts.faces[self._originals], starts.barycentric[self._originals])
-            angles = PathAngles(*(angle[self._originals] for angle in angles))
+            angles = type(angles)(*(angle[self._originals] for angle in angles))
         return distance, labels, angles, starts
 
     @cached_property
@@ -117,4 +124,6 @@ class WindowEngine(TriangleEngine):
 
     def paths(self, sources: SourceSet) -> PathLengths:
         """The paths whose lengths are the exact distances from vertices and points."""
+        from heat_igl.unfolding.path_lengths import from_windows
+
         return from_windows(self._on_delaunay, self._triangles.surface.unfolding, sources)

@@ -93,7 +93,7 @@ def trace_back(
     sources : Starts
         Its sources.
     begin : PathStarts
-        Where the k paths begin; see `heat_igl.unfolding.exact_paths.PathStarts`.
+        Where the k paths begin; see `heat_igl.unfolding.traced_paths.PathStarts`.
     face, place : (r,), (r, 2, 3)
         Take the segments, path after path: face, and barycentric coordinates of both ends.
     end : (k,)

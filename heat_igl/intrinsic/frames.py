@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from heat_igl.errors import MeshError, as_array, real_numbers
-from heat_igl.intrinsic.polar_angles import PolarAngles
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, previous_half_edge
+from heat_igl.intrinsic.vertex_angles import PolarAngles
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["TangentFrames", "checked_vectors"]

@@ -1,0 +1,46 @@
+"""Packages whose names are loaded on first use, so that a call imports the modules that it needs and no others."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+__all__ = ["attached"]
+
+
+def attached(package: str, file: str) -> tuple[list[str], Callable[[str], object], Callable[[], list[str]]]:
+    """`__all__`, `__getattr__` and `__dir__` of a package (PEP 562), from the stub beside its ``__init__.py``.
+
+    The stub ``__init__.pyi``, which type checkers read as well, is the one list of the package's names: a line
+    ``from module import name as name`` for each. No name may be that of another module of the package, which would
+    take its place once it is imported.
+    """
+    stub = Path(file).with_suffix(".pyi").read_text(encoding="utf8")
+    homes = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as \2$", stub, re.MULTILINE)}
+    names = sorted(homes)
+
+    def load(name: str) -> object:
+        home = homes.get(name, package)
+        if home != package:
+            # What `from home import name` does, which finds modules in a package as well.
+            found = getattr(__import__(home, fromlist=[name]), name)
+            setattr(sys.modules[package], name, found)
+            return found
+        if not name.startswith("_") and find_spec(f"{package}.{name}"):
+            return import_module(f"{package}.{name}")
+        message = f"module {package!r} has no attribute {name!r}"
+        if not name.startswith("_"):
+            from difflib import get_close_matches
+
+            message += "".join(f"; did you mean {close!r}?" for close in get_close_matches(name, names, n=1))
+        # With a name but no object, the interpreter adds no second suggestion.
+        raise AttributeError(message, name=name)
+
+    def listed() -> list[str]:
+        return sorted(name for name in {*vars(sys.modules[package]), *names} if not re.match("_[^_]", name))
+
+    return names, load, listed

@@ -1,0 +1,16 @@
+from heat_igl.reference import baselines as baselines
+from heat_igl.reference.bounds import edge_paths as edge_paths
+from heat_igl.reference.bounds import straight_lines as straight_lines
+from heat_igl.reference.exact_distance import exact as exact
+from heat_igl.reference.guarded import MEMORY as MEMORY
+from heat_igl.reference.guarded import TIMEOUT as TIMEOUT
+from heat_igl.reference.guarded import close as close
+from heat_igl.reference.heat_methods import igl_heat as igl_heat
+from heat_igl.reference.heat_methods import potpourri3d_heat as potpourri3d_heat
+from heat_igl.reference.measurement import EXACT_SOLVERS as EXACT_SOLVERS
+from heat_igl.reference.measurement import Measured as Measured
+from heat_igl.reference.measurement import exact_solver as exact_solver
+from heat_igl.reference.measurement import measured as measured
+from heat_igl.reference.meshlab_filters import meshlab as meshlab
+from heat_igl.reference.meshlab_filters import meshlab_border as meshlab_border
+from heat_igl.reference.meshlab_filters import meshlab_heat as meshlab_heat

@@ -1,0 +1,16 @@
+from heat_igl.sources.curve_samples import samples as samples
+from heat_igl.sources.ordered import ordered_vertices as ordered_vertices
+from heat_igl.sources.oriented import Oriented as Oriented
+from heat_igl.sources.oriented import OrientedPoints as OrientedPoints
+from heat_igl.sources.oriented import OrientedSet as OrientedSet
+from heat_igl.sources.oriented import oriented_set as oriented_set
+from heat_igl.sources.source_sets import SourcePoints as SourcePoints
+from heat_igl.sources.source_sets import SourceSegments as SourceSegments
+from heat_igl.sources.source_sets import SourceSet as SourceSet
+from heat_igl.sources.source_sets import nearest_first as nearest_first
+from heat_igl.sources.specification import OffsetSources as OffsetSources
+from heat_igl.sources.specification import Sources as Sources
+from heat_igl.sources.specification import named_vertices as named_vertices
+from heat_igl.sources.specification import require_resolved as require_resolved
+from heat_igl.sources.specification import source_set as source_set
+from heat_igl.sources.specification import vertex_sources as vertex_sources

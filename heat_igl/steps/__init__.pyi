@@ -1,0 +1,17 @@
+from heat_igl.steps.diffusion import Boundary as Boundary
+from heat_igl.steps.diffusion import HeatFlow as HeatFlow
+from heat_igl.steps.diffusion import check_boundary as check_boundary
+from heat_igl.steps.diffusion import diffuse as diffuse
+from heat_igl.steps.diffusion import mass_unit as mass_unit
+from heat_igl.steps.fitted import fitted_laplacian as fitted_laplacian
+from heat_igl.steps.flow_derivative import FlowDerivative as FlowDerivative
+from heat_igl.steps.flow_derivative import MatrixSlopes as MatrixSlopes
+from heat_igl.steps.integration import PoissonProblem as PoissonProblem
+from heat_igl.steps.integration import integrate as integrate
+from heat_igl.steps.normalization import NormalizedDivergence as NormalizedDivergence
+from heat_igl.steps.normalization import damping as damping
+from heat_igl.steps.normalization import normalize as normalize
+from heat_igl.steps.pattern import analysis as analysis
+from heat_igl.steps.time_steps import smallest_time_step as smallest_time_step
+from heat_igl.steps.time_steps import smallest_time_steps as smallest_time_steps
+from heat_igl.steps.vector_diffusion import VectorHeatFlow as VectorHeatFlow
