@@ -23,7 +23,7 @@ from heat_igl.io.files import (
 )
 from heat_igl.io.packed import form_suffix, pack
 from heat_igl.io.text import Text, format_rows
-from heat_igl.mesh import Mesh, PointCloud, read_paths_with, usable_normals
+from heat_igl.mesh import Mesh, PointCloud, usable_normals
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 __all__ = [
@@ -101,9 +101,6 @@ def read_mesh_or_cloud(path: str | os.PathLike[str], points: bool = False) -> Me
     """
     path = checked_path(path, (*MESH_SUFFIXES, *POINT_SUFFIXES), (*MESH_SUFFIXES, *POINT_CLOUD_SUFFIXES))
     return read_point_cloud(path) if points or form_suffix(path) in POINT_SUFFIXES else read_mesh(path)
-
-
-read_paths_with(read_mesh_or_cloud)
 
 
 def is_mesh_or_cloud_path(path: Path, points: bool = False) -> bool:

@@ -18,7 +18,6 @@ from heat_igl.mesh.objects import MeshLike as MeshLike
 from heat_igl.mesh.objects import as_mesh as as_mesh
 from heat_igl.mesh.objects import as_simplices as as_simplices
 from heat_igl.mesh.objects import one_sided as one_sided
-from heat_igl.mesh.objects import read_paths_with as read_paths_with
 from heat_igl.mesh.objects import tangent_surface as tangent_surface
 from heat_igl.mesh.objects import warn_of_seams as warn_of_seams
 from heat_igl.mesh.part import MeshPart as MeshPart

@@ -25,7 +25,6 @@ __all__ = [
     "as_mesh",
     "as_simplices",
     "one_sided",
-    "read_paths_with",
     "tangent_surface",
     "warn_of_seams",
 ]
@@ -56,13 +55,6 @@ _NOT_MESHES = {
 
 # The beginning of the warning, behind a number.
 _SEAMS = "boundary edges of the mesh lie on others"
-
-_readers: list[Callable[[str | os.PathLike[str]], Mesh | PointCloud]] = []
-
-
-def read_paths_with(reader: Callable[[str | os.PathLike[str]], Mesh | PointCloud]) -> None:
-    """Let `as_mesh` read paths with `reader`: files are the business of a room above this one."""
-    _readers[:] = [reader]
 
 
 @names_guessed
@@ -184,9 +176,9 @@ def _converted(mesh: MeshLike, F: ArrayLike | None) -> Mesh | PolygonMesh | Poin
     if isinstance(mesh, ImageDomain):
         return mesh.mesh
     if isinstance(mesh, (str, os.PathLike)):
-        if not _readers:
-            import_module("heat_igl.io")  # which calls `read_paths_with`
-        return _readers[0](mesh)
+        # Files are the business of a room above this one.
+        found: Mesh | PointCloud = import_module("heat_igl.io").read_mesh_or_cloud(mesh)
+        return found
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return Mesh(*mesh)
     if isinstance(mesh, np.ndarray):
