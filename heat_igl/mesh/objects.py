@@ -177,8 +177,8 @@ def _converted(mesh: MeshLike, F: ArrayLike | None) -> Mesh | PolygonMesh | Poin
         return mesh.mesh
     if isinstance(mesh, (str, os.PathLike)):
         # Files are the business of a room above this one.
-        found: Mesh | PointCloud = import_module("heat_igl.io").read_mesh_or_cloud(mesh)
-        return found
+        read: Callable[..., Mesh | PointCloud] = import_module("heat_igl.io").read_mesh_or_cloud
+        return read(mesh)
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return Mesh(*mesh)
     if isinstance(mesh, np.ndarray):
