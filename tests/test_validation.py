@@ -246,34 +246,34 @@ def test_no_reference() -> None:
 def test_references_of_ones_own() -> None:
     mesh = shapes.grid(10)
     known = np.stack([closed_forms.plane(mesh, source) for source in (0, 50)])
-    by_array = validate(mesh, [[0], [50]], ["heat"], known)
-    by_function = validate(mesh, [[0], [50]], ["heat"], closed_forms.plane)
+    by_array = validate(mesh, [[0], [50]], ["heat"], reference=known)
+    by_function = validate(mesh, [[0], [50]], ["heat"], reference=closed_forms.plane)
     by_exact = validate(mesh, [[0], [50]], ["heat"])
     assert (by_array.reference, by_function.reference, by_exact.reference) == ("given distances", "plane", "exact")
     assert by_array.rows[0].errors == by_function.rows[0].errors
     assert by_array.rows[0].errors.mean == pytest.approx(by_exact.rows[0].errors.mean, rel=1e-9)  # type: ignore[union-attr]
     box = shapes.box(4)
-    report = validate(box, 0, ["heat", "exact", "windows"], closed_forms.convex_solid)
+    report = validate(box, 0, ["heat", "exact", "windows"], reference=closed_forms.convex_solid)
     assert report.rows[0].errors is not None
     assert "works on triangles" in str(report.rows[1].failure)
     assert report.rows[2].failure is not None
     assert report.plot().axes
     with pytest.raises(ValueError, match=r"reference must have shape \(1, 121\), not \(2, 121\)"):
-        validate(mesh, 0, ["heat"], known)
+        validate(mesh, 0, ["heat"], reference=known)
 
 
 def test_rows_of_other_domains() -> None:
     """Methods of this package take the points of a cloud, not its triangles; lines are right in a solid."""
     P = np.random.default_rng(0).standard_normal((1500, 3))
     cloud = heat_igl.PointCloud(P / np.linalg.norm(P, axis=1, keepdims=True))
-    report = validate(cloud, [[0], [9]], ["heat", "windows"], closed_forms.sphere)
+    report = validate(cloud, [[0], [9]], ["heat", "windows"], reference=closed_forms.sphere)
     by_heat = HeatMethodSolver(cloud, magnitude="damped")
     assert report.rows[0].parameters["t"] == by_heat.t
     np.testing.assert_array_equal(report.distances["heat"], by_heat.distances([0, 9]))
     errors = [row.errors.mean for row in report.rows if row.errors is not None]
     assert errors[1] < 0.4 * errors[0] < 0.01
     box = shapes.box(6)
-    heat, lines = validate(box, [[0], [100, 7]], ["heat", "sweep"], closed_forms.convex_solid).rows
+    heat, lines = validate(box, [[0], [100, 7]], ["heat", "sweep"], reference=closed_forms.convex_solid).rows
     assert heat.errors is not None
     assert lines.errors is not None
     assert lines.errors.mean < 1e-6 < heat.errors.mean < 0.1
@@ -284,7 +284,7 @@ def test_unknown_repeated_and_no_methods_are_refused() -> None:
     with pytest.raises(ValueError, match="'magic' is unknown: choose from heat, sweep, windows, meshlab"):
         validate(mesh, 0, ["magic"])
     with pytest.raises(ValueError, match="'magic' is unknown"):
-        validate(mesh, 0, ["heat"], "magic")
+        validate(mesh, 0, ["heat"], reference="magic")
     with pytest.raises(ValueError, match="methods is empty: choose from heat, sweep"):
         validate(mesh, 0, [])
     assert set(validation.METHODS) >= {"heat", "sweep", "windows", "meshlab", "igl", "potpourri3d", "exact"}
