@@ -382,15 +382,14 @@ def test_a_full_disk_ends_with_one_error_and_can_be_resumed(client, tmp_path, sm
     begun = chunk_times(small_disk / "store")
     assert 0 < len(begun) < 44
     subprocess.run(["mount", "-o", "remount,size=20m", small_disk], check=True)
-    whole = {row.name for row in cluster.report(small_disk / "store").rows}
+    # A mesh whose metadata the full disk cut off counts as damaged and is made again.
+    begun_meshes = {row.name for row in cluster.report(small_disk / "store").rows if row.n_sources}
     intact = {
         path
-        for name in whole
-        if (attributes := Store(small_disk / "store").attributes(name)).get("status") in ("running", "done")
-        for block in range(11)
-        if block not in Store(small_disk / "store").group(name).missing()
+        for name in begun_meshes
+        for block in set(range(11)) - set(Store(small_disk / "store").group(name).missing())
         for path in begun
-        if f"/{name}/distance/c/{block}/" in path and attributes
+        if f"/{name}/distance/c/{block}/" in path
     }
     report = cluster.distances(meshes, "all", small_disk / "store", client=client)
     assert [row.status for row in report.rows] == ["done"] * 4
