@@ -8,8 +8,8 @@ import heat_igl
 
 # Names with a dot are those of a room. Public names in no group come last.
 GROUPS = {
-    "Distance": """geodesic_distance HeatMethodSolver HeatSolution heat_method.Diagnostics
-        heat_method.LabelledDistance GeodesicSolver""",
+    "Distance": """geodesic_distance HeatMethodSolver HeatSolution heat.Diagnostics
+        heat.LabelledDistance GeodesicSolver""",
     "Only what is asked": """distances_within nearest_vertices pair_distances distance_matrix
         write_distances_within read_distances_within""",
     "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh to_trimesh to_pyvista to_open3d
@@ -22,7 +22,7 @@ GROUPS = {
         geodesic_path straighten curves.GeodesicPathSolver curves.handle_loops curves.geodesic_bezier trace_geodesic cut
         curves.CutMesh""",
     "Directions and tangent vectors": """tangent_frames intrinsic.TangentFrames log_map exp_map log_maps_within
-        VectorHeatSolver heat_method.Directions operators.connection_laplacian""",
+        VectorHeatSolver heat.Directions operators.connection_laplacian""",
     "Which side": """signed_distance SignedHeatSolver OrientedPoints mesh.region_boundary volume_signed_distance
         VoxelBox""",
     "Sampling": """farthest_points farthest_cells voronoi_cells sampling.VoronoiCells sampling.dual_triangulation

@@ -26,12 +26,12 @@ from heat_igl.errors import MeshError as MeshError
 from heat_igl.errors import SourceError as SourceError
 from heat_igl.geodesic import GeodesicSolver as GeodesicSolver
 from heat_igl.geodesic import geodesic_distance as geodesic_distance
-from heat_igl.heat_method import HeatMethodSolver as HeatMethodSolver
-from heat_igl.heat_method import HeatSolution as HeatSolution
-from heat_igl.heat_method import SignedHeatSolver as SignedHeatSolver
-from heat_igl.heat_method import VectorHeatSolver as VectorHeatSolver
-from heat_igl.heat_method import VoxelBox as VoxelBox
-from heat_igl.heat_method import volume_signed_distance as volume_signed_distance
+from heat_igl.heat import HeatMethodSolver as HeatMethodSolver
+from heat_igl.heat import HeatSolution as HeatSolution
+from heat_igl.heat import SignedHeatSolver as SignedHeatSolver
+from heat_igl.heat import VectorHeatSolver as VectorHeatSolver
+from heat_igl.heat import VoxelBox as VoxelBox
+from heat_igl.heat import volume_signed_distance as volume_signed_distance
 from heat_igl.intrinsic import tangent_frames as tangent_frames
 from heat_igl.io import read_attributes as read_attributes
 from heat_igl.io import read_mesh as read_mesh
@@ -65,15 +65,15 @@ from heat_igl.sampling import farthest_points as farthest_points
 from heat_igl.sampling import voronoi_cells as voronoi_cells
 from heat_igl.sources import OffsetSources as OffsetSources
 from heat_igl.sources import OrientedPoints as OrientedPoints
-from heat_igl.unfolding import distances_within as distances_within
-from heat_igl.unfolding import nearest_vertices as nearest_vertices
-from heat_igl.unfolding import pair_distances as pair_distances
-from heat_igl.unfolding import read_distances_within as read_distances_within
-from heat_igl.unfolding import write_distances_within as write_distances_within
 from heat_igl.validation import ValidationReport as ValidationReport
 from heat_igl.validation import shapes as shapes
 from heat_igl.validation import validate as validate
 from heat_igl.validation.samples import sample_mesh as sample_mesh
+from heat_igl.windows import distances_within as distances_within
+from heat_igl.windows import nearest_vertices as nearest_vertices
+from heat_igl.windows import pair_distances as pair_distances
+from heat_igl.windows import read_distances_within as read_distances_within
+from heat_igl.windows import write_distances_within as write_distances_within
 
 __all__: list[str]
 __version__: str

@@ -26,8 +26,8 @@ from heat_igl.kernels.sweep import sweeping
 from heat_igl.sources import source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import Invariants, WindowEngine
 from heat_igl.validation.zoo import FAMILIES
+from heat_igl.windows import Invariants, WindowEngine
 
 from harness import Table, parsed, publish
 

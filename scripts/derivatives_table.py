@@ -21,7 +21,7 @@ import numpy as np
 
 from heat_igl import Mesh, shapes
 from heat_igl.geodesic import Solver, SolverChoice
-from heat_igl.heat_method.derivatives import DistanceDerivative
+from heat_igl.heat.derivatives import DistanceDerivative
 from heat_igl.typing import FloatArray
 
 from harness import Row, Table, collected, drawn, named, paired, parsed, publish

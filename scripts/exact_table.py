@@ -42,8 +42,8 @@ from heat_igl.errors import ReferenceSolverError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding.exact import ExactSurface
 from heat_igl.validation.zoo.registry import hull
+from heat_igl.windows.exact import ExactSurface
 
 from harness import (
     METHODS,

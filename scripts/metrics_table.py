@@ -44,8 +44,8 @@ from heat_igl import (
     speed_operators,
 )
 from heat_igl.operators import MetricSimplices, Operators
+from heat_igl.sweep.reflex_edges import reflex_edges
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.unfolding.reflex_edges import reflex_edges
 from heat_igl.validation.domains.body_cases import around_the_edge, delaunay, without
 from heat_igl.validation.domains.surface_cases import by_fermat, moved_inside, straight
 

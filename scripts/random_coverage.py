@@ -22,9 +22,9 @@ from heat_igl import Mesh
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.half_edges import MARGIN, from_mesh
 from heat_igl.validation.zoo import FAMILIES
+from heat_igl.windows.exact import ExactSurface
+from heat_igl.windows.half_edges import MARGIN, from_mesh
 
 from harness import Table, parsed, publish
 

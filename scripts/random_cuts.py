@@ -34,8 +34,8 @@ from heat_igl.curves import CutMesh
 from heat_igl.intrinsic import mollify
 from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import exact_distance
-from heat_igl.unfolding.half_edges import MARGIN
+from heat_igl.windows import exact_distance
+from heat_igl.windows.half_edges import MARGIN
 
 from harness import Table, parsed, publish
 

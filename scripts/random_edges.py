@@ -26,8 +26,8 @@ from heat_igl import Mesh, SignedHeatSolver, SurfacePoints, exp_map, geodesic_di
 from heat_igl.mesh import region_boundary
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import ExactSurface
 from heat_igl.validation.zoo.registry import hull
+from heat_igl.windows import ExactSurface
 
 from harness import Row, Table, on_sphere, parsed, publish
 

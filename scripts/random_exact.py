@@ -32,10 +32,10 @@ from heat_igl.errors import ReferenceSolverError
 from heat_igl.intrinsic import intrinsic_triangulation, mollify
 from heat_igl.reference import guarded
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding import exact_distance
-from heat_igl.unfolding.exact import ExactSurface
-from heat_igl.unfolding.half_edges import MARGIN
 from heat_igl.validation.zoo.registry import compact, hull, joined
+from heat_igl.windows import exact_distance
+from heat_igl.windows.exact import ExactSurface
+from heat_igl.windows.half_edges import MARGIN
 
 from harness import Row, Table, on_sphere, parsed, publish
 

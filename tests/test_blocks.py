@@ -139,7 +139,7 @@ def test_rows_do_not_depend_on_blocks_or_threads(sphere, method, monkeypatch):
             monkeypatch.setattr(blocks, "_MOST", most)
             assert np.abs(solver.distances(sets) - one_by_one).max() < 1e-9 * np.pi
     monkeypatch.setattr(blocks, "_MOST", 8)
-    monkeypatch.setattr("heat_igl.heat_method.batches.n_threads", lambda: 3)
+    monkeypatch.setattr("heat_igl.heat.batches.n_threads", lambda: 3)
     three = solver.distances(sets)
     assert (three == solver.distances(sets)).all()
 

@@ -20,7 +20,7 @@ from heat_igl import (
     tangent_frames,
 )
 from heat_igl.mesh import region_boundary
-from heat_igl.unfolding import ExactSurface, vectors_from
+from heat_igl.windows import ExactSurface, vectors_from
 
 
 def angle_between(a: np.ndarray, b: np.ndarray | float) -> np.ndarray:
@@ -332,7 +332,7 @@ def test_exact_paths_from_curves_along_edges_lead_back_to_the_vertices():
     np.testing.assert_allclose(ends, mesh.V[found.distance > 0], atol=1e-12)
 
 
-def followed(mesh: Mesh, found: heat_igl.heat_method.Directions, v: int) -> np.ndarray:
+def followed(mesh: Mesh, found: heat_igl.heat.Directions, v: int) -> np.ndarray:
     """Where the geodesic ends that leaves the start of the path to vertex v in the direction of the departure."""
     face, place = int(found.start.faces[v]), found.start.barycentric[v]
     start = int(mesh.F[face, place.argmax()]) if place.max() == 1 else SurfacePoints([face], [place])

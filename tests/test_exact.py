@@ -32,8 +32,8 @@ from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, rea
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.kernels.mesh import flipping, gluing
 from heat_igl.reference.steiner import graph_distance
-from heat_igl.unfolding.exact import ExactSurface, exact_distance
-from heat_igl.unfolding.half_edges import from_mesh
+from heat_igl.windows.exact import ExactSurface, exact_distance
+from heat_igl.windows.half_edges import from_mesh
 
 
 def delaunay(mesh: Mesh) -> ExactSurface:

@@ -7,8 +7,8 @@ import pytest
 from conftest import load_script, pygeodesic_distance
 
 from heat_igl import Mesh, geodesic_distance, pair_distances, shapes
-from heat_igl.unfolding import exact_distance, window_search
 from heat_igl.validation.zoo import FAMILIES
+from heat_igl.windows import exact_distance, window_search
 
 
 def single_precision_cylinder() -> Mesh:

@@ -28,7 +28,7 @@ from heat_igl.geodesic import SolverChoice
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import ExactSurface
+from heat_igl.windows import ExactSurface
 
 
 def to_polyline(P: FloatArray, corners: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from heat_igl import (
 )
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import ExactSurface
+from heat_igl.windows import ExactSurface
 
 
 def terrain(n: int) -> Mesh:

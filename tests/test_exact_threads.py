@@ -11,8 +11,8 @@ from heat_igl import Mesh, SurfacePoints, isolines, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.kernels.windows import windows
 from heat_igl.sources import source_set
-from heat_igl.unfolding import window_search
-from heat_igl.unfolding.exact import ExactSurface
+from heat_igl.windows import window_search
+from heat_igl.windows.exact import ExactSurface
 
 
 def pinched() -> Mesh:

@@ -12,15 +12,15 @@ import pytest
 
 import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, shapes
-from heat_igl.heat_method.checking import Comparisons
+from heat_igl.heat.checking import Comparisons
 from heat_igl.kernels.sweep import sweeping
 from heat_igl.kernels.windows import windows
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import Engine, GuardedEngine, Invariants, WindowEngine
 from heat_igl.validation.zoo import FAMILIES
 from heat_igl.validation.zoo.registry import joined
+from heat_igl.windows import Engine, GuardedEngine, Invariants, WindowEngine
 
 SOURCE, FAR = 40, 399
 

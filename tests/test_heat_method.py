@@ -10,7 +10,7 @@ import pytest
 from conftest import perturbed, wheel_path, zoo
 
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, read_mesh, shapes
-from heat_igl.heat_method import SolverOptions
+from heat_igl.heat import SolverOptions
 from heat_igl.operators import Operators, intrinsic_operators, operators
 from heat_igl.steps import HeatFlow, fitted_laplacian, integrate
 

@@ -25,7 +25,7 @@ from heat_igl import (
     tangent_frames,
 )
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import (
+from heat_igl.windows import (
     blocks_within,
     local,
     local_searches,
@@ -33,9 +33,9 @@ from heat_igl.unfolding import (
     within_store,
     write_distances_within,
 )
-from heat_igl.unfolding.exact import ExactSurface, exact_distance
-from heat_igl.unfolding.half_edges import from_mesh
-from heat_igl.unfolding.window_search import Found
+from heat_igl.windows.exact import ExactSurface, exact_distance
+from heat_igl.windows.half_edges import from_mesh
+from heat_igl.windows.window_search import Found
 
 # --- Local queries: equal to the full search, ended where asked, cleared after each; errors that name the remedy
 

@@ -26,7 +26,7 @@ from heat_igl import (
     isolines,
     shapes,
 )
-from heat_igl.heat_method import curve_levels
+from heat_igl.heat import curve_levels
 from heat_igl.mesh import region_boundary
 from heat_igl.sources import oriented_set
 

@@ -29,7 +29,7 @@ from heat_igl import (
     shapes,
 )
 from heat_igl.geodesic import SolverChoice
-from heat_igl.heat_method.source_terms import SourceTerm
+from heat_igl.heat.source_terms import SourceTerm
 from heat_igl.reference import edge_paths
 from heat_igl.sources import Sources, source_set, vertex_sources
 from heat_igl.steps import fitted_laplacian

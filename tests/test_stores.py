@@ -22,7 +22,7 @@ pytest.importorskip("distributed")
 
 from heat_igl import cluster  # noqa: E402
 from heat_igl.cluster.store import locked  # noqa: E402
-from heat_igl.unfolding import within_store  # noqa: E402
+from heat_igl.windows import within_store  # noqa: E402
 
 BALL = shapes.icosphere(3)
 

@@ -12,10 +12,11 @@ from heat_igl.kernels.sweep import sweeping
 from heat_igl.mesh import connectivity
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import source_set
-from heat_igl.unfolding import MeshTriangles, SweepEngine
-from heat_igl.unfolding.bounds import Bounds
-from heat_igl.unfolding.exact import exact_distance
+from heat_igl.sweep import SweepEngine
 from heat_igl.validation import zoo
+from heat_igl.windows import MeshTriangles
+from heat_igl.windows.bounds import Bounds
+from heat_igl.windows.exact import exact_distance
 
 # --- Distance by sweeps over triangles, in an order of their own: exact on flat domains, near it on others
 

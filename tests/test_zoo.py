@@ -19,8 +19,8 @@ from heat_igl import (
     geodesic_distance,
     shapes,
 )
-from heat_igl.heat_method.assembly import SourceAssembler
-from heat_igl.heat_method.several_sources import drop_overtaken
+from heat_igl.heat.assembly import SourceAssembler
+from heat_igl.heat.several_sources import drop_overtaken
 from heat_igl.intrinsic import mollify
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray

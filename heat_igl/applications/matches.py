@@ -8,7 +8,7 @@ from heat_igl.errors import MeshError
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import pair_distances
+from heat_igl.windows import pair_distances
 
 __all__ = ["geodesic_errors"]
 

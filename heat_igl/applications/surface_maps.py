@@ -14,7 +14,7 @@ from heat_igl.operators import operators
 from heat_igl.runtime import progress_bar
 from heat_igl.sampling import as_solver
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.unfolding import pair_distances
+from heat_igl.windows import pair_distances
 
 __all__ = ["Statistic", "parcel_distances", "smooth"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl import reference
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.geodesic import GeodesicSolver
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat import HeatMethodSolver
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray

@@ -36,7 +36,7 @@ from heat_igl.cli.output import (
 )
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import SolverChoice
-from heat_igl.heat_method import Backend, Boundary, HeatMethodSolver, Laplacian, Magnitude
+from heat_igl.heat import Backend, Boundary, HeatMethodSolver, Laplacian, Magnitude
 from heat_igl.io import is_flat, read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud, as_simplices, closest_points
 from heat_igl.sources import vertex_sources

@@ -12,7 +12,7 @@ import heat_igl
 from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, choice, positive
 from heat_igl.cli.output import Row, check_json, check_outputs, check_writable, print_rows, write_distance
 from heat_igl.errors import MeshError, SourceError
-from heat_igl.heat_method import Level, SignedHeatSolver
+from heat_igl.heat import Level, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh_or_cloud, read_polylines, write_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, as_simplices, curve_on
 

@@ -18,7 +18,7 @@ from heat_igl.cli.options import JsonOption, MeshArgument, MethodOption, PointsO
 from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows
 from heat_igl.cli.regions import projected
 from heat_igl.geodesic import SolverChoice
-from heat_igl.heat_method import Boundary, SignedHeatSolver
+from heat_igl.heat import Boundary, SignedHeatSolver
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import vertex_sources

@@ -24,7 +24,7 @@ from heat_igl.cluster.solver_cache import SolverCache
 from heat_igl.cluster.store import MeshGroup, Store
 from heat_igl.errors import AccuracyWarning, BatchError
 from heat_igl.geodesic import Solver, SolverChoice
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat import HeatMethodSolver
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.sampling import farthest_points

@@ -12,7 +12,7 @@ import numpy as np
 
 from heat_igl.curves import geodesic_path
 from heat_igl.geodesic import geodesic_distance
-from heat_igl.heat_method import HeatMethodSolver, SignedHeatSolver
+from heat_igl.heat import HeatMethodSolver, SignedHeatSolver
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.sources import OffsetSources
 from heat_igl.typing import ArrayLike, FloatArray, IntArray

@@ -14,7 +14,7 @@ from heat_igl.geodesic import geodesic_distance
 from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.unfolding import distances_within, pair_distances
+from heat_igl.windows import distances_within, pair_distances
 
 __all__ = ["compute_gdist", "distance_matrix_of_selected_points", "local_gdist_matrix"]
 

@@ -13,7 +13,7 @@ import igl
 import numpy as np
 
 from heat_igl.geodesic import geodesic_distance
-from heat_igl.heat_method import HeatMethodSolver
+from heat_igl.heat import HeatMethodSolver
 from heat_igl.mesh import Mesh
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 

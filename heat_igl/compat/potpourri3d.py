@@ -28,7 +28,7 @@ from heat_igl.compat.curves import (
 )
 from heat_igl.compat.files import read_mesh, read_point_cloud, read_polygon_mesh, write_mesh, write_point_cloud
 from heat_igl.compat.triangles import cotan_laplacian, edges, face_areas, proper, vertex_areas
-from heat_igl.heat_method import HeatMethodSolver, SignedHeatSolver, VectorHeatSolver
+from heat_igl.heat import HeatMethodSolver, SignedHeatSolver, VectorHeatSolver
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import connection_laplacian
 from heat_igl.typing import ArrayLike, FloatArray, IntArray

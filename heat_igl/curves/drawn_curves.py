@@ -7,7 +7,7 @@ import numpy as np
 from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.errors import SourceError, names_guessed, truth
-from heat_igl.heat_method import SignedHeatSolver
+from heat_igl.heat import SignedHeatSolver
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, closest_points
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import ArrayLike, FloatArray

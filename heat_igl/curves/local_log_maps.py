@@ -8,13 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, positive
-from heat_igl.heat_method.directions import rigid_angles
+from heat_igl.heat.directions import rigid_angles
 from heat_igl.mesh import MeshLike, one_sided
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding import PathDirections, WindowWays, contradicted, in_circle, local_searches
-from heat_igl.unfolding.half_edges import MARGIN, HalfEdges, from_triangulation
+from heat_igl.windows import PathDirections, WindowWays, contradicted, in_circle, local_searches
+from heat_igl.windows.half_edges import MARGIN, HalfEdges, from_triangulation
 
 __all__ = ["LogMapsWithin", "log_maps_within"]
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from heat_igl.errors import SourceError, names_guessed, require_choice
 from heat_igl.geodesic import GeodesicSolver
-from heat_igl.heat_method import VectorHeatSolver
+from heat_igl.heat import VectorHeatSolver
 from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices
 from heat_igl.sources import Sources, ordered_vertices
 from heat_igl.typing import FloatArray
-from heat_igl.unfolding import vectors_from
+from heat_igl.windows import vectors_from
 
 __all__ = ["LogMapMethod", "log_map"]
 

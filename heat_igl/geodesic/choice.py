@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from heat_igl.errors import require_choice
 from heat_igl.geodesic.solver import GeodesicSolver
-from heat_igl.heat_method import HeatMethodSolver, SolverOptions
+from heat_igl.heat import HeatMethodSolver, SolverOptions
 from heat_igl.mesh import MeshLike
 from heat_igl.operators import Operators
 from heat_igl.plan import DistanceMethod

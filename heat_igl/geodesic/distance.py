@@ -10,7 +10,7 @@ import numpy as np
 
 from heat_igl.errors import names_guessed, require_choice
 from heat_igl.geodesic.solver import GeodesicSolver
-from heat_igl.heat_method.batches import checked_cutoff, cut_off
+from heat_igl.heat.batches import checked_cutoff, cut_off
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh
 from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod
 from heat_igl.sources import OffsetSources, Sources, named_vertices, source_set
@@ -85,7 +85,7 @@ def geodesic_distance(
     beyond = checked_cutoff(cutoff)
     given = as_mesh(mesh)
     if method == "heat":
-        from heat_igl.heat_method import HeatMethodSolver  # what follows needs none of its modules
+        from heat_igl.heat import HeatMethodSolver  # what follows needs none of its modules
 
         distance = HeatMethodSolver(given, region=region).distance(sources, cutoff=beyond)
         return distance if targets is None else distance[named_vertices(targets, len(distance), "targets")]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.errors import MeshError, names_guessed
-from heat_igl.heat_method.batches import BatchedSolver, LabelledDistance, checked_cutoff, cut_off
+from heat_igl.heat.batches import BatchedSolver, LabelledDistance, checked_cutoff, cut_off
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Operators
@@ -17,12 +17,12 @@ from heat_igl.plan import Method, Plan, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources, SourceSet, named_vertices, require_resolved, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
-from heat_igl.unfolding import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
+from heat_igl.windows import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
 
 if TYPE_CHECKING:
-    from heat_igl.heat_method.derivatives import DistanceDerivative
-    from heat_igl.heat_method.directions import Directions
-    from heat_igl.heat_method.side_lengths import SidesOfMesh
+    from heat_igl.heat.derivatives import DistanceDerivative
+    from heat_igl.heat.directions import Directions
+    from heat_igl.heat.side_lengths import SidesOfMesh
     from heat_igl.intrinsic import TangentFrames
 
 __all__ = ["GeodesicSolver"]
@@ -130,12 +130,12 @@ class GeodesicSolver(BatchedSolver):
                     "faces): remove these faces"
                 )
             from heat_igl.operators import MetricSimplices
-            from heat_igl.unfolding import LineEngine
+            from heat_igl.sweep import LineEngine
 
             return distance_plan("tetrahedra", method, tolerance), LineEngine(MetricSimplices.in_space(domain))
         if isinstance(domain, Operators):
             if domain.simplices is not None:
-                from heat_igl.unfolding import HopfLaxEngine, LineEngine
+                from heat_igl.sweep import HopfLaxEngine, LineEngine
 
                 if domain.simplices.V is not None:
                     return distance_plan("tetrahedra", method, tolerance), LineEngine(domain.simplices)
@@ -161,7 +161,7 @@ class GeodesicSolver(BatchedSolver):
     def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:
         self._triangles, originals = triangles, self._originals
         if chosen.engine == "sweep":
-            from heat_igl.unfolding import SweepEngine
+            from heat_igl.sweep import SweepEngine
 
             sweep = SweepEngine(triangles, originals)
             chosen = sweep_plan(sweep.measures, chosen)
@@ -279,14 +279,14 @@ class GeodesicSolver(BatchedSolver):
         ValueError
             If the engine is not windows, or the solver was made from operators.
         """
-        from heat_igl.heat_method.directions import directions
+        from heat_igl.heat.directions import directions
 
         chosen = self._source_set(sources)
         engine, frames = self._directed
         found = directions(*engine.directed(chosen), frames)
         if isinstance(self._domain, PointCloud):
             if self._domain.cover is not None:
-                from heat_igl.heat_method.two_sides import directions_from_one_side
+                from heat_igl.heat.two_sides import directions_from_one_side
 
                 found = directions_from_one_side(found, frames, self.n_vertices, self._domain.n_faces)
             return found if self._originals is None else found.of(self._originals)
@@ -314,8 +314,8 @@ class GeodesicSolver(BatchedSolver):
         Arguments and errors as for `distance`; a ValueError also if the engine is not windows, and for what has no
         derivative, see `differentiable_surface`. The derivative is that of the exact paths.
         """
-        from heat_igl.heat_method.derivatives import DistanceDerivative, differentiable_surface
-        from heat_igl.heat_method.side_lengths import SideLengths
+        from heat_igl.heat.derivatives import DistanceDerivative, differentiable_surface
+        from heat_igl.heat.side_lengths import SideLengths
 
         engine, chosen, domain = self._windows("derivatives are those of"), self._source_set(sources), self._domain
         surface = differentiable_surface(

@@ -22,7 +22,7 @@ from heat_igl.reference.guarded import MEMORY, TIMEOUT
 from heat_igl.runtime import PeakMemory
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.unfolding import exact_distance
+from heat_igl.windows import exact_distance
 
 __all__ = ["EXACT_SOLVERS", "WINDOWS", "Measured", "exact_solver", "measured"]
 

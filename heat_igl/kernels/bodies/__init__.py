@@ -1,4 +1,4 @@
-"""Shortest paths through tetrahedra: chains of straight lines that bend around edges (`heat_igl.unfolding.lines`).
+"""Shortest paths through tetrahedra: chains of straight lines that bend around edges (`heat_igl.sweep.lines`).
 
 They bend at edges of the body with more than half a turn inside. Such an edge is a source like a given one, once its
 ends have distances.

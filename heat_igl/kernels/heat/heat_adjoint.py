@@ -23,7 +23,7 @@ def normalized(
     by_log_t: cython.double[::1],
     by_v: cython.double[::1],
 ):
-    """The derivative of p . (b - L phi), see `heat_igl.heat_method.field_derivative`.
+    """The derivative of p . (b - L phi), see `heat_igl.heat.field_derivative`.
 
     `of_vertex` (n, 3) are v, p and phi, beside each other in memory. On each face b is s K v with s = 1 / |grad v|, or
     1 / full_rate where the gradient is below that (m,), 0 for never; faces with a negative full_rate have no part in b.

@@ -1,6 +1,6 @@
 """Distance from vertex to vertex: planar unfolding over triangles, and the Hopf-Lax formula on simplices.
 
-*Unfolding* (`heat_igl.unfolding.sweep`). Two neighbours a and b of v that know their distances from one source place it
+*Unfolding* (`heat_igl.sweep.sweep`). Two neighbours a and b of v that know their distances from one source place it
 in the plane of their triangle; the distance of v is that of the straight line to it, if this line crosses ab.
 
 - `half_edges` fills a record per spoke, an edge seen from v: its length, the triangle to its left laid out flat, and
@@ -11,7 +11,7 @@ in the plane of their triangle; the distance of v is that of the straight line t
   source, and v keeps the least (formulas: `planar_updates.pxd`). If v falls below a vertex that came before, the sweep
   goes back to that one.
 
-*Hopf-Lax formula* (`heat_igl.unfolding.hopf_lax`). The distance of a corner v of a simplex is the least of
+*Hopf-Lax formula* (`heat_igl.sweep.hopf_lax`). The distance of a corner v of a simplex is the least of
 T(x) + |v - x| over the facet opposite, with T the distance on the facet and |v - x| in the metric of the simplex.
 
 - `hopf_lax`, first order: T is linear, and the least value has a closed form (`linear`). The nearest vertex comes next,

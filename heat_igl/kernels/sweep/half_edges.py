@@ -13,7 +13,7 @@ _CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("angle", "f8")])
 @cython.final
 @cython.cclass
 class HalfEdges:
-    """Views of the arrays of `heat_igl.unfolding.spokes.Spokes`."""
+    """Views of the arrays of `heat_igl.sweep.spokes.Spokes`."""
 
     def __init__(self, spokes):
         self.first = spokes.first

@@ -161,7 +161,7 @@ def pull_back(
 
     `weight` (n + e,) is handed on along the paths, in descending `order` of distance; at the sources it ends as the sum
     of the weights of all paths to them. Vertices whose line does not meet its end are marked in `is_lost` (n,). Other
-    arguments as `heat_igl.unfolding.path_derivatives.Paths` makes them.
+    arguments as `heat_igl.windows.path_derivatives.Paths` makes them.
     """
     lines = Lines(triangles, points, ways)
     at_end: cython.pointer[cython.double] = cython.NULL

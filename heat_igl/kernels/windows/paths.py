@@ -13,7 +13,7 @@ __all__ = ["InnerSources", "PathSegments", "trace_back"]
 class InnerSources:
     """Source points and, after them, source segments of a search by windows.
 
-    `n` is the number of vertices, and `starts` are the sources, see `heat_igl.unfolding.window_starts.Starts`.
+    `n` is the number of vertices, and `starts` are the sources, see `heat_igl.windows.window_starts.Starts`.
     """
 
     def __init__(self, n, starts):
@@ -93,7 +93,7 @@ def trace_back(
     sources : Starts
         Its sources.
     begin : PathStarts
-        Where the k paths begin; see `heat_igl.unfolding.traced_paths.PathStarts`.
+        Where the k paths begin; see `heat_igl.windows.traced_paths.PathStarts`.
     face, place : (r,), (r, 2, 3)
         Take the segments, path after path: face, and barycentric coordinates of both ends.
     end : (k,)

@@ -1,0 +1,325 @@
+"""Derivatives of an answer by the positions of the vertices, by edge lengths, by the sources and by the time step.
+
+All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
+lengths lead paths (`heat_igl.windows.path_lengths`) or the steps of the heat method
+(`heat_igl.heat.heat_derivative`), from there to the edges of the mesh the flips
+(`heat_igl.intrinsic.length_derivatives`); the positions follow here.
+docs/derivatives.md derives each step.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from heat_igl.errors import MeshError, real_numbers
+from heat_igl.heat.side_lengths import SidesOfMesh
+from heat_igl.intrinsic import IntrinsicTriangulation, Merged
+from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back, check_carried
+from heat_igl.intrinsic.place_derivatives import PlaceSlopes
+from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.operators import MetricSides, Surface
+from heat_igl.sources import SourceSet
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+from heat_igl.windows import Change, SideChange
+
+__all__ = ["DistanceDerivative", "SidesDerivative", "differentiable_surface"]
+
+# A distance that differs from the length of the path by more than this fraction is not the length of that path.
+# Rounding is below 1e-14; in flat parts other paths are longer by 1e-13 to 1e-9, with derivatives that differ by 1e-3.
+_SAME = 1e-12
+
+
+class SidesDerivative(Protocol):
+    """The derivative of one answer by the lengths of the sides of a triangulation."""
+
+    @property
+    def triangulation(self) -> IntrinsicTriangulation:
+        """The triangles that the answer was found on."""
+
+    def pull_back(self, g: FloatArray) -> Change:
+        """The derivative of the sum of distances times g (n,), finite."""
+
+    def push_forward(self, change: SideChange) -> FloatArray:
+        """How the distances (n,) change with the sides and the places of source points."""
+
+    def lengths(self) -> FloatArray:
+        """The distances (n,) that are differentiated; any number at unreachable vertices."""
+
+
+class DistanceDerivative:
+    """The derivative of one distance: called with a gradient by the distances, it returns that by the positions.
+
+    Where the shortest path is not unique (at the cut locus, and between two sources) the path that was found decides,
+    and the derivative is one of several one-sided ones. So it is at a vertex next to a source vertex, whose distance
+    has no gradient in the source. Which edges were flipped counts as fixed, which is right almost everywhere: a flip
+    changes neither the surface nor a path on it.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        The answer.
+    unreachable : (k,) int64
+        Vertices at distance ``inf``. Their derivative is 0.
+    """
+
+    def __init__(
+        self,
+        distance: FloatArray,
+        sources: SourceSet,
+        surface: Surface,
+        sides: SidesOfMesh | None,
+        answer: SidesDerivative,
+    ) -> None:
+        self.distance, self._sources, self._sides, self._answer = distance, sources, sides, answer
+        if surface.faces is None:
+            raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
+        self._faces = surface.faces
+        check_carried(answer.triangulation)
+        self.unreachable: IntArray = np.flatnonzero(np.isinf(distance))
+
+    def __call__(self, g: ArrayLike) -> FloatArray:
+        """The gradient by the positions of the vertices.
+
+        Parameters
+        ----------
+        g : (n,) or (k, n) array_like
+            Derivative of a function by each distance; entries at unreachable vertices do not count. Rows are functions.
+            The rows of the identity give the Jacobian of a small mesh.
+
+        Returns
+        -------
+        (n, 3) or (k, n, 3) float64
+            Its derivative by the positions.
+
+        Raises
+        ------
+        ValueError
+            If g has another shape, or is not finite at a reachable vertex.
+        MeshError
+            If the solver has no vertices to move: it was made from edge lengths or operators.
+        """
+        sides = self._positions()
+        result = [sides.by_positions(self._on_given_faces(self._by_sides(row)[0])) for row in self._rows(g)]
+        return np.stack(result) if np.ndim(g) == 2 else result[0]
+
+    def by_lengths(self, g: ArrayLike) -> FloatArray:
+        """The gradient (m, 3) or (k, m, 3) by the lengths of the sides opposite each corner, for `g` as for a call.
+
+        An edge of two faces changes both of its sides: its derivative is the sum of theirs. Rows are the faces of the
+        mesh; of faces that are there twice, one has the derivative of both.
+        """
+        result = [self._on_given_faces(self._by_sides(row)[0]) for row in self._rows(g)]
+        return np.stack(result) if np.ndim(g) == 2 else result[0]
+
+    def by_points(self, g: ArrayLike) -> FloatArray:
+        """The gradient by the positions of the sources that are points in faces.
+
+        Parameters
+        ----------
+        g : (n,) array_like
+            As for a call.
+
+        Returns
+        -------
+        (p, 3) float64
+            For each point a vector in the plane of its face. The gradient of one distance has length 1 and leads away
+            from the path. Of a point on a side of its face, to paths that leave by this side, the component along the
+            side alone. Source vertices have their gradient among the positions.
+
+        Raises
+        ------
+        ValueError
+            If g has another shape or is not finite.
+        MeshError
+            If the solver has no positions.
+        """
+        slopes = self._place_slopes
+        (row,) = self._rows(g, 1)
+        _, by_place = self._by_sides(row)
+        return np.zeros((0, 3)) if by_place is None else np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
+
+    def by_time_step(self, g: ArrayLike) -> float:
+        """The derivative by the time step t, all else fixed; 0 of a distance that is not heat's."""
+        (row,) = self._rows(g, 1)
+        return self._answer.pull_back(row).by_t
+
+    def by_metric(self, g: ArrayLike) -> FloatArray:
+        """The gradient by the metric, (m, 3, 3) or (m, 2, 2) as it was given to `metric_operators`; `g` (n,).
+
+        Symmetric on each face. Raises a ValueError without a metric, and if g has another shape or is not finite.
+        """
+        metric = self._metric("metric_operators(mesh, metric)")
+        (row,) = self._rows(g, 1)
+        return metric.by_metric(self._on_given_faces(self._by_sides(row)[0]))
+
+    def by_speed(self, g: ArrayLike) -> FloatArray:
+        """The gradient (m,) by the speeds that were given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
+        metric = self._metric("speed_operators(mesh, speed)")
+        (row,) = self._rows(g, 1)
+        return metric.by_speed(self._on_given_faces(self._by_sides(row)[0]))
+
+    def _metric(self, function: str) -> MetricSides:
+        if not isinstance(self._sides, MetricSides):
+            raise ValueError(f"the solver knows no metric to change: make it on {function}")
+        return self._sides
+
+    def push_forward(self, dV: ArrayLike, points: ArrayLike | None = None) -> FloatArray:
+        """The directional derivative of all distances: how they change when the vertices and the source points move.
+
+        Parameters
+        ----------
+        dV : (n, 3) array_like
+            Velocity of each vertex.
+        points : (p, 3) array_like, optional
+            Velocity of each source that is a point in a face, in the plane of the face and relative to it. Points
+            keep their barycentric coordinates if it is not given.
+
+        Returns
+        -------
+        (n,) float64
+            Rate of change of each distance; 0 at unreachable vertices.
+
+        Raises
+        ------
+        ValueError
+            If dV or points have another shape or are not finite.
+        MeshError
+            If the solver has no vertices to move.
+        """
+        sides, places = self._positions(), self._sources.points
+        moved = _velocities("dV", dV, sides.mesh.V.shape, "vertex")
+        by_side = self._on_faces(sides.push_positions(moved))
+        n_before, triangulation = len(self._faces.history), self._answer.triangulation
+        if not len(places.faces):
+            on_answer, _ = carry_lengths(triangulation, by_side, n_before)
+            change = SideChange(on_answer, None, by_side)
+        else:
+            by_place = np.zeros((len(places.faces), 3))
+            if points is not None:
+                velocity = _velocities("points", points, by_place.shape, "source point")
+                by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
+            given = PlaceSlopes(places.faces, places.barycentric, by_place)
+            _, before = carry_lengths(self._faces, by_side, n_before, given)
+            on_answer, after = carry_lengths(triangulation, by_side, n_before, given)
+            change = SideChange(on_answer, after, by_side, before)
+        result = self._answer.push_forward(change)
+        result[self.unreachable] = 0.0
+        return result
+
+    @property
+    def _place_slopes(self) -> FloatArray:
+        """The slopes (p, 3, 3) of the coordinates of each source point in the plane of its face, in space."""
+        mesh, points = self._positions().mesh, self._sources.points
+        corners = mesh.V[mesh.F[points.faces]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        per_area = 1 / np.einsum("px,px->p", normal, normal)
+        opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+        # A coordinate rises by the height of its corner.
+        return np.asarray(np.cross(normal[:, None], opposite) * per_area[:, None, None])
+
+    @cached_property
+    def inexact(self) -> IntArray:
+        """Vertices whose distance is not the length of the path that is differentiated.
+
+        Bounds set some distances by heat, and a tolerance changes those by windows. The derivative is that of the path
+        as it is.
+        """
+        reached = np.flatnonzero(np.isfinite(self.distance))
+        distance = self.distance[reached]
+        return np.asarray(reached[np.abs(self._answer.lengths()[reached] - distance) > _SAME * distance])
+
+    def _positions(self) -> SidesOfMesh:
+        if self._sides is None:
+            raise MeshError(
+                "the solver was made without positions, so there are no vertices to move: use by_lengths for the "
+                "derivative by edge lengths"
+            )
+        return self._sides
+
+    def _rows(self, g: ArrayLike, most: int = 2) -> FloatArray:
+        """`g` as rows (k, n), 0 at unreachable vertices."""
+        array = real_numbers("g", g)
+        n = len(self.distance)
+        if not 1 <= array.ndim <= most or array.shape[-1] != n:
+            also = f" or (k, {n})" if most == 2 else ""
+            raise ValueError(f"g must have shape ({n},){also}, one entry per vertex, but it has shape {array.shape}")
+        rows = np.array(array.reshape(-1, n))
+        rows[:, self.unreachable] = 0.0
+        if not np.isfinite(rows).all():
+            row, vertex = np.argwhere(~np.isfinite(rows))[0]
+            raise ValueError(f"g must be finite at reachable vertices, but is {rows[row, vertex]} at vertex {vertex}")
+        return rows
+
+    def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+        """The derivative (m, 3) by the sides of the faces before any flip, and (p, 3) by the points in given faces."""
+        change, points = self._answer.pull_back(row), self._sources.points
+        places = None if change.by_place is None else PlaceSlopes(points.faces, points.barycentric, change.by_place)
+        triangulation, n_before = self._answer.triangulation, len(self._faces.history)
+        by_side, by_place = carry_lengths_back(triangulation, change.by_side, n_before, places)
+        if change.by_given is not None:
+            by_side = by_side + change.by_given
+        if change.by_given_place is not None:
+            direct = PlaceSlopes(points.faces, points.barycentric, change.by_given_place)
+            _, by_given_place = carry_lengths_back(self._faces, np.zeros_like(by_side), n_before, direct)
+            if by_place is None or by_given_place is None:
+                return by_side, by_given_place
+            by_place = by_place + by_given_place
+        return by_side, by_place
+
+    @cached_property
+    def _merged(self) -> Merged | None:
+        """The change that removed faces which were there twice; None if there were none."""
+        history = self._faces.history
+        return history[0] if history and isinstance(history[0], Merged) else None
+
+    def _on_given_faces(self, by_side: FloatArray) -> FloatArray:
+        """The derivative by the sides of the faces that the user gave, some of which may be there twice."""
+        if self._merged is None:
+            return by_side
+        kept, which = np.unique(self._merged.face, return_index=True)
+        on_given = np.zeros((len(self._merged.face), 3))
+        on_given[which] = np.take_along_axis(by_side[kept], self._merged.corner[which], axis=1)
+        return on_given
+
+    def _on_faces(self, by_side: FloatArray) -> FloatArray:
+        """Changes of the sides (m, 3) of the faces that the user gave, for each face once."""
+        if self._merged is None:
+            return by_side
+        kept, which = np.unique(self._merged.face, return_index=True)
+        on_faces = np.zeros((len(kept), 3))
+        np.put_along_axis(on_faces, self._merged.corner[which], by_side[which], axis=1)
+        return on_faces
+
+
+def _velocities(name: str, given: ArrayLike, shape: tuple[int, ...], of: str) -> FloatArray:
+    """Velocities as finite float64 of the given shape."""
+    array = real_numbers(name, given)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be {shape} finite numbers, one velocity per {of}; it has shape {array.shape}")
+    return array
+
+
+def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Mesh | PointCloud | None) -> Surface:
+    """The surface, if a distance from `sources` on it has a derivative.
+
+    Raises
+    ------
+    ValueError
+        If there is none, if it is that of a point cloud, or if a curve is among the sources.
+    """
+    if surface is None or isinstance(mesh, PointCloud):
+        raise ValueError(
+            "derivatives need a surface of triangles: this domain has none, or is a point cloud: take its triangles"
+        )
+    if mesh is not None and mesh.has_copies:
+        raise ValueError(
+            "derivatives need vertices none of which is a copy of another, and seams of this mesh were merged"
+        )
+    if len(sources.segments.faces):
+        raise ValueError(
+            "derivatives are there for vertices and points, and a curve is among the sources: place points on it"
+        )
+    return surface

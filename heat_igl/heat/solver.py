@@ -1,0 +1,426 @@
+"""`HeatMethodSolver`: the three steps put together, factored once, asked many times."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from heat_igl.errors import AccuracyWarning, names_guessed
+from heat_igl.heat.batches import BatchedSolver, LabelledDistance, checked_cutoff, cut_off
+from heat_igl.heat.checking import AnswerCheck
+from heat_igl.heat.derivatives import DistanceDerivative, differentiable_surface
+from heat_igl.heat.heat_derivative import HeatDerivative
+from heat_igl.heat.integration import damped_field
+from heat_igl.heat.options import Magnitude, SolverOptions
+from heat_igl.heat.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
+from heat_igl.heat.several_sources import drop_overtaken, warmest_sources
+from heat_igl.heat.side_lengths import SideLengths
+from heat_igl.heat.solution import Diagnostics, HeatSolution
+from heat_igl.heat.source_terms import SourceTerm, right_hand_side
+from heat_igl.linear import Backend
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh
+from heat_igl.operators import Laplacian, Operators, edge_length_operators
+from heat_igl.plan import Plan
+from heat_igl.runtime import warn_caller
+from heat_igl.sources import Sources, SourceSet, require_resolved, source_set
+from heat_igl.steps import Boundary
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+
+__all__ = ["HeatMethodSolver"]
+
+
+class HeatMethodSolver(BatchedSolver):
+    """Geodesic distance by the heat method (Crane, Weischedel, Wardetzky 2013): factor once, ask many times.
+
+    Parameters
+    ----------
+    mesh : mesh, Operators or (n, 3) array_like
+        Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
+        `polygon_operators`, points with those of the triangles between them. Or the operators of a metric, a speed or
+        another domain, as `metric_operators` returns them.
+    F : (m, 3) or (m, 4) array_like, optional
+        Faces, when `mesh` is V.
+    t_coef : float, optional
+        Scale-free time step, t = t_coef h^2 with h the mean edge length of the triangulation that is solved on. Larger
+        values smooth the distance across the cut locus. 0.5 where heat is fitted to the lengths of edges (see
+        `magnitude`), else the paper's 1.
+    t : float, optional
+        Time step as a squared length; overrides `t_coef`.
+    laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
+        Triangulation to solve on, see `operators`; "cotan" is the paper's. "auto" is the intrinsic Delaunay one where
+        triangles are even, and has more vertices where they are not: `operators` then has more rows than there are
+        answers, the first ones for the vertices of the mesh. Tetrahedra always keep their own.
+    boundary : {"neumann", "dirichlet", "average"}
+        What the heat does at the boundary, see `HeatFlow`.
+    magnitude : {"auto", "unit", "damped"}
+        Length of the field X that is integrated: 1 as in the paper, or less where heat arrives from several sides, see
+        `damping`. "auto" damps on surfaces, where it was measured to pay, but not for "cotan", where heat may be
+        negative and the paper's method is wanted. "unit" is the paper's method throughout: otherwise the heat flow is
+        fitted to the lengths of edges (`fitted_laplacian`), X follows the gradient of log u, and the vertices next to a
+        source vertex get the lengths of the edges.
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
+        Linear solver, see `factorize`.
+    region : (n,) or (m,) array_like of bool, optional
+        What heat may enter, of a mesh: faces all of whose vertices are selected, or selected faces. Elsewhere distance
+        is ``inf``, and sources are an error. Fields per face, as those of `solve`, are those of the part alone.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot be used; the message names the first offender.
+    FactorizationError
+        If a matrix is not positive definite.
+    MissingExtraError
+        If a library asked for is not installed.
+    ValueError
+        If an option has no meaning.
+
+    Warns
+    -----
+    AccuracyWarning
+        If an explicit `t` had to be raised for the heat to cross the mesh, or is so large that heat is nearly level.
+
+    Notes
+    -----
+    A time step too small for the heat to cross the mesh in double precision is raised, and `t` and `diagnostics` say
+    so. The solver is immutable; threads may share it, and a pickled copy gives the same bits.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.icosphere(4)  # the unit sphere, on which distance is an angle
+    >>> solver = heat_igl.HeatMethodSolver(mesh)
+    >>> angle = np.arccos(np.clip(mesh.V @ mesh.V[7], -1, 1))
+    >>> bool(abs(solver.distance(7) - angle).mean() < 0.01 * np.pi)
+    True
+    >>> solver.distances([[0, 1], [2]]).shape  # of two sets of sources
+    (2, 2562)
+    """
+
+    _mesh: Mesh | PointCloud | None = None
+    _parts: SolverParts
+    _part: MeshPart | None = None
+
+    @names_guessed
+    def __init__(
+        self,
+        mesh: MeshLike | Operators,
+        F: ArrayLike | None = None,
+        *,
+        t_coef: float | None = None,
+        t: float | None = None,
+        laplacian: Laplacian = "auto",
+        boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
+        backend: Backend = "auto",
+        region: ArrayLike | None = None,
+    ) -> None:
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
+        self._set_up(mesh if isinstance(mesh, Operators) and F is None else as_mesh(mesh, F), options, region)
+
+    @classmethod
+    def from_options(
+        cls, mesh: MeshLike | Operators, options: SolverOptions, region: ArrayLike | None = None
+    ) -> HeatMethodSolver:
+        """A solver on `mesh` with options that were put together before."""
+        solver = cls.__new__(cls)
+        solver._set_up(mesh if isinstance(mesh, Operators) else as_mesh(mesh), options, region)
+        return solver
+
+    @classmethod
+    def from_edge_lengths(
+        cls,
+        F: ArrayLike,
+        lengths: ArrayLike,
+        *,
+        n: int | None = None,
+        twin: ArrayLike | None = None,
+        t_coef: float | None = None,
+        t: float | None = None,
+        laplacian: Laplacian = "auto",
+        boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
+        backend: Backend = "auto",
+    ) -> HeatMethodSolver:
+        """A solver on triangles that are known by their edge lengths alone; positions are not needed.
+
+        Parameters
+        ----------
+        F : (m, 3) array_like of int
+            Vertices of each triangle.
+        lengths : (m, 3) array_like
+            ``lengths[f, c]`` is that of the side of triangle f opposite its corner c, as `igl.edge_lengths` gives it;
+            both triangles at an edge give it the same length.
+        n : int, optional
+            Number of vertices; one more than the largest in `F` if not given.
+        twin : (m, 3) array_like of int, optional
+            ``twin[f, c]`` is ``3 g + d`` where side c of triangle f is glued to side d of triangle g, and -1 on the
+            boundary. By default sides with the same ends are glued. It is needed where several edges join the same two
+            vertices, or a vertex with itself, as in intrinsic triangulations; then a triangle may repeat a vertex.
+        **options
+            As for the class. Where more than two triangles meet at an edge no tufted cover is made, which takes
+            positions: such edges are not flipped.
+
+        Raises
+        ------
+        MeshError
+            If `F`, `lengths` or `twin` cannot be used; the message names the first offender.
+        """
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
+        start = time.perf_counter()
+        domain = edge_length_operators(F, lengths, n, options.laplacian, twin)
+        return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
+
+    def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
+        """A new solver after the vertices have moved; this one stays as it is.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices.
+
+        Returns
+        -------
+        HeatMethodSolver
+            With the same faces and options, and the same results as one made anew. The time step follows `t_coef`,
+            unless `t` was given. What the faces alone say is shared: they are not validated, and edges, boundary and
+            components not found again; nor is the order of elimination, unless other edges are flipped.
+
+        Raises
+        ------
+        MeshError
+            If `V` cannot be used; the message names the first offender.
+        ValueError
+            If the solver was made from operators.
+        """
+        if self._mesh is None:
+            fans = self.operators.fans
+            if fans is None:
+                raise ValueError("this solver was made from operators and has no vertices to move: make it again")
+            positions = fans.polygons.triangles.with_vertices(V).V
+            return self._of(prepare_polygons(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
+        moved = self._mesh.with_vertices(V)
+        options, known = self._parts.options, self._parts.analysis
+        solver = self._of(prepare_mesh(moved, options, known), moved)
+        if self._part is not None and isinstance(moved, Mesh):
+            solver._part = replace(self._part, mesh=moved)
+        return solver
+
+    def _set_up(
+        self,
+        mesh: Mesh | PolygonMesh | PointCloud | Operators,
+        options: SolverOptions,
+        region: ArrayLike | None = None,
+    ) -> None:
+        if region is not None:
+            self._part = MeshPart.of(mesh, region)
+            mesh = self._part.mesh
+        if isinstance(mesh, Operators):
+            if options.laplacian != "auto":
+                raise ValueError(f"laplacian={options.laplacian!r} is for meshes: operators have a Laplacian already")
+            # Whoever made the operators chose the triangulation.
+            chosen = replace(options, laplacian="intrinsic-delaunay")
+            self._mesh, self._parts = None, prepare(mesh, chosen)
+        elif isinstance(mesh, PolygonMesh):
+            self._mesh, self._parts = None, prepare_polygons(mesh, options)
+        else:
+            self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
+
+    @classmethod
+    def _of(cls, parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> HeatMethodSolver:
+        solver = cls.__new__(cls)
+        solver._mesh, solver._parts = mesh, parts
+        return solver
+
+    def __repr__(self) -> str:
+        backend = self.diagnostics.backend
+        return f"HeatMethodSolver({self.n_vertices} vertices, t={self.t:.4g}, backend={backend!r})"
+
+    @property
+    def plan(self) -> Plan:
+        """The engine, which is heat, and what it runs on."""
+        return self._parts.plan
+
+    @property
+    def operators(self) -> Operators:
+        """L, M, G and D of the triangulation that is solved on."""
+        return self._parts.operators
+
+    @property
+    def t(self) -> float:
+        """The time step in use, a squared length; of several (`time_steps`), that of the largest component."""
+        return self.diagnostics.t
+
+    @property
+    def time_steps(self) -> FloatArray:
+        """The time step of each component, by their labels in ``operators.components``."""
+        return self._parts.time_steps
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """What the solver did and rests on."""
+        comparisons = self._parts.comparisons
+        return replace(self._parts.diagnostics, compared=None if comparisons is None else comparisons.worst)
+
+    @property
+    def n_vertices(self) -> int:
+        """Length of a distance array: the vertices of the mesh. The operators may have more."""
+        return self._parts.n_vertices
+
+    @property
+    def referenced(self) -> BoolArray:
+        """Mask (n,) of the vertices that a face uses."""
+        return self.operators.referenced[: self.n_vertices]
+
+    @property
+    def _n_faces(self) -> int:
+        return self._parts.n_faces
+
+    @names_guessed
+    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
+        """Distance (n,) from the nearest source: arguments, values and errors as for `GeodesicSolver.distance`.
+
+        Warns
+        -----
+        AccuracyWarning
+            If heat underflowed on the way, so that distances beyond are too short; if the first answer from sources of
+            this kind is off by more than 3.5 % in the mean, compared with a sweep; and where that is not done, if the
+            answer leaves bounds that need no reference by so much that it is wrong (see `AnswerCheck`).
+        """
+        beyond = checked_cutoff(cutoff)
+        chosen = self._source_set(sources)
+        (distance,), (complaint,) = self._answers(self._drawn([chosen]))
+        _warn(complaint)
+        return np.asarray(cut_off(distance, beyond))
+
+    def _source_set(self, sources: Sources) -> SourceSet:
+        faces = self._parts.given_faces
+        if self._part is not None and faces is not None:
+            faces = self._part.whole
+        chosen = source_set(sources, self.n_vertices, faces)
+        if self._originals is not None:
+            chosen = chosen.with_vertices_moved(self._originals)
+        if self._part is not None:
+            chosen = chosen.within(self._part)
+        return require_resolved(chosen, self._parts.operators.mean_edge_length)
+
+    def _answers(
+        self,
+        source_sets: list[SourceSet],
+        cutoff: float = np.inf,  # noqa: ARG002
+    ) -> tuple[FloatArray, list[str | None]]:
+        """Distances (k, n) from k sets of sources, and what is wrong with them: the method from end to end."""
+        terms = self._source_terms(source_sets)
+        distances = self._distances_from_heat(terms, self._heat(terms))
+        checks = [self._checked(*pair) for pair in zip(distances, source_sets, strict=True)]
+        return self._with_copies(distances), [check.complaint(self._parts.is_surface) for check in checks]
+
+    @property
+    def _originals(self) -> IntArray | None:
+        """The vertex (n,) whose values each takes, where seams were merged or points are equal."""
+        return None if self._mesh is None or not self._mesh.has_copies else self._mesh.originals
+
+    def _with_copies(self, values: AnyArray) -> AnyArray:
+        """Values (..., n) in which copies have those of their originals."""
+        return values if self._originals is None else values[..., self._originals]
+
+    def _drawn(self, source_sets: list[SourceSet]) -> list[SourceSet]:
+        """The same sets; those that are the first of their kind, and so to be compared, are marked."""
+        comparisons = self._parts.comparisons
+        if comparisons is None:
+            return source_sets
+        return [replace(each, is_first=True) if comparisons.claim(each) else each for each in source_sets]
+
+    def _checked(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck:
+        """Check one answer (n,), and move it inside the bounds that it violates.
+
+        A field of length 1 is the paper's method, and a time step or a boundary that was asked for has a purpose: their
+        answers are left as they are.
+        """
+        parts = self._parts
+        check = parts.checker.check(distance, sources)
+        if not parts.is_default:
+            return check
+        check = parts.checker.hold_to_bounds(distance, sources, check)
+        if parts.comparisons is None:
+            return check
+        if sources.is_first:
+            parts.comparisons.compare(distance, sources)
+        return check._replace(compared=parts.comparisons.known(sources))
+
+    def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:
+        """Initial heat of each set, and what is known near it."""
+        terms = [self._parts.assembler.term(sources) for sources in source_sets]
+        return [drop_overtaken(term, self._parts.heat_flow, self.operators.n) for term in terms]
+
+    def _heat(self, terms: list[SourceTerm]) -> FloatArray:
+        """Heat at all vertices of the operators, for k terms: step 1."""
+        return self._parts.heat_flow.solve(right_hand_side(self.operators.n, terms))
+
+    def _distances_from_heat(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
+        """Distances (k, n) from the heat of `_heat`: steps 2 and 3."""
+        last_steps = self._parts.last_steps
+        divergence = last_steps.divergence(terms, u)
+        phi = last_steps.poisson.solve(divergence)
+        return last_steps.pin_levels(terms, phi, u)[:, : self.n_vertices]
+
+    @names_guessed
+    def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
+        """Distance, and which source is nearest: as `GeodesicSolver.voronoi`, with a heat solve for each source.
+
+        Labels say from which source most of the heat comes: right but for vertices less than an edge from the border of
+        two cells.
+        """
+        beyond = checked_cutoff(cutoff)
+        (chosen,) = self._drawn([self._source_set(sources)])
+        terms = self._source_terms([chosen])
+        distance = self._distances_from_heat(terms, self._heat(terms))[0]
+        labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
+        _warn(self._checked(distance, chosen).complaint(self._parts.is_surface))
+        distance = cut_off(self._with_copies(distance), beyond)
+        labels = self._with_copies(labels)
+        labels[np.isinf(distance)] = -1
+        return LabelledDistance(distance, labels)
+
+    def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
+        """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
+
+        Arguments and errors as for `distance`; a ValueError also for what is not differentiated, see
+        `differentiable_surface` and `HeatDerivative`. The derivative is that of the three steps; where bounds moved the
+        answer, `DistanceDerivative.inexact` says so.
+        """
+        chosen = self._source_set(sources)
+        surface = differentiable_surface(self.operators.surface, chosen, self._mesh)
+        if self.operators.fans is not None:
+            raise ValueError("derivatives need a surface of triangles, and this is heat on polygons")
+        sides = SideLengths(self._mesh) if isinstance(self._mesh, Mesh) else self.operators.metric
+        distance, answer = self.distance(sources), HeatDerivative(self._parts, chosen)
+        return distance, DistanceDerivative(distance, chosen, surface, sides, answer)
+
+    def solve(self, sources: Sources) -> HeatSolution:
+        """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
+        (chosen,) = self._drawn([self._source_set(sources)])
+        terms = self._source_terms([chosen])
+        u = self._heat(terms)
+        X, magnitude = damped_field(self.operators, terms, u, self._parts.t_damping, self._parts.fitted)
+        distance = self._distances_from_heat(terms, u)[0]
+        check = self._checked(distance, chosen)
+        _warn(check.complaint(self.operators.is_surface))
+        with np.errstate(under="ignore"):
+            heat = (u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass)[: self.n_vertices]
+        return HeatSolution(
+            heat=self._with_copies(heat),
+            direction=np.ascontiguousarray(X[:, 0].reshape(self.operators.dimension, -1).T),
+            magnitude=np.ascontiguousarray(magnitude[:, 0]),
+            distance=self._with_copies(distance),
+            t=self.t,
+            diagnostics=replace(self.diagnostics, check=check),
+        )
+
+
+def _warn(complaint: str | None) -> None:
+    if complaint is not None:
+        warn_caller(complaint, AccuracyWarning)

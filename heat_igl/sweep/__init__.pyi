@@ -1,0 +1,3 @@
+from heat_igl.sweep.hopf_lax import HopfLaxEngine as HopfLaxEngine
+from heat_igl.sweep.lines import LineEngine as LineEngine
+from heat_igl.sweep.sweep import SweepEngine as SweepEngine

@@ -1,0 +1,138 @@
+"""`LineEngine`: distance through tetrahedra in space, along straight lines that bend around edges of the body."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.kernels.bodies.bends import bend_around
+from heat_igl.kernels.bodies.bodies import Body
+from heat_igl.kernels.bodies.sight import look_around
+from heat_igl.mesh import connectivity
+from heat_igl.operators import MetricSimplices
+from heat_igl.sources import SourceSet
+from heat_igl.sweep.reflex_edges import reflex_edges
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.windows.engine import ROUNDING, SimplexEngine
+
+__all__ = ["LineEngine"]
+
+# Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
+_MOST_ROUNDS = 5
+# Up to so many vertices, a body around whose edges ways bend is measured on halved tetrahedra as well: of a long edge,
+# a part may see the source although neither end does, and then such an edge is too coarse a source itself. Also, every
+# vertex looks for the only source, and for several again after bends, since a vertex may see a source that no vertex
+# around it sees. On finer bodies both are rare, and take time.
+_FEW = 1000
+# How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
+_BESIDE, _BESIDE_OF_FEW = 0.5, 2.0
+# What the kernel of bends knows of the way to a vertex.
+_STRAIGHT, _UNKNOWN = -1, -2
+
+
+class LineEngine(SimplexEngine):
+    """Distance through tetrahedra in space: straight lines from the sources, and lines that bend around edges.
+
+    A body bends lines at edges with more than half a turn inside: once its ends know their distances, such an edge is a
+    source itself.
+
+    Parameters
+    ----------
+    simplices : MetricSimplices
+        Tetrahedra with positions `V`.
+    is_halved : bool
+        Whether they are not to be halved again.
+    """
+
+    def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
+        super().__init__(simplices)
+        self._V = np.ascontiguousarray(simplices.place)
+        self._is_small = simplices.n <= _FEW
+        is_refined = self._is_small and not is_halved and len(self._reflex_edges[0]) > 0
+        self._finer = LineEngine(simplices.halved(), is_halved=True) if is_refined else None
+
+    @cached_property
+    def _reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
+        """Edges around which ways bend (e, 2), directions out of the body (e, 3), and cosines to the walls (e,)."""
+        edges, outward, wall = reflex_edges(self._simplices.corners, self._V)
+        return edges.astype(np.int32), outward, wall
+
+    @cached_property
+    def _body(self) -> Body:
+        return Body(self._corners, self._first, self._incident, self._V)
+
+    @cached_property
+    def _edge_graph(self) -> sp.csr_array:
+        return connectivity.shortest_edge_graph(*self._simplices.edges, self._simplices.n)
+
+    def _order(self, vertices: AnyArray, straight: bool = False) -> AnyArray:
+        """All vertices, from near to far: by the straight line from the only source, or by edges."""
+        if straight:
+            far = np.linalg.norm(self._V - self._V[vertices[0]], axis=1)
+        else:
+            far = connectivity.edge_distance(self._edge_graph, vertices)
+        return np.argsort(far, kind="stable").astype(np.int32)
+
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
+        """Distance (n,), and the source (n,) that it is measured from; on small bodies also by halved tetrahedra."""
+        distance, labels = super().labelled(sources, cutoff, threads)
+        if self._finer is not None:
+            found, other = (values[: len(distance)] for values in self._finer.labelled(sources))
+            # Longer by rounding alone, a distance stays as it is.
+            shorter = found < distance * (1 - ROUNDING)
+            distance[shorter] = found[shorter]
+            labels[shorter] = other[shorter]
+        return distance, labels
+
+    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
+        """Lower distance to straight lines, and to ways of straight lines that bend around edges of the body."""
+        begin = distance.copy()
+        order = self._order(vertices, straight=len(vertices) == 1)
+        edges, outward, wall = self._reflex_edges
+        if len(edges):
+            rank = np.empty(len(order), np.int64)
+            rank[self._order(vertices)] = np.arange(len(order))
+            near = np.argsort(rank[edges].max(axis=1), kind="stable")
+            edges, outward, wall = edges[near], outward[near], wall[near]
+        way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
+        way[vertices] = _STRAIGHT
+        turns = np.isin(vertices, edges).astype(np.uint8)
+        beside = _BESIDE_OF_FEW if self._is_small else _BESIDE
+        is_continued = False
+        for round_ in range(_MOST_ROUNDS):
+            before = distance.copy()
+            guess = self._nearest(vertices)
+            look_around(order, self._body, vertices, offset, turns, len(edges) > 0, guess, distance, begin, label)
+            is_seen = distance < before
+            way[is_seen] = _STRAIGHT
+            if round_ and not is_seen.any() and not is_continued:
+                break
+            if len(edges):
+                bend_around(edges, outward, wall, self._body, beside, vertices, offset, distance, begin, label, way)
+            # Behind a point or an edge at which tetrahedra touch, no line continues.
+            is_continued = self._continue_along_edges(distance, begin, label)
+            if not is_continued and not (self._is_small and len(edges) and len(vertices) > 1):
+                break
+
+    def _nearest(self, vertices: AnyArray) -> AnyArray:
+        """The source (n,) that each vertex looks for first: the nearest in space, or -1 for those of its neighbours."""
+        if len(vertices) == 1:
+            return np.full(self._simplices.n, 0 if self._is_small else -1, np.int32)
+        from scipy.spatial import cKDTree
+
+        return np.asarray(cKDTree(self._V[vertices]).query(self._V)[1], np.int32)
+
+    def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
+        """Give vertices that nothing has reached a distance along edges; returns whether there were any."""
+        pairs, lengths = self._simplices.edges
+        start, end = np.concatenate([pairs, pairs[:, ::-1]]).T
+        lengths = np.concatenate([lengths, lengths])
+        reached = len(distance) - np.count_nonzero(np.isinf(distance))
+        while len(rows := np.flatnonzero(np.isinf(distance[end]) & np.isfinite(distance[start]))):
+            # The smallest value of each vertex is written last.
+            rows = rows[np.argsort(-(distance[start[rows]] + lengths[rows]), kind="stable")]
+            distance[end[rows]] = distance[start[rows]] + lengths[rows]
+            begin[end[rows]], label[end[rows]] = distance[start[rows]], label[start[rows]]
+        return bool(len(distance) - np.count_nonzero(np.isinf(distance)) > reached)

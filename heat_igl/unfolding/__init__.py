@@ -1,5 +1,0 @@
-"""Distance along simplices: windows, sweeps, straight lines in bodies, the Hopf-Lax formula."""
-
-from heat_igl.lazy import attached
-
-__all__, __getattr__, __dir__ = attached(__name__, __file__)

@@ -1,0 +1,371 @@
+"""A triangulated surface as the windows of exact distance read it: half-edge by half-edge, in the order of a front."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.intrinsic import IntrinsicTriangulation, Merged, intrinsic_delaunay, intrinsic_triangulation, lay_out
+from heat_igl.kernels.mesh import numbering
+from heat_igl.kernels.windows.surface import shapes
+from heat_igl.mesh import Mesh, SurfacePoints, connectivity
+from heat_igl.sources import SourceSegments
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.windows.glued import TOO_MANY, glued, mean_exponent
+
+__all__ = [
+    "MARGIN",
+    "NO_POINTS",
+    "NO_SEGMENTS",
+    "HalfEdges",
+    "Located",
+    "Numbered",
+    "Tables",
+    "from_mesh",
+    "from_triangulation",
+    "rings",
+]
+
+#: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
+#: `mollify`, paths across needles were up to 3e-4 of themselves too long.
+MARGIN = 1e-12
+# A point whose barycentric coordinate is below this lies on the side of its face.
+_ON_SIDE = 1e-13
+# Up to so many faces, the tables stay in the caches in any order in which most neighbours are at most so far apart.
+_FEW_FACES = 30_000
+_NEAR = 768
+# Powers of two up to here, and their inverses, are normal numbers.
+_LARGEST_EXPONENT = 1000
+
+
+class Tables(NamedTuple):
+    """What the kernel reads, in its order; see `heat_igl.kernels.windows.surface.shapes`."""
+
+    vertex: AnyArray
+    length: FloatArray
+    twin: AnyArray
+    aligned: AnyArray
+    ring: AnyArray
+    double_area: FloatArray
+    bulge: FloatArray
+    corner_of_vertex: AnyArray
+    next_corner: AnyArray
+    n_corners: AnyArray
+    kind: AnyArray
+    is_delaunay: bool
+
+
+class Located(NamedTuple):
+    """Points in the triangles, by their new numbers; one on a side, once for every triangle there; contiguous.
+
+    Attributes
+    ----------
+    faces : (q,) int32
+        Triangle of each.
+    barycentric : (q, 3) float64
+        Coordinates in it; exactly 0 on a side.
+    point : (q,) int64
+        Which point it is.
+    turn : (q,) float64
+        What is added to the angle of a direction in the triangle to count it in the first triangle of the same point:
+        both count from the side of corners 0 and 1. On faces that are oriented alike.
+    """
+
+    faces: AnyArray
+    barycentric: FloatArray
+    point: IntArray
+    turn: FloatArray
+
+
+#: No points, and no segments, in any triangles.
+NO_POINTS = Located(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, np.int64), np.empty(0))
+NO_SEGMENTS = NO_POINTS._replace(barycentric=np.empty((0, 2, 3)))
+
+
+class Numbered(NamedTuple):
+    """Triangles by their sides, numbered in the order of a front: what `numbering.breadth_first` returns.
+
+    Attributes
+    ----------
+    vertex, twin, ring : (3 m,) int32
+        Vertex of each corner; the half-edge glued to each, -1 on the boundary and -2 where more than two faces meet;
+        there the next half-edge of the same edge, elsewhere the half-edge itself.
+    aligned : (3 m,) uint8
+        Whether glued faces run along their half-edge in opposite directions.
+    length : (3 m,) float64
+        Of each half-edge.
+    number : (n,) int32
+        Number of each vertex of the caller.
+    face : (m,) int32
+        The caller's number of each face.
+    """
+
+    vertex: AnyArray
+    twin: AnyArray
+    ring: AnyArray
+    aligned: AnyArray
+    length: FloatArray
+    number: AnyArray
+    face: AnyArray
+
+
+class HalfEdges:
+    """The tables of one surface, with vertices and faces numbered anew.
+
+    Parameters
+    ----------
+    numbered : Numbered
+        The triangles. Their lengths are scaled in place.
+    exponent : int
+        Lengths are in units of ``2 ** exponent``.
+    triangulation : IntrinsicTriangulation, optional
+        What the tables were made from, to locate points.
+    """
+
+    def __init__(self, numbered: Numbered, exponent: int, triangulation: IntrinsicTriangulation | None = None) -> None:
+        vertex, twin, ring, aligned, length, self.number, self.face = numbered
+        m, n = len(self.face), len(self.number)
+        # By a power of two: no digit changes, and no square leaves the range of doubles.
+        shift = mean_exponent(length)
+        _times_power(length, -shift, out=length)
+        self.n, self.exponent = n, exponent + shift
+        self._triangulation = triangulation
+        derived: dict[str, AnyArray] = {
+            "double_area": np.empty(m),
+            "bulge": np.empty(3 * m),
+            "corner_of_vertex": np.full(n, -1, np.int32),
+            "next_corner": np.empty(3 * m, np.int32),
+            "n_corners": np.zeros(n, np.int32),
+            "kind": np.zeros(n, np.uint8),
+        }
+        is_delaunay = shapes(vertex, length, twin, **derived)
+        self.tables = Tables(vertex, length, twin, aligned, ring, **derived, is_delaunay=is_delaunay)
+
+    @cached_property
+    def old_vertex(self) -> IntArray:
+        """The caller's number (n,) of each vertex."""
+        vertex = np.empty(self.n, np.int64)
+        vertex[self.number] = np.arange(self.n)
+        return vertex
+
+    def scaled(self, lengths: FloatArray | float) -> FloatArray:
+        """Lengths of the caller in the unit of the tables."""
+        return _times_power(lengths, -self.exponent)
+
+    def unscaled(self, lengths: FloatArray) -> FloatArray:
+        """Lengths of the tables in the caller's unit."""
+        return _times_power(lengths, self.exponent)
+
+    def old_half_edge(self, half_edge: AnyArray) -> IntArray:
+        """Half-edges by the caller's numbers; -1 stays."""
+        old = 3 * self.face[half_edge // 3].astype(np.int64) + half_edge % 3
+        return np.asarray(np.where(half_edge >= 0, old, -1))
+
+    def located(self, points: SurfacePoints | None) -> Located:
+        """Points of the mesh in the triangles.
+
+        Raises
+        ------
+        ValueError
+            If the tables come from `from_mesh`, which keeps no history of its flips.
+        """
+        if points is None:
+            return NO_POINTS
+        if self._triangulation is None:
+            raise ValueError("this surface knows vertices only: make it from a triangulation")
+        faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
+        located = self._on_all_faces(faces, barycentric[:, None])
+        return located._replace(barycentric=located.barycentric[:, 0])
+
+    def located_segments(self, segments: SourceSegments | None) -> Located:
+        """Segments in the triangles: as `located`, with coordinates (q, 2, 3) of both ends.
+
+        Raises
+        ------
+        ValueError
+            If the triangles are not those that the segments were given in.
+        """
+        if segments is None:
+            return NO_SEGMENTS
+        if self._triangulation is None or self._triangulation.n_flips:
+            raise ValueError("segments need triangles that were not flipped: make this surface from those of the mesh")
+        ends = [self._triangulation.locate(segments.faces, end) for end in (segments.start, segments.end)]
+        return self._on_all_faces(ends[0][0], np.stack([end[1] for end in ends], axis=1))
+
+    def _on_all_faces(self, faces: IntArray, barycentric: FloatArray) -> Located:
+        """Sets of places (k, e, 3), by new numbers; those on a side, once more for every other face there."""
+        t = self.tables
+        new_face = np.empty(self.face.max() + 1, np.int64)
+        new_face[self.face] = np.arange(len(self.face))
+        faces = new_face[faces]
+        barycentric = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
+        barycentric /= barycentric.sum(axis=-1, keepdims=True)
+        point = np.arange(len(faces))
+        rows = [(faces, barycentric, point, np.zeros(len(faces)))]
+        is_zero = (barycentric == 0).all(axis=1)
+        i, c = np.nonzero(is_zero & (is_zero.sum(axis=1) == 1)[:, None])
+        start = here = 3 * faces[i] + c
+        while len(here):
+            # To the other triangle at the side, or to the next of many, until all have been met.
+            there = np.where(t.twin[here] >= 0, t.twin[here], t.ring[here]).astype(np.int64)
+            go_on = there != start
+            i, c, start, here = i[go_on], c[go_on], start[go_on], there[go_on]
+            same_vertex = t.vertex[_following(start)] == t.vertex[_following(here)]
+            same_way = np.where(t.twin[start] >= 0, t.aligned[start] == 0, same_vertex)[:, None]
+            tail, head = barycentric[i, :, (c + 1) % 3], barycentric[i, :, (c + 2) % 3]
+            other, k = np.zeros((len(i), *barycentric.shape[1:])), np.arange(len(i))
+            other[k, :, (here + 1) % 3] = np.where(same_way, tail, head)
+            other[k, :, (here + 2) % 3] = np.where(same_way, head, tail)
+            # The same side runs the other way there.
+            rows.append((here // 3, other, point[i], np.angle(-self._along(start) * self._along(here).conj())))
+        faces, barycentric, point, turn = (np.concatenate(column) for column in zip(*rows, strict=True))
+        return Located(faces.astype(np.int32), np.ascontiguousarray(barycentric), point, turn)
+
+    def _along(self, half_edge: IntArray) -> AnyArray:
+        """Half-edges (k,) as complex numbers in their triangles, of which the side of corners 0 and 1 is real."""
+        corners = lay_out(self.tables.length.reshape(-1, 3)[half_edge // 3]) @ np.array([1, 1j])
+        k = np.arange(len(half_edge))
+        return np.asarray(corners[k, (half_edge + 2) % 3] - corners[k, (half_edge + 1) % 3])
+
+    def by_face(self, located: Located) -> tuple[AnyArray, AnyArray]:
+        """The first point of each triangle, and the next point of the same triangle; -1 for none."""
+        faces = located.faces
+        if not len(faces):
+            return faces, faces
+        first = np.full(len(self.face), -1, np.int32)
+        following = np.full(len(faces), -1, np.int32)
+        order = np.argsort(faces, kind="stable")
+        first[faces[order][::-1]] = order[::-1]
+        same = faces[order][1:] == faces[order][:-1]
+        following[order[:-1][same]] = order[1:][same]
+        return first, following
+
+    def largest_circle(self, located: Located) -> float:
+        """Diameter of the largest circle around a triangle that holds a point; 0 without points."""
+        if not len(located.faces):
+            return 0.0
+        sides = self.tables.length.reshape(-1, 3)[located.faces]
+        return float((sides.prod(axis=1) / self.tables.double_area[located.faces]).max())
+
+
+def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
+    """The tables of a triangulation.
+
+    Raises
+    ------
+    MeshError
+        If there are too many triangles for 32-bit indices.
+    """
+    m = len(triangulation.F)
+    if 3 * m + triangulation.n >= TOO_MANY:
+        raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
+    once, kept, merged = _without_copies(triangulation)
+    exponent = mean_exponent(once.l)
+    found = numbering.breadth_first(
+        once.F.ravel().astype(np.int32),
+        once.twin.astype(np.int32),
+        rings(once),
+        once.aligned.astype(np.uint8),
+        np.ldexp(once.l.ravel(), -exponent),
+        once.n,
+        0,
+    )
+    numbered = Numbered(*found)
+    located_in = replace(triangulation, history=(*triangulation.history, *merged))
+    return HalfEdges(numbered._replace(face=kept[numbered.face]), exponent, located_in)
+
+
+def _without_copies(
+    given: IntrinsicTriangulation,
+) -> tuple[IntrinsicTriangulation, IntArray, tuple[Merged, ...]]:
+    """The triangulation with one of the faces that share all edges, which faces those are, and where points move.
+
+    No shortest path crosses from one of them to another, and windows would multiply.
+    """
+    F, m = given.F, len(given.F)
+    order = np.argsort(F, axis=1)
+    first, which, _ = connectivity.unique_rows(np.take_along_axis(F, order, axis=1), given.n)
+    first = first[which]
+    # An edge of more than two faces was never flipped: its vertices tell it apart.
+    twin = given.twin.reshape(m, 3)
+    is_copy: BoolArray = ((twin == -2) | (twin // 3 == first[:, None])).all(axis=1) & (first < np.arange(m))
+    kept = np.flatnonzero(~is_copy)
+    if len(kept) == m:
+        return given, kept, ()
+    stands = np.where(is_copy, first, np.arange(m))
+    corner = np.empty((m, 3), np.int64)
+    np.put_along_axis(corner, order, order[stands], axis=1)
+    half_edge = (3 * kept[:, None] + np.arange(3)).ravel()
+    new = np.full(3 * m + 2, -1)
+    new[half_edge], new[-2] = np.arange(len(half_edge)), -2
+    once = replace(given, F=F[kept], l=given.l[kept], twin=new[given.twin[half_edge]], aligned=given.aligned[half_edge])
+    # Edges that have one or two faces now.
+    many = np.flatnonzero(once.twin == -2)
+    ends = np.sort(np.stack([once.tail(many), once.head(many)], axis=1), axis=1)
+    _, edge, count = connectivity.unique_rows(ends, given.n)
+    once.twin[many[count[edge] == 1]] = -1
+    many = many[np.argsort(edge, kind="stable")]
+    a, b = many[np.repeat(count, count) == 2].reshape(-1, 2).T
+    once.twin[a], once.twin[b] = b, a
+    once.aligned[a] = once.aligned[b] = once.tail(a) == once.head(b)
+    return once, kept, (Merged(stands, corner),)
+
+
+def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
+    """The tables of the intrinsic Delaunay triangulation of a mesh that is asked once, for distances from vertices.
+
+    Without a history of the flips. What is near vertex `start` comes first in memory, unless the mesh is small and most
+    neighbours are near each other as they are: then numbers stay.
+    """
+    found = glued(mesh)
+    if (found.twin == -2).any():
+        # Windows would go on in every copy of a face, and multiply.
+        reduced, _ = mesh.without_duplicate_faces()
+        if reduced is not mesh:
+            return from_mesh(reduced, start)
+    if found.n_across:
+        return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
+    found.flip(mesh.F, MARGIN)
+    m, n = mesh.n_faces, mesh.n_vertices
+    if m <= _FEW_FACES and numbering.n_near(found.twin, _NEAR) > len(found.twin) // 2:
+        numbers, faces = np.arange(n, dtype=np.int32), np.arange(m, dtype=np.int32)
+        return HalfEdges(Numbered(*found[:5], numbers, faces), found.exponent)
+    first_face = int(np.argmax(found.vertex == start)) // 3
+    numbered = Numbered(*numbering.breadth_first(*found[:5], n, first_face))
+    exponent = found.exponent
+    del found  # before there are more tables
+    return HalfEdges(numbered, exponent)
+
+
+def _following(half_edge: IntArray) -> IntArray:
+    """The next half-edge of the same face."""
+    return np.asarray(half_edge + 1 - 3 * (half_edge % 3 == 2))
+
+
+def _times_power(lengths: FloatArray | float, exponent: int, out: FloatArray | None = None) -> FloatArray:
+    """Lengths times ``2 ** exponent``, in place of `out` if that is given."""
+    if abs(exponent) > _LARGEST_EXPONENT:
+        return np.asarray(np.ldexp(lengths, exponent, out=out))
+    return np.asarray(np.multiply(lengths, 2.0**exponent, out=out))  # the same bits, ten times as fast
+
+
+def rings(triangulation: IntrinsicTriangulation) -> AnyArray:
+    """For a half-edge where more than two faces meet, the next of those there; elsewhere itself."""
+    ring = np.arange(len(triangulation.twin), dtype=np.int32)
+    many = np.flatnonzero(triangulation.twin == -2)
+    if len(many):
+        # Such edges were never flipped: the two vertices tell them apart.
+        ends = np.sort(np.stack([triangulation.tail(many), triangulation.head(many)]), axis=0)
+        order = np.lexsort((many, *ends))
+        many, ends = many[order], ends[:, order]
+        is_first: BoolArray = np.ones(len(many), bool)
+        is_first[1:] = (ends[:, 1:] != ends[:, :-1]).any(axis=0)
+        first = np.flatnonzero(is_first)
+        following = np.roll(many, -1)
+        following[np.append(first[1:], len(many)) - 1] = many[first]
+        ring[many] = following
+    return ring

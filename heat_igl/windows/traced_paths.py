@@ -1,0 +1,149 @@
+"""Exact shortest paths, traced back to the sources through the windows that gave the distances."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from heat_igl.intrinsic import intrinsic_triangulation
+from heat_igl.kernels.windows import paths
+from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.sources import SourceSet
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.windows.half_edges import MARGIN, HalfEdges, from_triangulation
+from heat_igl.windows.window_search import Searched, search
+from heat_igl.windows.window_starts import starts_at
+
+__all__ = ["ExactPaths", "PathStarts", "exact_paths"]
+
+# Initial room for segments.
+_ROOM = 2**14
+
+
+class PathStarts(NamedTuple):
+    """The ends of k paths to trace back, by the numbers of the tables: vertices, or targets of the search.
+
+    Attributes
+    ----------
+    vertex : (k,) int32
+        The vertex; -1 for a target.
+    face, barycentric : (k,) int32, (k, 3) float64
+        The target, or a corner at the vertex.
+    distance, root, entered, crossing : (k,)
+        Result of the search there.
+    """
+
+    vertex: AnyArray
+    face: AnyArray
+    barycentric: FloatArray
+    distance: FloatArray
+    root: AnyArray
+    entered: AnyArray
+    crossing: FloatArray
+
+
+class ExactPaths(NamedTuple):
+    """Shortest paths from k places to the nearest source.
+
+    Attributes
+    ----------
+    faces : (s,) int64
+        Face of each segment, path after path.
+    points : (s, 2, 3) float64
+        Barycentric coordinates of the start and the end of each segment.
+    first : (k + 1,) int64
+        Segments of path i are ``first[i]`` to ``first[i + 1]``; none if no source is reached, or if the path was lost
+        among needles.
+    distance : (k,) float64
+        Exact distance of each place.
+    """
+
+    faces: IntArray
+    points: FloatArray
+    first: IntArray
+    distance: FloatArray
+
+
+def exact_paths(
+    mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: FloatArray, margin: float = MARGIN
+) -> ExactPaths:
+    """Shortest paths on the faces of a mesh, by windows on the triangles as they are given.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles.
+    sources : SourceSet
+        Vertices, points and segments.
+    faces, barycentric : (k,) int64, (k, 3) float64
+        Where the paths begin. The search ends when the distance of all these places is known.
+    margin : float
+        By how much triangles are mollified, see `intrinsic_triangulation`.
+
+    Returns
+    -------
+    ExactPaths
+        Their lengths are the distances, to rounding. A path that passes a vertex closer than rounding goes through it.
+
+    Raises
+    ------
+    MemoryError
+        If the windows do not fit into memory.
+    """
+    edges = from_triangulation(intrinsic_triangulation(mesh, margin))
+    is_corner = barycentric.max(axis=1) == 1
+    vertex = np.full(len(faces), -1)
+    vertex[is_corner] = mesh.F[faces[is_corner], barycentric[is_corner].argmax(axis=1)]
+    points, segments = sources.points, sources.segments
+    begin = float(sources.offsets.min())
+    sources_there = starts_at(
+        edges,
+        sources.vertices,
+        sources.vertex_offset - begin,
+        SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
+        points.offset - begin if len(points.faces) else None,
+        replace(segments, offset=segments.offset - begin) if len(segments.faces) else None,
+    )
+    inside = SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None
+    done = search(edges, sources_there, targets=inside, goals=np.unique(vertex[is_corner]))
+    starts = _starts(edges, done, vertex)
+    where, places, ends = _traced(edges, done, starts)
+    return ExactPaths(
+        edges.face[where].astype(np.int64), places, np.append(0, ends), edges.unscaled(starts.distance) + begin
+    )
+
+
+def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> PathStarts:
+    """Starts of paths, by the caller's numbers: `vertex`, or where that is -1, the targets one after the other."""
+    at, place = done.targets.found, done.targets.place
+    k, of_target = len(vertex), np.flatnonzero(vertex < 0)
+    which = done.nearest_copy(len(of_target))
+    number = edges.number[vertex]
+    corner = edges.tables.corner_of_vertex[number]
+    starts = PathStarts(
+        np.where(vertex < 0, -1, number).astype(np.int32),
+        (corner // 3).astype(np.int32),
+        np.eye(3)[corner % 3],
+        done.found.distance[number],
+        np.full(k, -1, np.int32),
+        np.full(k, -1, np.int32),
+        np.zeros(k),
+    )
+    found = (place.faces, place.barycentric, at.distance, at.root, at.entered, at.crossing)
+    for column, values in zip(starts[1:], found, strict=True):
+        column[of_target] = values[which]
+    return starts
+
+
+def _traced(edges: HalfEdges, done: Searched, starts: PathStarts) -> tuple[AnyArray, FloatArray, IntArray]:
+    """Faces and ends of all segments, and the end of each path's segments; the arrays are doubled until they fit."""
+    room = _ROOM
+    while True:
+        face, place, ends = np.empty(room, np.int32), np.empty((room, 2, 3)), np.zeros(len(starts.vertex), np.int64)
+        n_done = paths.trace_back(edges.tables, done.found, done.starts, starts, face, place, ends)
+        if n_done == len(starts.vertex):
+            n = ends[-1] if n_done else 0
+            return face[:n], place[:n], ends
+        room *= 2
