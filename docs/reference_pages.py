@@ -15,8 +15,8 @@ GROUPS = {
     "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh to_trimesh to_pyvista to_open3d
         mesh.MeshReport mesh.CloudReport terrain mesh.Terrain image_domain mesh.ImageDomain closest_points
         mesh.ClosestPoints mesh.split_long_edges""",
-    "Files": """read_mesh read_polygon_mesh read_point_cloud read_attributes write_mesh write_point_cloud
-        write_curves""",
+    "Files": """read_mesh read_polygon_mesh read_point_cloud read_attributes write_attributes write_mesh
+        write_point_cloud write_curves""",
     "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on curve_through edge_curve",
     "Curves": """isolines curves.offset_curves curves.enclosed_areas curves.sublevel_areas shortest_path shortest_paths
         geodesic_path straighten curves.GeodesicPathSolver curves.handle_loops curves.geodesic_bezier trace_geodesic cut

@@ -37,6 +37,7 @@ from heat_igl.io import read_attributes as read_attributes
 from heat_igl.io import read_mesh as read_mesh
 from heat_igl.io import read_point_cloud as read_point_cloud
 from heat_igl.io import read_polygon_mesh as read_polygon_mesh
+from heat_igl.io import write_attributes as write_attributes
 from heat_igl.io import write_curves as write_curves
 from heat_igl.io import write_mesh as write_mesh
 from heat_igl.io import write_point_cloud as write_point_cloud

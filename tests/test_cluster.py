@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -15,6 +16,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import scipy.io
 
 import heat_igl
 from heat_igl import Mesh, cluster
@@ -217,7 +219,8 @@ def killed_at(crash: int):
 
 
 def begin_fan(store: Path, attributes) -> None:
-    made = Store(store, {"sources": "0 4", "dtype": "float32", "solver": {"method": "auto", "tolerance": 1e-05}})
+    solver = {"method": "auto", "tolerance": 1e-05}
+    made = Store(store, {"sources": "0 4", "dtype": "float32", "normalize": False, "solver": solver})
     made.begin("fan", [np.array([0]), np.array([4])], 7, "float32", attributes)
 
 
@@ -270,7 +273,7 @@ def test_the_format_of_a_store_is_one_that_can_be_read(client, tmp_path):
 
 def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
     (item,) = items({"fan": FAN})
-    task = Task(item, tmp_path / "elsewhere", SourcePlan.of("all"), "float32", {})
+    task = Task(item, tmp_path / "elsewhere", SourcePlan.of("all"), "float32", False, {})
     with pytest.raises(BatchError, match=r"a worker cannot open store .*elsewhere.* Name a folder that .* share"):
         begin([task])
 
@@ -525,3 +528,22 @@ def test_a_bundle_that_kills_its_workers_is_handed_out_again_mesh_by_mesh() -> N
     assert left == [(batch.begin, [task]) for task in tasks]
     assert not run._collect(future, left[1])
     assert run._reason == {tasks[1].item.name: "the workers that tried it died: out of memory, or a crash in a library"}
+
+
+def test_a_data_set_is_symmetric_normalized_and_exact(client, tmp_path, capsys, monkeypatch):
+    cli = pytest.importorskip("heat_igl.cli", exc_type=ImportError)
+    monkeypatch.setattr(cluster, "connected", lambda *_: contextlib.nullcontext(client))
+    meshes = {"a.off": heat_igl.shapes.icosphere(2), "sub/b.ply": heat_igl.shapes.grid(6)}
+    (tmp_path / "in" / "sub").mkdir(parents=True)
+    for name, mesh in meshes.items():
+        heat_igl.write_mesh(tmp_path / "in" / name, mesh)
+    arguments = ["dataset", str(tmp_path / "in"), str(tmp_path / "out"), "--normalize", "--dtype=float16"]
+    assert cli.run([*arguments, "--format=mat"]) == 0
+    assert re.search(r"all pairs on 2 meshes: about \d+ s with \d+ workers, and \d+ MB", capsys.readouterr().err)
+    for name, mesh in meshes.items():
+        found = scipy.io.loadmat(tmp_path / "out" / f"{name}.mat")["distance"]
+        assert (found == found.T).all()
+        expected = heat_igl.reference.exact(mesh, 7) / np.sqrt(mesh.measures.sum())
+        np.testing.assert_allclose(found[7], expected, rtol=2**-11)  # the rounding of float16
+    report = cluster.distances([Mesh(1e5 * mesh.V, mesh.F)], [0], tmp_path / "far", client=client, dtype="float16")
+    assert re.match(r"distances up to .* are no float16: normalize them, or take float32", report.rows[0].reason)

@@ -117,6 +117,35 @@ def test_gifti_without_a_surface_lists_its_arrays(tmp_path: Path, mesh: Mesh) ->
 
 
 @needs_nibabel
+def test_scalars_on_two_surfaces_are_written_to_cifti(tmp_path: Path, mesh: Mesh) -> None:
+    import nibabel
+
+    path, x = tmp_path / "a.dscalar.nii", np.where(mesh.V[:, 2] > 0, mesh.V[:, 0], np.nan)
+    maps = {"cortex_left x": x, "cortex_left y": mesh.V[:, 1], "cortex_right x": x[::-1], "cortex_right y": x[::-1]}
+    heat_igl.write_attributes(path, maps)
+    axes = nibabel.load(path).header
+    assert list(axes.get_axis(0).name) == ["x", "y"]
+    assert [name for name, _, _ in axes.get_axis(1).iter_structures()] == [
+        "CIFTI_STRUCTURE_CORTEX_LEFT",
+        "CIFTI_STRUCTURE_CORTEX_RIGHT",
+    ]
+    assert len(axes.get_axis(1)) == mesh.n_vertices + (mesh.V[:, 2] > 0).sum()
+    found = heat_igl.read_attributes(path)
+    assert found.keys() == maps.keys()
+    for name, values in maps.items():
+        np.testing.assert_array_equal(found[name], values.astype(np.float32))
+    for wrong, said in (
+        ({}, "no maps"),
+        ({"cortex_left x": x, "cortex_right y": x}, "maps of cortex_right are y, and not x"),
+        ({"heat x": x}, "'heat' is no part of a brain"),
+        ({"cortex_left x": mesh.V}, "several numbers per vertex"),
+    ):
+        with pytest.raises(MeshError, match=said):
+            heat_igl.write_attributes(tmp_path / "b.dscalar.nii", wrong)
+    assert not (tmp_path / "b.dscalar.nii").exists()
+
+
+@needs_nibabel
 def test_maps_without_a_surface_are_read_and_matrices_take_them(
     tmp_path: Path, mesh: Mesh, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,8 +164,8 @@ def test_maps_without_a_surface_are_read_and_matrices_take_them(
     maps = heat_igl.read_attributes("halves.dlabel.nii")
     np.testing.assert_array_equal(maps["cortex_left halves"], np.where(inside, parcel, np.nan))
     np.testing.assert_array_equal(maps["cortex_right halves"], 1 - parcel)
-    shape = nibabel.gifti.GiftiDataArray(inside.astype(np.float32), "NIFTI_INTENT_SHAPE")
-    nibabel.GiftiImage(darrays=[shape]).to_filename("inside.shape.gii")
+    heat_igl.write_attributes("inside.shape.gii", {"inside": inside})
+    np.testing.assert_array_equal(nibabel.load("inside.shape.gii").darrays[0].data, inside)
     heat_igl.write_mesh("lh.ply", mesh)
 
     pytest.importorskip("typer")
@@ -153,7 +182,7 @@ def test_maps_without_a_surface_are_read_and_matrices_take_them(
         assert cli.run(["matrix", "lh.ply", "--normalize", "--dtype=float64", f"--output={name}"]) == 0
         assert f"{n} by {n} distances: about" in capsys.readouterr().err
         rows = heat_igl.GeodesicSolver(mesh, tolerance=0).distances(range(n)) / np.sqrt(mesh.measures.sum())
-        np.testing.assert_array_equal(load(name), rows)
+        np.testing.assert_array_equal(load(name), np.minimum(rows, rows.T))
     assert cli.run(["matrix", "lh.ply", "--radius=1", "--parcels=x", "--output=c.npz"]) == 1
     assert not Path("c.npz").exists()
     Path("cut.nii").write_bytes(b"cut")

@@ -1,20 +1,41 @@
-"""The command for many meshes."""
+"""The commands for many meshes."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import unquote
 
+import numpy as np
 import typer
 from rich.console import Console
 
-from heat_igl.cli.options import JsonOption, MethodOption, PointsOption, ToleranceOption, one_of
+import heat_igl
+from heat_igl.cli.matrices import estimated_seconds, make_symmetric, write_matrix
+from heat_igl.cli.options import (
+    DtypeOption,
+    JsonOption,
+    MethodOption,
+    NormalizeOption,
+    PointsOption,
+    ToleranceOption,
+    one_of,
+)
 from heat_igl.cli.output import check_json, print_json, prints_json, say
+from heat_igl.errors import BatchError
+from heat_igl.io import complete_file
+from heat_igl.runtime import n_threads
 
-__all__ = ["batch"]
+if TYPE_CHECKING:
+    from heat_igl.cluster import BatchReport
+
+__all__ = ["batch", "dataset"]
+
+# Meshes of a data set on which queries are timed for the estimate.
+_SAMPLE = 8
 
 
 def batch(
@@ -27,7 +48,8 @@ def batch(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
     method: MethodOption = None,
     tolerance: ToleranceOption = 1e-5,
-    dtype: Annotated[str, typer.Option(help="Of the distances.", callback=one_of(("float32", "float64")))] = "float32",
+    dtype: DtypeOption = "float32",
+    normalize: NormalizeOption = False,
     points: PointsOption = False,
     log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
     dashboard: Annotated[bool, typer.Option(help="Serve Dask's dashboard (needs bokeh).")] = False,
@@ -43,6 +65,7 @@ def batch(
         "method": method,
         "tolerance": tolerance,
         "dtype": dtype,
+        "normalize": normalize,
         "points": points,
         "progress": Console(stderr=True).is_terminal,
     }
@@ -50,6 +73,60 @@ def batch(
         if dashboard:
             say(f"dashboard: {client.dashboard_link}")
         report = cluster.distances(meshes, plan, store, client=client, **options)
+    _finish(report, json_file)
+
+
+def dataset(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of meshes, searched with all below it.")],
+    output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Folder for the files; continued if it is there.")],
+    form: Annotated[
+        str, typer.Option("--format", help="Of the files, one for each mesh.", callback=one_of(("npy", "mat", "zarr")))
+    ] = "npy",
+    normalize: NormalizeOption = False,
+    dtype: DtypeOption = "float32",
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Exact distances between all pairs of vertices on every mesh of a folder, as symmetric matrices in files."""
+    from heat_igl import cluster
+
+    check_json(json_file)
+    meshes = cluster.folder(folder)
+    options: dict[str, Any] = {"method": "exact", "tolerance": 0, "dtype": dtype, "normalize": normalize}
+    store = output / "distances.zarr"
+    with cluster.connected(None, workers) as client, _logged(None):
+        say(_estimate(list(meshes.values()), np.dtype(dtype).itemsize, len(client.nthreads())))
+        report = cluster.distances(
+            meshes, "all", store, client=client, progress=Console(stderr=True).is_terminal, **options
+        )
+    for row in report.rows if form != "zarr" else ():
+        if row.status == "done":
+            found = cluster.read_distances(store, row.name)
+            make_symmetric(found)
+            file = output / f"{unquote(row.name)}.{form}"
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with complete_file(file) as temporary:
+                write_matrix(temporary, f".{form}", found)
+    _finish(report, json_file)
+
+
+def _estimate(paths: list[Path], itemsize: int, n_workers: int) -> str:
+    """What all pairs take, from some of the meshes; a mesh that cannot be read fails later, with its reason."""
+    seconds, size = [], []
+    for path in paths[:: -(-len(paths) // _SAMPLE)]:
+        with suppress(ValueError, OSError, BatchError):
+            mesh = heat_igl.read_mesh(path)
+            seconds.append(estimated_seconds(heat_igl.GeodesicSolver(mesh, tolerance=0), np.arange(mesh.n_vertices)))
+            size.append(mesh.n_vertices**2 * itemsize / 1e6)
+    share = len(paths) / max(len(size), 1)
+    return (
+        f"all pairs on {len(paths)} meshes: about {sum(seconds) * share * n_threads() / n_workers:.0f} s "
+        f"with {n_workers} workers, and {sum(size) * share:.0f} MB"
+    )
+
+
+def _finish(report: BatchReport, json_file: Path | None) -> None:
+    """Print the report of a batch; the status is 1 if anything is missing."""
     if json_file is not None:
         print_json(report.to_dict(), json_file)
     if not prints_json(json_file):

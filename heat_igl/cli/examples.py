@@ -40,6 +40,7 @@ EXAMPLES = {
     ),
     "demo": ("demo", "demo --out results"),
     "batch": ("batch meshes --store distances.zarr --sources farthest:200",),
+    "dataset": ("dataset meshes truth --normalize --format mat",),
 }
 
 

@@ -15,11 +15,12 @@ from rich.console import Console
 import heat_igl
 from heat_igl.applications import Statistic
 from heat_igl.cli.options import (
+    DtypeOption,
     JsonOption,
     MeshArgument,
+    NormalizeOption,
     RegionOption,
     choice,
-    one_of,
     positive,
     region_mask,
     values_of,
@@ -28,13 +29,14 @@ from heat_igl.cli.output import Row, check_json, check_writable, described, prin
 from heat_igl.io import complete_file, read_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.runtime import n_threads
-from heat_igl.typing import AnyArray, BoolArray
+from heat_igl.typing import AnyArray, BoolArray, IntArray
 
-__all__ = ["matrix"]
+__all__ = ["estimated_seconds", "matrix", "write_matrix"]
 
 _DENSE, _SPARSE = (".npy", ".csv", ".mat"), (".npz", ".mat")
 # Queries that are timed for the estimate.
 _SAMPLE = 5
+_ROWS = 512
 
 
 def matrix(
@@ -49,10 +51,8 @@ def matrix(
     ] = None,
     statistic: Annotated[str, choice(Statistic, "Distance between two parcels.")] = "mean",
     region: RegionOption = None,
-    normalize: Annotated[bool, typer.Option("--normalize", help="Divide by the square root of the area.")] = False,
-    dtype: Annotated[
-        str, typer.Option(help="Of all pairs.", callback=one_of(("float16", "float32", "float64")))
-    ] = "float32",
+    normalize: NormalizeOption = False,
+    dtype: DtypeOption = "float32",
     json_file: JsonOption = None,
 ) -> None:
     """Distances between all vertices, those within a radius, or parcels of a surface."""
@@ -76,7 +76,7 @@ def matrix(
             found = heat_igl.parcel_distances(loaded, labels, statistic=kind, region=mask, progress=shows) / unit
         else:
             found = _all_pairs(loaded, temporary, np.dtype(dtype), mask, unit, shows)
-        _write(temporary, output.suffix.lower(), found)
+        write_matrix(temporary, output.suffix.lower(), found)
     rows: list[Row] = [described(mesh, loaded), ("matrix", f"{found.shape[0]} by {found.shape[1]}", list(found.shape))]
     if sp.issparse(found):
         rows.append(("distances", str(found.nnz), found.nnz))
@@ -90,9 +90,7 @@ def _all_pairs(
     n = mesh.n_vertices
     solver = heat_igl.GeodesicSolver(mesh, tolerance=0, region=region)
     vertices = np.flatnonzero(mesh.referenced if region is None else solver.referenced)
-    start = time.perf_counter()
-    solver.distances(vertices[np.linspace(0, len(vertices) - 1, _SAMPLE).astype(int)].tolist())
-    seconds = (time.perf_counter() - start) / _SAMPLE * len(vertices)
+    seconds = estimated_seconds(solver, vertices)
     size = n * n * dtype.itemsize / 1e6
     say(f"{n} by {n} distances: about {seconds:.0f} s on {n_threads()} threads, and {size:.0f} MB")
     out = np.lib.format.open_memmap(path, mode="w+", dtype=dtype, shape=(n, n))
@@ -101,13 +99,34 @@ def _all_pairs(
         for vertex, row in zip(vertices, solver.iter_distances(vertices.tolist()), strict=True):
             out[vertex] = row / unit
             advance(1)
+    make_symmetric(out)
     return out
 
 
-def _write(path: Path, suffix: str, found: Any) -> None:
+def make_symmetric(matrix: AnyArray) -> None:
+    """Give both entries of a pair the lesser: the distance and that of the way back may be rounded differently."""
+    for start in range(0, len(matrix), _ROWS):
+        rows = slice(start, start + _ROWS)
+        lesser = np.minimum(matrix[rows, start:], matrix[start:, rows].T)
+        matrix[rows, start:], matrix[start:, rows] = lesser, lesser.T
+
+
+def estimated_seconds(solver: heat_igl.GeodesicSolver, vertices: IntArray) -> float:
+    """About how long distances from all these vertices take, from the time of a few."""
+    start = time.perf_counter()
+    solver.distances(vertices[np.linspace(0, len(vertices) - 1, _SAMPLE).astype(int)].tolist())
+    return (time.perf_counter() - start) / _SAMPLE * len(vertices)
+
+
+def write_matrix(path: Path, suffix: str, found: Any) -> None:
+    """Write a matrix in the format of a suffix; nothing is done for an array that is the file already."""
     if suffix == ".mat":
-        # On the way through memory, since the file may be the array.
-        scipy.io.savemat(path, {"distance": found if sp.issparse(found) else np.array(found)}, appendmat=False)
+        # On the way through memory, since the file may be the array. The format has no float16.
+        scipy.io.savemat(
+            path,
+            {"distance": found if sp.issparse(found) else np.array(found, np.promote_types(found.dtype, np.float32))},
+            appendmat=False,
+        )
     elif suffix == ".npz":
         with path.open("wb") as file:
             sp.save_npz(file, found)

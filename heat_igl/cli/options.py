@@ -86,6 +86,8 @@ def position(text: str, name: str = "--at") -> list[float]:
     return [x, y, z]
 
 
+DtypeOption = Annotated[str, typer.Option(help="Of the distances.", callback=one_of(("float16", "float32", "float64")))]
+NormalizeOption = Annotated[bool, typer.Option("--normalize", help="Divide by the square root of the area.")]
 MethodOption = Annotated[
     str | None,
     choice(DistanceMethod, "Default: auto, windows on triangles; heat with one of the options of heat."),

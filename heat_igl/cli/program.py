@@ -45,6 +45,7 @@ _MODULES = {
     "view": "views",
     "demo": "views",
     "batch": "collections",
+    "dataset": "collections",
 }
 
 

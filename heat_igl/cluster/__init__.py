@@ -11,12 +11,13 @@ Examples
 [('large', 'done'), ('small', 'done')]
 """
 
-from heat_igl.cluster.batch import distances
+from heat_igl.cluster.batch import DTYPES, distances
 from heat_igl.cluster.collection import folder, read_source_sets
 from heat_igl.cluster.connection import connected
 from heat_igl.cluster.report import BatchReport, BatchRow, read_distances, report
 
 __all__ = [
+    "DTYPES",
     "BatchReport",
     "BatchRow",
     "connected",

@@ -22,7 +22,9 @@ from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.mesh import MeshLike
 from heat_igl.sources import Sources
 
-__all__ = ["distances"]
+__all__ = ["DTYPES", "distances"]
+
+DTYPES = ("float16", "float32", "float64")
 
 _CLUSTER_LOST = "the cluster is lost; what is finished stays in the store: run the same again to go on"
 
@@ -41,6 +43,7 @@ def distances(
     method: DistanceMethod | None = None,
     tolerance: float = 1e-5,
     dtype: str = "float32",
+    normalize: bool = False,
     points: bool = False,
     progress: bool = False,
     **options: Any,
@@ -63,8 +66,10 @@ def distances(
         As for `geodesic_distance`; "auto" by default, and "heat" with an option of heat.
     tolerance : float
         Largest error over the distance, for windows; 0 is exact.
-    dtype : {"float32", "float64"}
+    dtype : {"float16", "float32", "float64"}
         Type to which the distances are rounded.
+    normalize : bool
+        Divide the distances on each mesh by the square root of its area, as benchmarks of shape matching do.
     points : bool
         Read all files as point clouds, by `read_point_cloud`. Otherwise .xyz and .npy files hold points, and a file
         of another format without faces fails.
@@ -94,14 +99,14 @@ def distances(
     at each, and as attributes t, versions, a checksum and the mesh's report. With the same versions on the same kind of
     processor, the bits are those of ``solver.distances(...).astype(dtype)``, however often the batch is interrupted.
     """
-    if dtype not in ("float32", "float64"):
-        raise ValueError(f"dtype must be 'float32' or 'float64', not {dtype!r}")
+    if dtype not in DTYPES:
+        raise ValueError(f"dtype must be one of {', '.join(map(repr, DTYPES))}, not {dtype!r}")
     plan = SourcePlan.of(sources)
     choice = SolverChoice.of(method, tolerance, **options)
     solver = {"method": choice.method, "tolerance": tolerance, **options}
     with locked(Path(store)):
-        opened = Store(store, {"sources": str(plan), "dtype": dtype, "solver": solver})
-        tasks = [Task(item, opened.path.resolve(), plan, dtype, choice) for item in items(meshes, points)]
+        opened = Store(store, {"sources": str(plan), "dtype": dtype, "normalize": normalize, "solver": solver})
+        tasks = [Task(item, opened.path.resolve(), plan, dtype, normalize, choice) for item in items(meshes, points)]
         with ExitStack() as stack:
             client = stack.enter_context(connected()) if client is None else client
             watch = stack.enter_context(watched(client, len(tasks), progress))

@@ -51,6 +51,7 @@ class Task:
     store: Path
     plan: SourcePlan
     dtype: str
+    normalize: bool
     choice: SolverChoice
     blocks: tuple[int, ...] = ()
 
@@ -131,7 +132,7 @@ def _begin(task: Task, store: Store) -> Outcome:
         spans = _spans(group)
         _send("begun", task, blocks=sum(map(len, spans)))
         if spans:
-            _solve(task, group, source_sets, solver, spans[0])
+            _solve(task, mesh, group, source_sets, solver, spans[0])
         return Outcome(name, remaining=tuple(spans[1:]))
 
 
@@ -143,7 +144,7 @@ def _resume(task: Task, store: Store) -> Outcome:
         raise ValueError("the file changed during the batch: run the same again")
     group = store.group(task.item.name)
     with _SOLVERS.solver(mesh, fingerprint, task.choice) as solver:
-        _solve(task, group, group.source_sets(), solver, task.blocks)
+        _solve(task, mesh, group, group.source_sets(), solver, task.blocks)
     return Outcome(task.item.name)
 
 
@@ -233,20 +234,31 @@ def _spans(group: MeshGroup) -> list[tuple[int, ...]]:
 
 def _solve(
     task: Task,
+    mesh: Mesh | PointCloud,
     group: MeshGroup,
     source_sets: Sequence[IntArray],
     solver: Solver,
     blocks: Sequence[int],
 ) -> None:
+    unit = _root_of_area(mesh) if task.normalize else 1.0
     for block in blocks:
         start = time.perf_counter()
         rows = group.rows(block)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", AccuracyWarning)
-            distances = solver.distances(source_sets[rows]).astype(task.dtype, copy=False)
-        group.write(block, distances)
+            distances = solver.distances(source_sets[rows]) / unit
+        largest = np.max(distances, where=np.isfinite(distances), initial=0)
+        if largest > np.finfo(task.dtype).max:
+            raise ValueError(f"distances up to {largest:.4g} are no {task.dtype}: normalize them, or take float32")
+        group.write(block, distances.astype(task.dtype, copy=False))
         messages = sorted({str(warning.message) for warning in caught})
         _send("block", task, block=block, seconds=time.perf_counter() - start, warnings=messages)
+
+
+def _root_of_area(mesh: Mesh | PointCloud) -> float:
+    if isinstance(mesh, PointCloud) or mesh.is_tetrahedral:
+        raise ValueError("only a surface has an area by which distances are normalized: leave `normalize` away")
+    return float(np.sqrt(mesh.measures.sum()))
 
 
 def _send(kind: str, task: Task, **facts: Any) -> None:

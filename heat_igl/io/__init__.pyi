@@ -8,6 +8,7 @@ from heat_igl.io.files import MESH_SUFFIXES as MESH_SUFFIXES
 from heat_igl.io.files import read_attributes as read_attributes
 from heat_igl.io.files import read_mesh as read_mesh
 from heat_igl.io.files import read_polygon_mesh as read_polygon_mesh
+from heat_igl.io.files import write_attributes as write_attributes
 from heat_igl.io.files import write_mesh as write_mesh
 from heat_igl.io.point_clouds import POINT_CLOUD_SUFFIXES as POINT_CLOUD_SUFFIXES
 from heat_igl.io.point_clouds import is_mesh_or_cloud_path as is_mesh_or_cloud_path

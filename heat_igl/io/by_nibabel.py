@@ -17,7 +17,7 @@ from heat_igl.io.packed import form_suffix
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray
 
-__all__ = ["FREESURFER_SUFFIXES", "MAP_SUFFIXES", "read", "read_maps", "write"]
+__all__ = ["FREESURFER_SUFFIXES", "MAP_SUFFIXES", "read", "read_maps", "write", "write_maps"]
 
 # FreeSurfer's files have no extension; these names of surfaces stand in its place.
 FREESURFER_SUFFIXES = (".white", ".pial", ".inflated", ".sphere", ".smoothwm", ".midthickness")
@@ -104,6 +104,45 @@ def read_maps(path: Path, data: bytes) -> dict[str, AnyArray]:
         raise MeshError(f"{path}: nibabel finds no maps here ({error}): it is damaged, or another file") from error
 
 
+def write_maps(path: Path, maps: dict[str, FloatArray]) -> None:
+    """Write maps (n,), to GIFTI as shapes; to CIFTI as scalars, under the names that `read_maps` gives them."""
+    nibabel = _nibabel("writing")
+    if form_suffix(path) == ".gii":
+        arrays: list[tuple[str, AnyArray, dict[str, str]]] = []
+        path.write_bytes(_gifti_image(nibabel, arrays, maps).to_bytes())
+        return
+    surfaces: dict[str, dict[str, FloatArray]] = {}
+    for full, values in maps.items():
+        structure, _, name = full.partition(" ")
+        surfaces.setdefault(structure, {})[name] = values
+    names = list(next(iter(surfaces.values())))
+    models, columns = None, []
+    for structure, found in surfaces.items():
+        if list(found) != names:
+            raise MeshError(f"{path}: the maps of {structure} are {', '.join(found)}, and not {', '.join(names)}")
+        rows = np.array(list(found.values()))
+        inside = ~np.isnan(rows).all(axis=0)
+        try:
+            model = nibabel.cifti2.BrainModelAxis.from_mask(inside, structure)
+        except ValueError:
+            raise MeshError(f"{path}: {structure!r} is no part of a brain: call a map 'cortex_left NAME'") from None
+        models = model if models is None else models + model
+        columns.append(rows[:, inside])
+    header = (nibabel.cifti2.ScalarAxis(names), models)
+    image = nibabel.Cifti2Image(np.hstack(columns).astype(np.float32), header=header)
+    image.nifti_header.set_intent("NIFTI_INTENT_CONNECTIVITY_DENSE_SCALARS")
+    path.write_bytes(image.to_bytes())
+
+
+def _gifti_image(nibabel: Any, arrays: list[tuple[str, AnyArray, dict[str, str]]], maps: dict[str, FloatArray]) -> Any:
+    arrays += [("SHAPE", values.astype("<f4"), {"Name": name}) for name, values in maps.items()]
+    return nibabel.GiftiImage(
+        darrays=[
+            nibabel.gifti.GiftiDataArray(values, f"NIFTI_INTENT_{intent}", meta=meta) for intent, values, meta in arrays
+        ]
+    )
+
+
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     """Write triangles; a GIFTI file also holds arrays (n,)."""
     nibabel = _nibabel("writing")
@@ -118,10 +157,4 @@ def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
         ("POINTSET", mesh.V.astype("<f4"), {}),
         ("TRIANGLE", mesh.F.astype("<i4"), {}),
     ]
-    arrays += [("SHAPE", values.astype("<f4"), {"Name": name}) for name, values in attributes.items()]
-    image = nibabel.GiftiImage(
-        darrays=[
-            nibabel.gifti.GiftiDataArray(values, f"NIFTI_INTENT_{intent}", meta=meta) for intent, values, meta in arrays
-        ]
-    )
-    path.write_bytes(image.to_bytes())
+    path.write_bytes(_gifti_image(nibabel, arrays, attributes).to_bytes())

@@ -248,6 +248,46 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
         pack(path, temporary)
 
 
+def write_attributes(path: str | os.PathLike[str], maps: Mapping[str, ArrayLike]) -> None:
+    """Write maps on surfaces without the surfaces, to GIFTI or CIFTI, as `read_attributes` reads them.
+
+    Parameters
+    ----------
+    path : path-like
+        A file .gii of shapes, or .dscalar.nii of scalars on one surface or several; replaced when it is complete.
+    maps : mapping from str to (n,) array_like
+        In CIFTI the key is "cortex_left NAME"; every surface has the same names, and vertices that are NaN in all maps
+        of a surface are left out. Values are stored in single precision.
+
+    Raises
+    ------
+    MeshError
+        If the format is another one, a map has the wrong shape or type, or a name is none of CIFTI's.
+    MissingExtraError
+        If nibabel is not installed.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.icosphere(1)
+    >>> heat_igl.write_attributes("lh.shape.gii", {"height": mesh.V[:, 2]})
+    >>> list(heat_igl.read_attributes("lh.shape.gii"))
+    ['height']
+    """
+    path = checked_path(path, by_nibabel.MAP_SUFFIXES, by_nibabel.MAP_SUFFIXES)
+    if not maps:
+        raise MeshError(f"{path}: there are no maps to write")
+    arrays = {}
+    for name, values in maps.items():
+        checked = checked_attributes({"map": values}, np.shape(values)[0] if np.ndim(values) else 0)["map"]
+        if checked.ndim > 1:
+            raise MeshError(f"{path}: {name} has several numbers per vertex: write them apart")
+        arrays[name] = checked
+    with replacing(path) as temporary:
+        by_nibabel.write_maps(temporary, arrays)
+        pack(path, temporary)
+
+
 def _those_with(capability: str) -> str:
     names = [suffix for suffix, form in _FORMATS.items() if getattr(form, capability)]
     return ", ".join(names[:-1]) + " and " + names[-1]
