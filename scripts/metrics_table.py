@@ -46,8 +46,7 @@ from heat_igl import (
 from heat_igl.operators import MetricSimplices, Operators
 from heat_igl.sweep.reflex_edges import reflex_edges
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.validation.domains.body_cases import around_the_edge, delaunay, without
-from heat_igl.validation.domains.surface_cases import by_fermat, moved_inside, straight
+from heat_igl.validation.domains import around_the_edge, by_fermat, delaunay, moved_inside, straight, without
 
 from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds
 

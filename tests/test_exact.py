@@ -31,9 +31,9 @@ from surfaces import (
 from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.kernels.mesh import flipping, gluing
-from heat_igl.reference.steiner import graph_distance
 from heat_igl.windows.exact import ExactSurface, exact_distance
 from heat_igl.windows.half_edges import from_mesh
+from tests.steiner import graph_distance
 
 
 def delaunay(mesh: Mesh) -> ExactSurface:

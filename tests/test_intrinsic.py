@@ -42,9 +42,9 @@ from heat_igl.intrinsic import (
 )
 from heat_igl.mesh import split_long_edges
 from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators, tufted_operators
-from heat_igl.reference.steiner import graph_distance, steiner_distance
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import exact_distance
+from tests.steiner import graph_distance, steiner_distance
 
 # --- intrinsic
 

@@ -29,7 +29,7 @@ from heat_igl import (
 )
 from heat_igl.mesh import connectivity, grouping, split_long_edges
 from heat_igl.mesh.connectivity import boundary_loops
-from heat_igl.reference.steiner import graph_distance
+from tests.steiner import graph_distance
 
 # --- Mesh, MeshReport and connectivity on small shapes whose every number can be worked out by hand
 

@@ -17,7 +17,7 @@ from heat_igl import (
     speed_operators,
 )
 from heat_igl.typing import FloatArray
-from heat_igl.validation.domains.body_cases import delaunay, straight
+from heat_igl.validation.domains import delaunay, straight
 
 
 def solver(mesh: Mesh, metric: FloatArray) -> GeodesicSolver:

@@ -22,10 +22,10 @@ from scipy.spatial import Delaunay
 from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.reference import guarded, measurement, native
-from heat_igl.reference.steiner import graph_distance
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
 from heat_igl.validation import closed_forms
+from tests.steiner import graph_distance
 
 SOLVERS = ("windows", *reference.EXACT_SOLVERS)
 

@@ -19,12 +19,13 @@ from heat_igl import (
     geodesic_distance,
     shapes,
 )
+from heat_igl.geodesic import SolverChoice
 from heat_igl.heat.assembly import SourceAssembler
 from heat_igl.heat.several_sources import drop_overtaken
 from heat_igl.intrinsic import mollify
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.domains import CASES, DomainCase, body_cases, solver_for, surface_cases
+from heat_igl.validation.domains import CASES, DomainCase, around_the_wall, by_fermat
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 from tests.conftest import load_script
 
@@ -241,7 +242,7 @@ def test_every_method_stays_within_its_bound(case: DomainCase):
     for method, bound in case.bounds.items():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", heat_igl.AccuracyWarning)
-            found = solver_for(problem.domain, method).distance(problem.sources)
+            found = SolverChoice.of(method).on(problem.domain).distance(problem.sources)
         error = found[away] / problem.exact[away] - 1
         assert np.abs(error).mean() <= bound, method
         # No value in a body is below the straight line by more than one percent.
@@ -255,7 +256,7 @@ def test_refracted_time_obeys_snells_law():
     refracted = np.arcsin(np.sin(incidence) * right / left)
     end = np.stack([0.5 + 0.3 * np.cos(refracted), 0.1 + 0.2 * np.tan(incidence) + 0.3 * np.sin(refracted)], axis=1)
     V = np.concatenate([[[0.3, 0.1]], end])
-    time = surface_cases.by_fermat(np.column_stack([V, np.zeros(5)]), 0, left, right)
+    time = by_fermat(np.column_stack([V, np.zeros(5)]), 0, left, right)
     np.testing.assert_allclose(time[1:], 0.2 / np.cos(incidence) / left + 0.3 / right, rtol=1e-6)
 
 
@@ -263,4 +264,4 @@ def test_a_wall_is_passed_at_both_corners():
     V = np.array([[0.0, 0, 0], [3.0, 1, 0], [5.0, 9, 0], [5.0, 4, 0], [5.0, 4, 3], [4.5, 6, 0]]) - [7, 8, 9]
     to_end = math.hypot(4, 6)
     expected = [0, math.hypot(3, 1), math.hypot(5, 9), to_end + 1 + 2, math.hypot(to_end + 3, 3), to_end + 0.5]
-    np.testing.assert_allclose(body_cases._around_the_wall(V, 0, -3.0, -2.0), expected)
+    np.testing.assert_allclose(around_the_wall(V, 0, -3.0, -2.0), expected)

@@ -24,7 +24,7 @@ from heat_igl.cli.options import (
     ToleranceOption,
     one_of,
 )
-from heat_igl.cli.output import check_json, print_json, prints_json, say
+from heat_igl.cli.output import print_json, prints_json, say
 from heat_igl.errors import BatchError
 from heat_igl.io import complete_file
 from heat_igl.runtime import n_threads
@@ -58,7 +58,6 @@ def batch(
     """Distances on every mesh of a folder, written to a store; resumes if it was interrupted."""
     from heat_igl import cluster
 
-    check_json(json_file)
     meshes = cluster.folder(folder, points)
     plan = sources if sources == "all" or sources.startswith("farthest:") else cluster.read_source_sets(sources)
     options: dict[str, Any] = {
@@ -90,7 +89,6 @@ def dataset(
     """Exact distances between all pairs of vertices on every mesh of a folder, as symmetric matrices in files."""
     from heat_igl import cluster
 
-    check_json(json_file)
     meshes = cluster.folder(folder)
     options: dict[str, Any] = {"method": "exact", "tolerance": 0, "dtype": dtype, "normalize": normalize}
     store = output / "distances.zarr"

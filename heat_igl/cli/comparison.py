@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -13,17 +12,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 import heat_igl
-from heat_igl.cli.options import JsonOption, MeshArgument, PointsOption, positive
-from heat_igl.cli.output import (
-    check_json,
-    check_outputs,
-    described,
-    plan_row,
-    print_json,
-    print_rows,
-    prints_json,
-    say,
-)
+from heat_igl.cli.options import JsonOption, MeshArgument, PictureOption, PointsOption, positive
+from heat_igl.cli.output import described, plan_row, print_json, print_rows, prints_json, say
 from heat_igl.drawing.output import Picture
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.reference.guarded import TIMEOUT
@@ -36,7 +26,6 @@ _DEFAULT_METHODS = "heat,sweep,windows,meshlab,igl"
 
 def info(mesh: MeshArgument, points: PointsOption = False, json_file: JsonOption = None) -> None:
     """Describe a mesh or the triangles of a point cloud: sizes, defects, and properties that affect distances."""
-    check_json(json_file)
     loaded = read_mesh_or_cloud(mesh, points)
     report = loaded.report()
     values = [getattr(report, field.name) for field in fields(report)]
@@ -58,7 +47,7 @@ def validate(
     timeout: Annotated[float, typer.Option(help="Seconds for one native solve.", callback=positive)] = TIMEOUT,
     points: PointsOption = False,
     json_file: JsonOption = None,
-    picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for errors on the surface.")] = None,
+    picture: PictureOption = None,
     fail_above: Annotated[
         float | None,
         typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.", callback=positive),
@@ -67,8 +56,6 @@ def validate(
     """Errors of methods against a reference, with time and memory."""
     loaded = read_mesh_or_cloud(mesh, points)
     drawn_sources = draw_sources(loaded, sources, seed)
-    check_outputs(loaded, None, picture)
-    check_json(json_file)
     console = Console(stderr=True)
     # Without a terminal there is no bar, not even the empty line after a finished one.
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:

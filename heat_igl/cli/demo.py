@@ -15,17 +15,12 @@ from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 from heat_igl.validation import shapes
-from heat_igl.validation.samples import bunny_path
+from heat_igl.validation.samples import bunny_path as sample_mesh
 
 __all__ = ["demonstrate", "sample_mesh"]
 
 _SOURCE = 1234  # on the bunny's haunch: most of the surface is visible from there
 _Rows = list[tuple[str, str]]
-
-
-def sample_mesh() -> Path | None:
-    """Path of the bunny in the pymeshlab wheel, or None without pymeshlab: `heat_igl.sample_mesh` gives a mesh."""
-    return bunny_path()
 
 
 def demonstrate(out: Path) -> _Rows:

@@ -13,30 +13,26 @@ from rich.console import Console
 
 import heat_igl
 from heat_igl.cli.options import (
+    BoundaryOption,
+    CurveOutput,
     JsonOption,
     MeshArgument,
     MethodOption,
+    PictureOption,
     PointsOption,
     RegionOption,
+    SourcesOption,
+    TimeStepOption,
     ToleranceOption,
     choice,
     position,
     positive,
     region_mask,
 )
-from heat_igl.cli.output import (
-    Row,
-    check_curves,
-    check_json,
-    check_outputs,
-    described,
-    plan_row,
-    print_rows,
-    write_distance,
-)
+from heat_igl.cli.output import Row, check_output, described, plan_row, print_rows, write_results, wrote
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import SolverChoice
-from heat_igl.heat import Backend, Boundary, HeatMethodSolver, Laplacian, Magnitude
+from heat_igl.heat import Backend, HeatMethodSolver, Laplacian, Magnitude
 from heat_igl.io import is_flat, read_mesh_or_cloud
 from heat_igl.mesh import Mesh, PointCloud, as_simplices, closest_points
 from heat_igl.sources import vertex_sources
@@ -54,9 +50,7 @@ _MOST_LINES = 10000
 
 def distance(
     mesh: MeshArgument,
-    source: Annotated[
-        list[int] | None, typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
-    ] = None,
+    source: SourcesOption = None,
     at: Annotated[
         list[str] | None, typer.Option(metavar="X,Y,Z", help="Source at the closest point of the surface; repeatable.")
     ] = None,
@@ -67,13 +61,11 @@ def distance(
     output: Annotated[
         Path | None, typer.Option(help="PLY, VTU or GIFTI file for mesh and distance, or NPY or CSV file for it.")
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG file for a picture.")] = None,
-    t_coef: Annotated[
-        float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)
-    ] = None,
+    picture: PictureOption = None,
+    t_coef: TimeStepOption = None,
     t: Annotated[float | None, typer.Option(help="Heat: time step, a squared length.", callback=positive)] = None,
     laplacian: Annotated[str, choice(Laplacian, "Heat: triangulation to solve on.")] = "auto",
-    boundary: Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")] = "neumann",
+    boundary: BoundaryOption = "neumann",
     magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
     backend: Annotated[str, choice(Backend, "Heat: linear solver.")] = "auto",
     points: PointsOption = False,
@@ -90,8 +82,7 @@ def distance(
         places, gap = closest_points(loaded, [position(text) for text in at])
         sources = places if vertices is None else [vertices, places]
         gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap), gap.tolist())]
-    check_outputs(loaded, output, picture)
-    check_json(json_file)
+    check_output(loaded, output)
     mask = None if region is None else region_mask(mesh, region)
     chosen = _choice(
         method,
@@ -106,9 +97,8 @@ def distance(
     with Console(stderr=True).status("measuring"):
         _warm_up(loaded, chosen)
         phi, about = _measured(loaded, sources, chosen, cutoff, mask)
-    written = _write(loaded, phi, vertices, output, picture)
-    rows = [*_summary(mesh, loaded, phi, cutoff), *about, *gaps]
-    print_rows([*rows, *(("wrote", str(path)) for path in written)], json_file)
+    written = write_results(loaded, phi, output, picture, lambda: heat_igl.plots.plot(loaded, phi, sources=vertices))
+    print_rows([*_summary(mesh, loaded, phi, cutoff), *about, *gaps, *written], json_file)
 
 
 def _choice(method: str | None, tolerance: float, **options: Any) -> SolverChoice:
@@ -153,21 +143,17 @@ def _warm_up(mesh: Mesh | PointCloud, choice: SolverChoice) -> None:
 
 def isolines(
     mesh: MeshArgument,
-    source: Annotated[
-        list[int], typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
-    ],
+    source: SourcesOption,
     spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
-    output: Annotated[Path, typer.Option(help="OBJ, PLY, VTP, CSV, SVG or DXF file; in SVG dotted behind.")],
+    output: CurveOutput,
     method: MethodOption = None,
     tolerance: ToleranceOption = 1e-5,
     points: PointsOption = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Curves of equal distance from one or more source vertices."""
+    """Curves of equal distance from one or more source vertices; in SVG they are dotted behind the surface."""
     loaded = as_simplices(read_mesh_or_cloud(mesh, points))
     sources = vertex_sources(np.array(source), loaded.n_vertices)
-    check_curves(output)
-    check_json(json_file)
     phi, _ = _measured(loaded, sources, _choice(method, tolerance), None)
     farthest = float(phi[np.isfinite(phi)].max())
     if farthest < spacing:
@@ -184,24 +170,7 @@ def isolines(
         heat_igl.write_curves(output, loaded, {f"{level:g}": each for level, each in zip(levels, curves, strict=True)})
     n = sum(map(len, curves))
     rows: list[Row] = [("farthest", f"{farthest:.6g}", farthest), ("lines", f"{n} at {len(levels)} distances", n)]
-    print_rows([*rows, ("distances", f"{spacing:g} apart", levels.tolist()), ("wrote", str(output))], json_file)
-
-
-def _write(
-    mesh: Mesh | PointCloud, phi: FloatArray, sources: Any, output: Path | None, picture: Path | None
-) -> list[Path]:
-    drawn = None
-    if picture is not None:
-        from heat_igl.drawing import plot
-
-        # Drawing comes before writing, since it may still fail.
-        with Console(stderr=True).status("drawing"):
-            drawn = plot(mesh, phi, sources=sources)
-    if output is not None:
-        write_distance(output, mesh, phi)
-    if drawn is not None and picture is not None:
-        drawn.save(picture)
-    return [path for path in (output, picture) if path is not None]
+    print_rows([*rows, ("distances", f"{spacing:g} apart", levels.tolist()), *wrote(output)], json_file)
 
 
 def _summary(path: Path, mesh: Mesh | PointCloud, phi: FloatArray, cutoff: float | None) -> list[Row]:

@@ -25,7 +25,7 @@ from heat_igl.cli.options import (
     region_mask,
     values_of,
 )
-from heat_igl.cli.output import Row, check_json, check_writable, described, print_rows, say
+from heat_igl.cli.output import Row, check_writable, described, print_rows, say, wrote
 from heat_igl.io import complete_file, read_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.runtime import n_threads
@@ -62,7 +62,6 @@ def matrix(
     if radius is not None and parcels is not None:
         raise ValueError("--radius and --parcels ask for different matrices: leave one of them away")
     check_writable(output)
-    check_json(json_file)
     loaded = read_mesh(mesh)
     mask = None if region is None else region_mask(mesh, region)
     unit = float(np.sqrt(loaded.measures.sum())) if normalize else 1.0
@@ -80,7 +79,7 @@ def matrix(
     rows: list[Row] = [described(mesh, loaded), ("matrix", f"{found.shape[0]} by {found.shape[1]}", list(found.shape))]
     if sp.issparse(found):
         rows.append(("distances", str(found.nnz), found.nnz))
-    print_rows([*rows, ("wrote", str(output))], json_file)
+    print_rows([*rows, *wrote(output)], json_file)
 
 
 def _all_pairs(

@@ -9,17 +9,24 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
+from heat_igl.cli.output import check_curves, check_json, check_picture
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.geodesic import DistanceMethod
+from heat_igl.heat import Boundary
 from heat_igl.io import MAP_SUFFIXES, read_attributes
 from heat_igl.typing import AnyArray, BoolArray
 
 __all__ = [
+    "BoundaryOption",
+    "CurveOutput",
     "JsonOption",
     "MeshArgument",
     "MethodOption",
+    "PictureOption",
     "PointsOption",
     "RegionOption",
+    "SourcesOption",
+    "TimeStepOption",
     "ToleranceOption",
     "choice",
     "one_of",
@@ -47,7 +54,22 @@ RegionOption = Annotated[
 ]
 JsonOption = Annotated[
     Path | None,
-    typer.Option("--json", metavar="FILE", help="JSON file for the results; with - they are printed as JSON."),
+    typer.Option(
+        "--json",
+        metavar="FILE",
+        help="JSON file for the results; with - they are printed as JSON.",
+        callback=check_json,
+    ),
+]
+PictureOption = Annotated[
+    Path | None, typer.Option("--picture", help="PNG, PDF or SVG file for a picture.", callback=check_picture)
+]
+CurveOutput = Annotated[
+    Path,
+    typer.Option("--output", help="OBJ, PLY, VTP, CSV, SVG or DXF file for the curves.", callback=check_curves),
+]
+SourcesOption = Annotated[
+    list[int] | None, typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
 ]
 
 
@@ -92,6 +114,10 @@ MethodOption = Annotated[
     str | None,
     choice(DistanceMethod, "Default: auto, windows on triangles; heat with one of the options of heat."),
 ]
+TimeStepOption = Annotated[
+    float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)
+]
+BoundaryOption = Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")]
 ToleranceOption = Annotated[float, typer.Option(help="Largest error over the distance, of windows; 0 is exact.")]
 
 

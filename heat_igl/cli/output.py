@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -19,12 +19,16 @@ from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.plan import Plan
 from heat_igl.typing import FloatArray
 
+if TYPE_CHECKING:
+    from heat_igl.drawing import Picture
+
 __all__ = [
     "Row",
     "check_curves",
     "check_json",
-    "check_outputs",
+    "check_output",
     "check_page",
+    "check_picture",
     "check_writable",
     "described",
     "plan_row",
@@ -32,7 +36,8 @@ __all__ = [
     "print_rows",
     "prints_json",
     "say",
-    "write_distance",
+    "write_results",
+    "wrote",
 ]
 
 # For distances alone: an array of numpy, and text with a line per vertex.
@@ -98,10 +103,16 @@ def prints_json(json_file: Path | None) -> bool:
     return json_file == _STANDARD_OUTPUT
 
 
-def check_json(json_file: Path | None) -> None:
-    """Check that JSON can be written to `json_file`."""
+def wrote(*paths: Path | None) -> list[Row]:
+    """The lines that name the files that were written."""
+    return [("wrote", str(path)) for path in paths if path is not None]
+
+
+def check_json(json_file: Path | None) -> Path | None:
+    """Check that JSON can be written to the value of an option."""
     if json_file is not None and json_file != _STANDARD_OUTPUT:
         check_writable(json_file)
+    return json_file
 
 
 def check_writable(path: Path) -> None:
@@ -134,22 +145,8 @@ def check_page(path: Path) -> None:
     check_writable(path)
 
 
-def check_outputs(mesh: Mesh | PointCloud, output: Path | None, picture: Path | None) -> None:
-    """Check that mesh and distance can be written to `output`, and a picture to `picture`."""
-    if output is not None:
-        kind = "distances"
-        with_mesh: tuple[str, ...] = (".ply", ".vtu", ".gii")
-        if isinstance(mesh, PointCloud):
-            kind, with_mesh = "points with distances", (".ply",)
-        elif mesh.is_tetrahedral:
-            kind, with_mesh = "tetrahedra with distances", (".vtu",)
-        accepted = with_mesh + ARRAY_SUFFIXES
-        if output.suffix.lower() not in accepted:
-            raise MeshError(f"--output {output}: {kind} go to {', '.join(accepted[:-1])} or {accepted[-1]} files")
-        for suffix, package, extra in ((".vtu", "meshio", "io"), (".gii", "nibabel", "io")):
-            if output.suffix.lower() == suffix:
-                MissingExtraError.check(f"a {suffix} file", package, extra)
-        check_writable(output)
+def check_picture(picture: Path | None) -> Path | None:
+    """Check that a picture can be written to the value of an option."""
     if picture is not None:
         from heat_igl.drawing.output import PICTURE_SUFFIXES
 
@@ -157,9 +154,49 @@ def check_outputs(mesh: Mesh | PointCloud, output: Path | None, picture: Path | 
             raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
         MissingExtraError.check("a picture", "matplotlib", "view")
         check_writable(picture)
+    return picture
 
 
-def write_distance(path: Path, mesh: Mesh | PointCloud, distance: FloatArray) -> None:
+def check_output(mesh: Mesh | PointCloud, output: Path | None) -> None:
+    """Check that mesh and distance can be written to `output`."""
+    if output is None:
+        return
+    kind = "distances"
+    with_mesh: tuple[str, ...] = (".ply", ".vtu", ".gii")
+    if isinstance(mesh, PointCloud):
+        kind, with_mesh = "points with distances", (".ply",)
+    elif mesh.is_tetrahedral:
+        kind, with_mesh = "tetrahedra with distances", (".vtu",)
+    accepted = with_mesh + ARRAY_SUFFIXES
+    suffix = output.suffix.lower()
+    if suffix not in accepted:
+        raise MeshError(f"--output {output}: {kind} go to {', '.join(accepted[:-1])} or {accepted[-1]} files")
+    if suffix in (".vtu", ".gii"):
+        MissingExtraError.check(f"a {suffix} file", "meshio" if suffix == ".vtu" else "nibabel", "io")
+    check_writable(output)
+
+
+def write_results(
+    mesh: Mesh | PointCloud,
+    distance: FloatArray,
+    output: Path | None,
+    picture: Path | None,
+    draw: Callable[[], Picture],
+) -> list[Row]:
+    """Write a distance, and the picture that `draw` makes of it, to those files that are asked for."""
+    drawn = None
+    if picture is not None:
+        # Drawing comes before writing, since it may still fail.
+        with Console(stderr=True).status("drawing"):
+            drawn = draw()
+    if output is not None:
+        _write_distance(output, mesh, distance)
+    if drawn is not None and picture is not None:
+        drawn.save(picture)
+    return wrote(output, picture)
+
+
+def _write_distance(path: Path, mesh: Mesh | PointCloud, distance: FloatArray) -> None:
     """Write a distance: with the mesh or the points, or alone to one of the `ARRAY_SUFFIXES`."""
     suffix = path.suffix.lower()
     if suffix not in ARRAY_SUFFIXES:
@@ -176,10 +213,11 @@ def write_distance(path: Path, mesh: Mesh | PointCloud, distance: FloatArray) ->
             file.write("\n".join(["vertex,distance", *lines, ""]).encode("ascii"))
 
 
-def check_curves(output: Path) -> None:
-    """Check that curves can be written to `output`."""
+def check_curves(output: Path) -> Path:
+    """Check that curves can be written to the value of an option."""
     if output.suffix.lower() not in CURVE_SUFFIXES:
         raise ValueError(f"--output {output}: curves go to {', '.join(CURVE_SUFFIXES)} files")
     if output.suffix.lower() == ".dxf":
         MissingExtraError.check("a .dxf file", "ezdxf", "io")
     check_writable(output)
+    return output

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 import typer
 
 import heat_igl
-from heat_igl.cli.examples import epilog
 from heat_igl.cli.output import say
 from heat_igl.errors import (
     AccuracyWarning,
@@ -23,7 +22,7 @@ from heat_igl.errors import (
     ReferenceSolverError,
 )
 
-__all__ = ["application", "run_program"]
+__all__ = ["EXAMPLES", "application", "run_program"]
 
 # Errors that a user can cause. Any other exception is a fault of the package and shows a traceback.
 _EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
@@ -38,15 +37,46 @@ _MODULES = {
     "distance": "distances",
     "matrix": "matrices",
     "isolines": "distances",
-    "path": "paths",
-    "trace": "paths",
-    "signed": "regions",
-    "cut": "regions",
+    "path": "curves",
+    "trace": "curves",
+    "signed": "curves",
+    "cut": "curves",
     "view": "views",
     "demo": "views",
     "batch": "collections",
     "dataset": "collections",
 }
+
+#: Examples for the help of the commands.
+EXAMPLES = """
+info bunny.obj
+info lh.pial --json -
+validate bunny.obj
+validate bunny.obj --methods heat,windows --sources 10 --picture errors.png
+distance bunny.obj --source 1234 --output distance.ply --picture distance.png
+distance bunny.obj --source 12 --source 40 --cutoff 0.1 --output distance.npy
+distance bunny.obj --at 0.3,0.1,0 --method exact --json -
+distance scan.xyz --source 1234 --output distance.ply --picture distance.png
+matrix lh.midthickness --radius 20 --region cortex.npy --output within.npz
+matrix lh.gii --parcels atlas.dlabel.nii::cortex_left --output parcels.csv
+matrix bunny.obj --normalize --dtype float16 --output all.npy
+isolines bunny.obj --source 1234 --spacing 0.05 --output lines.obj
+isolines bunny.obj --source 1234 --spacing 0.05 --output lines.svg
+path bunny.obj --from 12 --to 2000 --output path.obj
+path bunny.obj 12 2000 0.1,0.2,0.05 --output path.obj
+trace bunny.obj --from 12 --direction 1,0,0 --length 0.1 --output line.obj
+signed bunny.obj --curves loops.obj --output signed.ply
+cut bunny.obj --curves loops.obj --output cut.ply
+cut bunny.obj --curves loops.obj --output part.ply --split
+view bunny.obj --source 1234
+view bunny.obj --html bunny.html --exact
+view bunny.obj --html signed.html --curves loops.obj
+view scan.ply --points
+demo
+demo --out results
+batch meshes --store distances.zarr --sources farthest:200
+dataset meshes truth --normalize --format mat
+""".strip().splitlines()
 
 
 def application(asked: str | None = None) -> typer.Typer:
@@ -56,8 +86,10 @@ def application(asked: str | None = None) -> typer.Typer:
     )
     app.callback(invoke_without_command=True)(_version)
     for name in [asked] if asked in _MODULES else _MODULES:
-        command = getattr(import_module(f"heat_igl.cli.{_MODULES[name]}"), name.replace("-", "_"))
-        app.command(name, epilog=epilog(name))(command)
+        examples = [f"  heat-igl {example}" for example in EXAMPLES if example.split()[0] == name]
+        # click keeps the lines of a paragraph that begins with this character.
+        epilog = "\n".join(["\b", "Examples:", *examples])
+        app.command(name, epilog=epilog)(getattr(import_module(f"heat_igl.cli.{_MODULES[name]}"), name))
     return app
 
 

@@ -13,29 +13,33 @@ import typer
 from rich.console import Console
 
 from heat_igl import reference
+from heat_igl.cli.curves import projected
 from heat_igl.cli.demo import demonstrate
-from heat_igl.cli.options import JsonOption, MeshArgument, MethodOption, PointsOption, ToleranceOption, choice, positive
+from heat_igl.cli.options import (
+    BoundaryOption,
+    JsonOption,
+    MeshArgument,
+    MethodOption,
+    PointsOption,
+    SourcesOption,
+    TimeStepOption,
+    ToleranceOption,
+)
 from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows
-from heat_igl.cli.regions import projected
 from heat_igl.geodesic import SolverChoice
-from heat_igl.heat import Boundary, SignedHeatSolver
+from heat_igl.heat import SignedHeatSolver
 from heat_igl.io import read_mesh_or_cloud
-from heat_igl.mesh import Mesh, PointCloud, as_simplices
+from heat_igl.mesh import as_simplices
 from heat_igl.sources import vertex_sources
-from heat_igl.typing import FloatArray
 
 __all__ = ["demo", "view"]
 
 
 def view(
     mesh: MeshArgument,
-    source: Annotated[
-        list[int] | None, typer.Option(metavar="VERTEX", help="Source vertex to start with; repeat for several.")
-    ] = None,
-    t_coef: Annotated[
-        float | None, typer.Option(help="Time step in squared mean edge lengths.", callback=positive)
-    ] = None,
-    boundary: Annotated[str, choice(Boundary, "What heat does at the boundary.")] = "neumann",
+    source: SourcesOption = None,
+    t_coef: TimeStepOption = None,
+    boundary: BoundaryOption = "neumann",
     method: MethodOption = None,
     tolerance: ToleranceOption = 1e-5,
     exact: Annotated[bool, typer.Option("--exact", help="Show the exact distance beside it; takes seconds.")] = False,
@@ -51,13 +55,14 @@ def view(
 
     target = html or Path(f"{mesh.stem}-view.html")
     check_page(target)
-    check_json(json_file)
     loaded = read_mesh_or_cloud(mesh, points)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
     with Console(stderr=True).status("measuring"):
         solver = SolverChoice.of(method, tolerance, t_coef=t_coef, boundary=boundary).on(loaded)
         fields = {"exact": reference.exact(as_simplices(loaded), sources)} if exact else {}
-        fields |= {} if curves is None else _signed(loaded, curves)
+        if curves is not None:
+            surface = as_simplices(loaded)
+            fields["signed distance"] = SignedHeatSolver(surface).distance(projected(surface, curves))
         shown = page(
             loaded, solver.distance(sources), sources=sources, title=mesh.name, method=f"Distance by {solver.plan}.",
             fields=fields, beside=next(iter(fields), None),
@@ -70,15 +75,11 @@ def view(
     print_rows([described(mesh, loaded), written], json_file)
 
 
-def _signed(mesh: Mesh | PointCloud, curves: Path) -> dict[str, FloatArray]:
-    """The signed distance from the polylines of a file, as a field by name."""
-    surface = as_simplices(mesh)
-    return {"signed distance": SignedHeatSolver(surface).distance(projected(surface, curves))}
-
-
 def demo(
     out: Annotated[Path, typer.Option(help="Directory for the results; made if missing.")] = Path("heat-igl-demo"),
-    json_file: JsonOption = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="As for the other commands; may be in that directory.")
+    ] = None,
 ) -> None:
     """Distance on a real mesh, with errors against exact distance, files and a picture."""
     out.mkdir(parents=True, exist_ok=True)

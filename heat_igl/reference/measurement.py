@@ -7,30 +7,32 @@ source reaches is ``inf``, whatever number the solver would write there.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from heat_igl.errors import MeshError, MissingExtraError, ReferenceSolverError
-from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.reference import guarded
-from heat_igl.reference.checks import require_between_bounds, require_finite, require_manifold
+from heat_igl.reference.bounds import edge_paths, straight_lines
 from heat_igl.reference.guarded import MEMORY, TIMEOUT
 from heat_igl.runtime import PeakMemory
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import exact_distance
 
-__all__ = ["EXACT_SOLVERS", "WINDOWS", "Measured", "exact_solver", "measured"]
+__all__ = ["EXACT_SOLVERS", "WINDOWS", "Measured", "measured"]
 
 #: The exact solver of this package, which `exact` takes unless told otherwise.
 WINDOWS = "windows"
 #: The exact solvers of other packages, for a second opinion; the last one needs no extra.
 EXACT_SOLVERS = ("pygeodesic", "gdist", "igl")
 
+# An exact distance outside the bounds by more than this fraction is wrong. Rounding is near 1e-15.
+_OUTSIDE = 1e-9
 # At needles, rounded lengths move distances by about 1e-8 of themselves.
 _AT_NEEDLES = 1e-7
 
@@ -44,20 +46,17 @@ class _Solver:
     package: str = ""
     extra: str = "validate"
     is_exact: bool = False
-    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 _SOLVERS = {
     "gdist": _Solver("gdist_exact", "gdist", "tvb-gdist", is_exact=True),
     "pygeodesic": _Solver("pygeodesic_exact", "pygeodesic", "pygeodesic", is_exact=True),
     "igl": _Solver("igl_exact", "igl", is_exact=True),
-    "igl_heat": _Solver("igl_heat", "igl", options={"t": None, "intrinsic_delaunay": False}),
+    "igl_heat": _Solver("igl_heat", "igl"),
     "meshlab": _Solver("meshlab_front", "pymeshlab", "pymeshlab"),
     "meshlab_border": _Solver("meshlab_border", "pymeshlab", "pymeshlab"),
-    "meshlab_heat": _Solver("meshlab_heat", "pymeshlab", "pymeshlab", options={"m": 1.0}),
-    "potpourri3d_heat": _Solver(
-        "potpourri3d_heat", "potpourri3d", "potpourri3d", "bench", options={"t_coef": 1.0, "use_robust": True}
-    ),
+    "meshlab_heat": _Solver("meshlab_heat", "pymeshlab", "pymeshlab"),
+    "potpourri3d_heat": _Solver("potpourri3d_heat", "potpourri3d", "potpourri3d", "bench"),
 }
 
 
@@ -81,11 +80,6 @@ class Measured:
     precompute_seconds: float
     solve_seconds: float
     peak_memory: int | None
-
-
-def exact_solver() -> str:
-    """The exact solver that is taken by default: "windows", that of this package."""
-    return WINDOWS
 
 
 def measured(
@@ -117,7 +111,7 @@ def measured(
     """
     mesh = as_simplices(mesh)
     if solver == "exact":
-        solver = exact_solver()
+        solver = WINDOWS
     chosen = _SOLVERS.get(solver)
     if chosen is None and solver != WINDOWS:
         names = ", ".join(("exact", WINDOWS, *_SOLVERS))
@@ -134,7 +128,7 @@ def measured(
     to_boundary = solver == "meshlab_border"
     seeds = np.flatnonzero(mesh.boundary) if to_boundary else vertex_sources(sources, mesh.n_vertices)
     if chosen.is_exact:
-        require_manifold(mesh, seeds)
+        _require_manifold(mesh, seeds)
 
     def run(part: Mesh, part_seeds: IntArray) -> guarded.Reply:
         arrays = {"V": part.V, "F": part.F}
@@ -143,14 +137,14 @@ def measured(
         reply = guarded.call(
             f"heat_igl.reference.native:{chosen.function}",
             arrays,
-            {**chosen.options, **options},
+            options,
             timeout=timeout,
             memory=memory,
         )
         distance = reply.values["distance"]
-        require_finite(solver, part, distance)
+        _require_finite(solver, part, distance)
         if chosen.is_exact:
-            require_between_bounds(solver, part, part_seeds, distance)
+            _require_between_bounds(solver, part, part_seeds, distance)
         return reply
 
     return _over_components(mesh, seeds, run)
@@ -170,7 +164,7 @@ def _by_windows(mesh: Mesh, seeds: IntArray) -> Measured:
         raise ReferenceSolverError(f"{WINDOWS} did not reach the components of the sources: report this as a bug")
     # Where triangles have hardly any height, edges were rounded or made longer.
     slack = _AT_NEEDLES * float(mesh.edge_lengths.mean())
-    require_between_bounds(WINDOWS, mesh, seeds, distance, tolerance=_AT_NEEDLES, slack=slack)
+    _require_between_bounds(WINDOWS, mesh, seeds, distance, tolerance=_AT_NEEDLES, slack=slack)
     return Measured(distance, 0.0, seconds, peak.bytes)
 
 
@@ -197,3 +191,80 @@ def _over_components(mesh: Mesh, seeds: IntArray, run: Callable[[Mesh, IntArray]
         peaks.append(reply.peak_memory)
     known = [peak for peak in peaks if peak is not None]
     return Measured(distance, float(costs[0]), float(costs[1]), max(known) if len(known) == len(peaks) else None)
+
+
+def _require_manifold(mesh: Mesh, seeds: IntArray) -> None:
+    """Refuse defects by which the exact solvers crash or return too long a distance.
+
+    Only the components of the seeds must be free of them.
+
+    Raises
+    ------
+    ReferenceSolverError
+        If an edge has more than two triangles or no length, or two surfaces touch in a vertex.
+    """
+    around = np.isin(mesh.components, mesh.components[seeds])
+    faces = mesh.F[around[mesh.F[:, 0]]]
+    if not len(faces):
+        return
+    remedy = "repair the mesh (mesh.report() lists the places), or compare with reference.meshlab"
+    found = connectivity.facets(faces, mesh.n_vertices)
+    crowded = found.vertices[found.n_faces > 2]
+    if len(crowded):
+        raise ReferenceSolverError(
+            f"{len(crowded)} edges connected with the sources belong to more than two triangles (first: "
+            f"{crowded[0].tolist()}), and exact solvers crash on such meshes: {remedy}"
+        )
+    pinched = connectivity.nonmanifold_vertices(faces, found, mesh.n_vertices)
+    if len(pinched):
+        raise ReferenceSolverError(
+            f"at {len(pinched)} vertices connected with the sources two surfaces touch in a point (first: "
+            f"{pinched[0]}), and exact solvers find no path through it: {remedy}"
+        )
+    collapsed = mesh.edges[(mesh.edge_lengths == 0) & around[mesh.edges[:, 0]]]
+    if len(collapsed):
+        raise ReferenceSolverError(
+            f"{len(collapsed)} edges connected with the sources have length zero (first: {collapsed[0].tolist()}), "
+            "by which exact solvers divide: merge vertices that lie in one place"
+        )
+
+
+def _require_finite(name: str, mesh: Mesh, distance: FloatArray) -> None:
+    """Refuse a distance that has the wrong shape, or is not finite on a connected mesh.
+
+    Raises
+    ------
+    ReferenceSolverError
+        With the name of the solver.
+    """
+    if distance.shape != (mesh.n_vertices,):
+        raise ReferenceSolverError(
+            f"{name} returned an array of shape {distance.shape} for {mesh.n_vertices} vertices: report this as a bug"
+        )
+    n_bad = int((~np.isfinite(distance)).sum())
+    if n_bad:
+        raise ReferenceSolverError(
+            f"{name} returned {n_bad} of {mesh.n_vertices} distances that are not finite on one connected component: "
+            "look for slivers and zero areas with mesh.report()"
+        )
+
+
+def _require_between_bounds(
+    name: str, mesh: Mesh, seeds: IntArray, distance: FloatArray, *, tolerance: float = _OUTSIDE, slack: float = 0.0
+) -> None:
+    """Refuse a distance that claims to be exact and is outside the bounds that hold on every mesh.
+
+    By more than the fraction `tolerance` of the bound and the length `slack`.
+
+    Raises
+    ------
+    ReferenceSolverError
+        With the name of the solver.
+    """
+    too_short = distance < straight_lines(mesh, seeds) * (1 - tolerance) - slack
+    too_long = distance > edge_paths(mesh, seeds) * (1 + tolerance) + slack
+    if too_short.any() or too_long.any():
+        raise ReferenceSolverError(
+            f"{name} is wrong on this mesh: {int(too_short.sum())} vertices are nearer than a straight line and "
+            f"{int(too_long.sum())} farther than a path along edges; look for zero areas with mesh.report()"
+        )

@@ -93,7 +93,7 @@ def igl_exact(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]:
 
 
 def igl_heat(
-    V: FloatArray, F: IntArray, sources: IntArray, t: float | None, intrinsic_delaunay: bool
+    V: FloatArray, F: IntArray, sources: IntArray, t: float | None = None, intrinsic_delaunay: bool = False
 ) -> dict[str, Any]:
     """The heat method of libigl, on the mesh as it is."""
     import igl
@@ -110,7 +110,9 @@ def igl_heat(
     return _outcome(distance, start, ready, time.perf_counter())
 
 
-def potpourri3d_heat(V: FloatArray, F: IntArray, sources: IntArray, t_coef: float, use_robust: bool) -> dict[str, Any]:
+def potpourri3d_heat(
+    V: FloatArray, F: IntArray, sources: IntArray, t_coef: float = 1.0, use_robust: bool = True
+) -> dict[str, Any]:
     """The heat method of geometry-central through potpourri3d, on the mesh as it is."""
     import potpourri3d
 
@@ -136,7 +138,7 @@ def meshlab_border(V: FloatArray, F: IntArray) -> dict[str, Any]:
     return _filtered(V, F, None, "compute_scalar_by_border_distance_per_vertex", {})
 
 
-def meshlab_heat(V: FloatArray, F: IntArray, sources: IntArray, m: float) -> dict[str, Any]:
+def meshlab_heat(V: FloatArray, F: IntArray, sources: IntArray, m: float = 1.0) -> dict[str, Any]:
     """MeshLab's heat method, in single precision."""
     name = "compute_scalar_by_heat_geodesic_distance_from_selection_per_vertex"
     return _filtered(V, F, sources, name, {"m": m})

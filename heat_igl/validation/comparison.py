@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.validation import metrics
-from heat_igl.validation.methods import METHODS, Counter, Method, Progress, Run, Solver, resolved, run
+from heat_igl.validation.methods import METHODS, Method, Progress, Run, Solver, resolved, run
 from heat_igl.validation.metrics import BoundViolations
 from heat_igl.validation.report import ValidationReport, ValidationRow
 
@@ -102,34 +103,38 @@ def validate(
         raise ValueError(f"methods is empty: choose from {', '.join(METHODS)}, or leave it out for the default")
     if len({label for label, _ in chosen}) < len(chosen):
         raise ValueError(f"methods must have different names, not {', '.join(label for label, _ in chosen)}")
-    counter = Counter(progress, len(sets) * (len(chosen) + (reference is not None)))
+    total = len(sets) * (len(chosen) + (reference is not None))
+    done = 0
+
+    def begun(label: str, index: int) -> None:
+        if progress is not None:
+            progress(label, done + index, total)
+
     bounds = {"timeout": timeout, "memory": memory}
     failure = None
     try:
-        label, truths, known = _truths(mesh, sets, reference, bounds, counter)
+        label, truths, known = _truths(mesh, sets, reference, bounds, begun)
     except ReferenceSolverError as error:
         # The rest of the report needs no reference.
         label, truths, known, failure = str(reference), None, None, str(error)
-        counter.end_method()
     limits = [(straight_lines(mesh, sources), edge_paths(mesh, sources)) for sources in sets]
     rows, distances = [], {}
-    for method, prepare in chosen:
+    for i, (method, prepare) in enumerate(chosen, start=int(reference is not None)):
+        done = i * len(sets)
         try:
             if known is not None and method == label:
                 found = known
-                counter.begin_method(len(sets))
-                counter.end_method()
             elif failure is not None and method == label:
                 raise ReferenceSolverError(failure)
             else:
-                found = run(domain, sets, method, prepare, bounds, counter)
+                found = run(domain, sets, method, prepare, bounds, begun)
         except (ReferenceSolverError, MissingExtraError, FactorizationError, MeshError) as error:
-            counter.end_method()
             rows.append(ValidationRow(method, failure=str(error)))
             continue
-        distances[method] = found.distances
-        rows.append(_row(mesh, sets, method, found, truths, limits))
-    counter.finish()
+        distances[method], cost = found
+        rows.append(_row(mesh, sets, method, distances[method], truths, limits, cost))
+    if progress is not None:
+        progress("done", total, total)
     return ValidationReport(name, mesh, label, tuple(sets), tuple(rows), truths, distances, failure)
 
 
@@ -161,22 +166,20 @@ def _truths(
     sets: list[IntArray],
     reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None,
     bounds: Mapping[str, float],
-    counter: Counter,
+    begun: Callable[[str, int], None],
 ) -> tuple[str | None, FloatArray | None, Run | None]:
     """Name and distances of the reference, and the run if it is a method."""
     if reference is None:
         return None, None, None
     if isinstance(reference, str):
-        found = run(mesh, sets, *resolved(reference), bounds, counter)
-        return reference, found.distances, found
-    counter.begin_method(len(sets))
+        found = run(mesh, sets, *resolved(reference), bounds, begun)
+        return reference, found[0], found
     if callable(reference):
-        counter.step("reference")
+        begun("reference", 0)
         given: AnyArray = np.stack([reference(mesh, sources) for sources in sets])
         label = getattr(reference, "__name__", "function")
     else:
         given, label = np.atleast_2d(real_numbers("reference", reference)), "given distances"
-    counter.end_method()
     if given.shape != (len(sets), mesh.n_vertices):
         raise ValueError(f"reference must have shape ({len(sets)}, {mesh.n_vertices}), not {given.shape}")
     if np.isnan(given).any():
@@ -189,29 +192,29 @@ def _row(
     mesh: Mesh,
     sets: list[IntArray],
     label: str,
-    found: Run,
+    distances: FloatArray,
     truths: FloatArray | None,
     limits: list[tuple[FloatArray, FloatArray]],
+    cost: Mapping[str, Any],
 ) -> ValidationRow:
-    residuals = np.stack([metrics.eikonal_residual(mesh, distance) for distance in found.distances])
+    residuals = np.stack([metrics.eikonal_residual(mesh, distance) for distance in distances])
     known = np.isfinite(residuals)
     weights = np.broadcast_to(mesh.measures, residuals.shape)[known]
     checks = [
         metrics.bound_violations(mesh, d, sources, pair)
-        for d, sources, pair in zip(found.distances, sets, limits, strict=True)
+        for d, sources, pair in zip(distances, sets, limits, strict=True)
     ]
     asymmetry = triangle = None
     if len(sets) > 1 and all(len(sources) == 1 for sources in sets):
         single = np.array([sources[0] for sources in sets])
-        difference, between = metrics.asymmetry(found.distances, single), found.distances[:, single]
+        difference, between = metrics.asymmetry(distances, single), distances[:, single]
         # If both ways are 0 or infinite, their difference is 0.
         mean = np.where(np.isfinite(between + between.T) & (between + between.T > 0), (between + between.T) / 2, 1.0)
         asymmetry = float(np.abs(difference / mean).max())
-        triangle = metrics.triangle_violations(found.distances, single).largest
+        triangle = metrics.triangle_violations(distances, single).largest
     return ValidationRow(
         label,
-        found.parameters,
-        errors=None if truths is None else metrics.error_summary(mesh, found.distances, truths, sets),
+        errors=None if truths is None else metrics.error_summary(mesh, distances, truths, sets),
         eikonal=float(residuals[known] @ weights / weights.sum()) if len(weights) else None,
         bounds=BoundViolations(
             sum(check.n_below for check in checks),
@@ -221,8 +224,5 @@ def _row(
         ),
         asymmetry=asymmetry,
         triangle_excess=triangle,
-        precompute_seconds=found.precompute_seconds,
-        solve_seconds=found.solve_seconds,
-        peak_memory=found.peak_memory,
-        notes=found.notes,
+        **cost,
     )

@@ -6,7 +6,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,7 +17,7 @@ from heat_igl.mesh import Mesh, PointCloud, PolygonMesh, as_simplices
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["METHODS", "Counter", "Method", "Prepare", "Progress", "Run", "Solver", "resolved", "run"]
+__all__ = ["METHODS", "Method", "Prepare", "Progress", "Run", "Solver", "resolved", "run"]
 
 
 class Solver(Protocol):
@@ -32,6 +31,8 @@ class Solver(Protocol):
 Prepare = Callable[[Any], Solver]
 Method = str | tuple[str, Prepare]
 Progress = Callable[[str, int, int], None]
+Run = tuple[FloatArray, dict[str, Any]]
+"""Distances (k, n) of a method, and their cost: fields of `ValidationRow` by name."""
 
 # Methods that run in this process, as `geodesic_distance` names them; the others are native references.
 _OWN: tuple[DistanceMethod, ...] = ("heat", "sweep", "windows")
@@ -45,55 +46,6 @@ _NATIVE = {
 
 #: The names of methods that `validate` takes.
 METHODS = (*_OWN, *_NATIVE)
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """Distances (k, n) of a method and their cost; the other fields are those of `ValidationRow`."""
-
-    distances: FloatArray
-    precompute_seconds: float
-    solve_seconds: float
-    peak_memory: int | None
-    parameters: Mapping[str, Any]
-    notes: tuple[str, ...] = ()
-
-
-class Counter:
-    """Counts the distances of all methods, and reports each one to a callback before it begins.
-
-    Parameters
-    ----------
-    progress : callable or None
-        The callback, see `validate`.
-    total : int
-        Distances of all methods together.
-    """
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress = progress
-        self._total = total
-        self._done = 0
-        self._block_end = 0
-
-    def begin_method(self, n_distances: int) -> None:
-        """A method begins that will find so many distances."""
-        self._block_end = self._done + n_distances
-
-    def step(self, label: str) -> None:
-        """A distance of the method `label` begins."""
-        if self._progress is not None:
-            self._progress(label, self._done, self._total)
-        self._done += 1
-
-    def end_method(self) -> None:
-        """The method ends, possibly before it has found all of its distances."""
-        self._done = self._block_end
-
-    def finish(self) -> None:
-        """All methods have ended."""
-        if self._progress is not None:
-            self._progress("done", self._total, self._total)
 
 
 def resolved(method: Method) -> tuple[str, Prepare | None]:
@@ -123,19 +75,21 @@ def run(
     label: str,
     prepare: Prepare | None,
     bounds: Mapping[str, float],
-    counter: Counter,
+    begun: Callable[[str, int], None],
 ) -> Run:
-    """Distances from each set of sources by a method from `resolved`; `bounds` are timeout and memory."""
-    counter.begin_method(len(sets))
+    """Distances from each set of sources by a method from `resolved`; `bounds` are timeout and memory.
+
+    `begun` is called before each distance, with the name of the method and the index of the set.
+    """
     if prepare is None:
-        return _run_native(as_simplices(mesh), sets, label, bounds, counter)
+        return _run_native(as_simplices(mesh), sets, label, bounds, begun)
     distances, seconds = [], []
     with PeakMemory() as peak, _accuracy_notes() as notes:
         start = time.perf_counter()
         solver = prepare(mesh)
         ready = time.perf_counter()
-        for sources in sets:
-            counter.step(label)
+        for i, sources in enumerate(sets):
+            begun(label, i)
             begin = time.perf_counter()
             distances.append(solver.distance(sources))
             seconds.append(time.perf_counter() - begin)
@@ -147,7 +101,13 @@ def run(
     }
     if hasattr(solver, "plan"):
         parameters["plan"] = str(solver.plan)
-    return Run(np.stack(distances), ready - start, float(np.median(seconds)), peak.bytes, parameters, tuple(notes))
+    return np.stack(distances), {
+        "parameters": parameters,
+        "precompute_seconds": ready - start,
+        "solve_seconds": float(np.median(seconds)),
+        "peak_memory": peak.bytes,
+        "notes": tuple(notes),
+    }
 
 
 @contextmanager
@@ -164,17 +124,17 @@ def _accuracy_notes() -> Iterator[list[str]]:
             notes.append(str(warning.message))
 
 
-def _run_native(mesh: Mesh, sets: list[IntArray], label: str, bounds: Mapping[str, float], counter: Counter) -> Run:
+def _run_native(
+    mesh: Mesh, sets: list[IntArray], label: str, bounds: Mapping[str, float], begun: Callable[[str, int], None]
+) -> Run:
     solver = _NATIVE[label]
     results = []
-    for sources in sets:
-        counter.step(label)
+    for i, sources in enumerate(sets):
+        begun(label, i)
         results.append(reference.measured(solver, mesh, sources, **bounds))
-    peaks = [result.peak_memory for result in results if result.peak_memory is not None]
-    return Run(
-        np.stack([result.distance for result in results]),
-        float(np.median([result.precompute_seconds for result in results])),
-        float(np.median([result.solve_seconds for result in results])),
-        max(peaks) if peaks else None,
-        {"solver": reference.exact_solver() if solver == "exact" else solver},
-    )
+    return np.stack([result.distance for result in results]), {
+        "parameters": {"solver": "windows" if solver == "exact" else solver},
+        "precompute_seconds": float(np.median([result.precompute_seconds for result in results])),
+        "solve_seconds": float(np.median([result.solve_seconds for result in results])),
+        "peak_memory": max((result.peak_memory for result in results if result.peak_memory is not None), default=None),
+    }

@@ -12,15 +12,17 @@ Examples
 
 from __future__ import annotations
 
-from heat_igl.validation.error_norms import ErrorSummary, error_summary, relative_error
-from heat_igl.validation.violations import (
-    BoundViolations,
-    TriangleViolations,
-    asymmetry,
-    bound_violations,
-    eikonal_residual,
-    triangle_violations,
-)
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import igl
+import numpy as np
+
+from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.reference import edge_paths, straight_lines
+from heat_igl.sources import Sources, vertex_sources
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 
 __all__ = [
     "BoundViolations",
@@ -33,3 +35,292 @@ __all__ = [
     "relative_error",
     "triangle_violations",
 ]
+
+# Below this fraction a bound counts as held: sums of some thousand lengths round to about 1e-13.
+_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class ErrorSummary:
+    """Errors of distances against the truth, over all vertices and sets of sources.
+
+    Attributes
+    ----------
+    mean, median, percentile_95, maximum : float
+        Statistics of the relative error |d - truth| / truth, over vertices at a positive finite distance.
+    l1, l2, l_infinity : float
+        Norms of d - truth, divided by the largest distance from the same sources. L1 and L2 are weighted by vertex area
+        and normalized by the total area.
+    near_field : float
+        Mean relative error over the neighbours of the sources.
+    n_compared : int
+        Number of vertices in these statistics, summed over the sets of sources.
+    n_wrong_reach : int
+        Number of vertices that are unreachable (infinite or NaN) in one of the two and not in the other. If only the
+        truth is finite, the error counts as infinite.
+    """
+
+    mean: float
+    median: float
+    percentile_95: float
+    maximum: float
+    l1: float
+    l2: float
+    l_infinity: float
+    near_field: float
+    n_compared: int
+    n_wrong_reach: int
+
+
+def relative_error(distance: ArrayLike, truth: ArrayLike) -> FloatArray:
+    """Relative error |d - truth| / truth, entry by entry.
+
+    Parameters
+    ----------
+    distance, truth : (n,) or (k, n) array_like
+        In the same unit.
+
+    Returns
+    -------
+    (n,) or (k, n) float64
+        NaN if the truth is 0 or infinite; ``inf`` if only the distance is not finite.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ.
+    """
+    d, x = _same_shape(distance, truth)
+    error = np.full(x.shape, np.nan)
+    away = _comparable(x)
+    error[away] = np.where(np.isfinite(d[away]), np.abs(_finite_or_zero(d)[away] - x[away]) / x[away], np.inf)
+    return error
+
+
+def error_summary(
+    mesh: MeshLike, distances: ArrayLike, truths: ArrayLike, source_sets: Sequence[Sources]
+) -> ErrorSummary:
+    """All error norms of some distances.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Gives the areas and neighbours of vertices.
+    distances, truths : (k, n) array_like
+        One row per set of sources.
+    source_sets : sequence of sources
+        k entries.
+
+    Returns
+    -------
+    ErrorSummary
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit each other.
+    SourceError
+        If an entry does not name vertices of the mesh.
+    """
+    mesh = as_simplices(mesh)
+    d, x = _same_shape(distances, truths)
+    if d.shape != (len(source_sets), mesh.n_vertices):
+        raise ValueError(
+            f"distances must have shape ({len(source_sets)}, {mesh.n_vertices}), one row per set of sources, not "
+            f"{d.shape}"
+        )
+    away = _comparable(x)
+    relative = relative_error(d, x)[away]
+    near = np.stack([_neighbours(mesh, sources) for sources in source_sets]) & away
+    norms = np.array([_norms(mesh, d[row], x[row]) for row in range(len(d))])
+    return ErrorSummary(
+        mean=_of(np.mean, relative),
+        median=_of(np.median, relative),
+        # Interpolation between two infinite errors would be NaN.
+        percentile_95=_of(lambda e: np.percentile(e, 95, method="higher"), relative),
+        maximum=_of(np.max, relative),
+        l1=float(norms[:, 0].mean()),
+        l2=float(np.sqrt((norms[:, 1] ** 2).mean())),
+        l_infinity=float(norms[:, 2].max()),
+        near_field=_of(np.mean, relative_error(d, x)[near]),
+        n_compared=int(away.sum()),
+        n_wrong_reach=int((np.isfinite(d) != np.isfinite(x)).sum()),
+    )
+
+
+def _finite_or_zero(values: FloatArray) -> FloatArray:
+    """The values, with 0 for those that are not finite."""
+    return np.where(np.isfinite(values), values, 0.0)
+
+
+def _same_shape(distance: ArrayLike, truth: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    d, x = np.asarray(distance, dtype=np.float64), np.asarray(truth, dtype=np.float64)
+    if d.shape != x.shape:
+        raise ValueError(f"distance and truth must have one shape, not {d.shape} and {x.shape}")
+    return d, x
+
+
+def _comparable(truth: FloatArray) -> BoolArray:
+    return np.isfinite(truth) & (truth > 0)
+
+
+def _of(statistic: Callable[[FloatArray], Any], values: FloatArray) -> float:
+    return float(statistic(values)) if len(values) else float("nan")
+
+
+def _neighbours(mesh: Mesh, sources: Sources) -> BoolArray:
+    """The one-rings of the sources, themselves included: these have no relative error."""
+    is_source = np.zeros(mesh.n_vertices, bool)
+    is_source[vertex_sources(sources, mesh.n_vertices)] = True
+    near = np.zeros(mesh.n_vertices, bool)
+    near[mesh.edges[is_source[mesh.edges].any(axis=1)]] = True
+    return near
+
+
+def _norms(mesh: Mesh, distance: FloatArray, truth: FloatArray) -> tuple[float, float, float]:
+    """L1, L2 and L-infinity of the error over the largest distance, weighted by each vertex's share of the area."""
+    compared = np.isfinite(truth)
+    if not _comparable(truth).any():
+        return 0.0, 0.0, 0.0
+    if not np.isfinite(distance[compared]).all():
+        return np.inf, np.inf, np.inf
+    corners = mesh.F.shape[1]
+    area = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / corners, corners), mesh.n_vertices)[compared]
+    error = np.abs(distance[compared] - truth[compared]) / truth[compared].max()
+    weight = area / area.sum()
+    return float(weight @ error), float(np.sqrt(weight @ error**2)), float(error.max())
+
+
+@dataclass(frozen=True)
+class TriangleViolations:
+    """Violations of the triangle inequality: d(a, v) > d(a, b) + d(b, v), for sources a, b and vertices v.
+
+    Attributes
+    ----------
+    count : int
+        Triples with an excess above rounding.
+    fraction : float
+        Share of all triples that were tried.
+    largest : float
+        Largest excess, divided by d(a, v).
+    """
+
+    count: int
+    fraction: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class BoundViolations:
+    """Vertices whose distance is outside the bounds that hold on every mesh.
+
+    Attributes
+    ----------
+    n_below, n_above : int
+        Number of vertices nearer than the straight line, and farther than the shortest path along edges, beyond
+        rounding.
+    largest_below, largest_above : float
+        Largest violations, as fractions of the bound.
+    """
+
+    n_below: int
+    n_above: int
+    largest_below: float
+    largest_above: float
+
+
+def eikonal_residual(mesh: MeshLike, distance: ArrayLike) -> FloatArray:
+    """Residual of the eikonal equation |grad d| = 1 on each face: | |grad d| - 1 |.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles or tetrahedra.
+    distance : (n,) array_like
+        In the mesh's unit.
+
+    Returns
+    -------
+    (m,) float64
+        NaN on faces that are degenerate or not reached. It does not vanish at the sources and across the cut locus for
+        any discrete distance, so its mean tends to 0 with the edge length, and its maximum does not.
+    """
+    mesh = as_simplices(mesh)
+    d = np.asarray(distance, dtype=np.float64)
+    reached = np.isfinite(d)[mesh.F].all(axis=1) & (mesh.measures > 0)
+    gradient = igl.grad(mesh.V, mesh.F[reached]) @ _finite_or_zero(d)
+    residual = np.full(mesh.n_faces, np.nan)
+    residual[reached] = np.abs(np.linalg.norm(gradient.reshape(3, -1), axis=0) - 1)
+    return residual
+
+
+def asymmetry(distances: ArrayLike, sources: ArrayLike) -> FloatArray:
+    """The matrix d(a, b) - d(b, a) over pairs of sources; 0 for an exact distance.
+
+    Parameters
+    ----------
+    distances : (k, n) array_like
+        Row i is the distance from the one vertex ``sources[i]``.
+    sources : (k,) array_like of int
+        Single vertices.
+
+    Returns
+    -------
+    (k, k) float64
+        Antisymmetric, in the mesh's unit; 0 between components.
+    """
+    between = np.asarray(distances, dtype=np.float64)[:, np.asarray(sources)]
+    difference: FloatArray = np.where(np.isfinite(between) & np.isfinite(between.T), _finite_or_zero(between), 0.0)
+    return difference - difference.T
+
+
+def triangle_violations(distances: ArrayLike, sources: ArrayLike) -> TriangleViolations:
+    """Count violations of the triangle inequality, arguments as for `asymmetry`."""
+    d, vertices = np.asarray(distances, dtype=np.float64), np.asarray(sources)
+    count, n_tried, largest = 0, 0, 0.0
+    for a in range(len(vertices)):
+        for b in range(len(vertices)):
+            known = np.isfinite(d[a]) & np.isfinite(d[b]) & (d[a] > 0)
+            if a == b or not known.any() or not np.isfinite(d[a, vertices[b]]):
+                continue
+            excess = (d[a, known] - d[a, vertices[b]] - d[b, known]) / d[a, known]
+            count += int((excess > _TOLERANCE).sum())
+            n_tried += int(known.sum())
+            largest = max(largest, float(excess.max()))
+    return TriangleViolations(count, count / max(n_tried, 1), largest)
+
+
+def bound_violations(
+    mesh: MeshLike, distance: ArrayLike, sources: Sources, limits: tuple[FloatArray, FloatArray] | None = None
+) -> BoundViolations:
+    """Check a distance against the straight line from below and paths along edges from above.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles or tetrahedra.
+    distance : (n,) array_like
+        In the mesh's unit; vertices at which it is not finite are left out.
+    sources : int, sequence of int, or (n,) mask of bool
+        The sources of the distance.
+    limits : pair of (n,) float64, optional
+        `straight_lines` and `edge_paths` from these sources, if they are known already.
+
+    Returns
+    -------
+    BoundViolations
+    """
+    mesh = as_simplices(mesh)
+    d = np.asarray(distance, dtype=np.float64)
+    lower, upper = limits or (straight_lines(mesh, sources), edge_paths(mesh, sources))
+    inside = np.isfinite(d) & np.isfinite(upper) & (upper > 0)
+    d, lower, upper = d[inside], lower[inside], upper[inside]
+    # Two vertices in one place: the straight line is 0 and cannot be undercut.
+    below = (lower - d) / np.where(lower > 0, lower, np.inf)
+    above = (d - upper) / upper
+    return BoundViolations(
+        int((below > _TOLERANCE).sum()),
+        int((above > _TOLERANCE).sum()),
+        float(below.max(initial=0.0)),
+        float(above.max(initial=0.0)),
+    )

@@ -6,16 +6,7 @@ package may be tuned on them (`Shape.held_out`). `FAMILIES` are kinds of shapes 
 
 from __future__ import annotations
 
-from heat_igl.validation.zoo import (  # noqa: F401 - they register their shapes
-    cad,
-    carved,
-    families,
-    latest,
-    nearly_flat,
-    rough,
-    scattered,
-    smooth,
-)
+from heat_igl.validation.zoo import families, fixed, nearly_flat  # noqa: F401 - they register their shapes
 from heat_igl.validation.zoo.registry import FAMILIES, SHAPES, Shape
 
 __all__ = ["FAMILIES", "SHAPES", "Shape"]

@@ -11,16 +11,25 @@ import numpy as np
 from heat_igl.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.shapes import grid, icosphere, lattice_faces
-from heat_igl.validation.zoo.registry import boxes, compact, delaunay, family, hull, joined, merged, raised, ring, walls
+from heat_igl.validation.zoo.registry import (
+    boxes,
+    caps,
+    compact,
+    corridors,
+    delaunay,
+    extruded,
+    family,
+    hull,
+    joined,
+    merged,
+    raised,
+    revolved,
+    ring,
+    tube,
+    walls,
+)
 
 Generator = np.random.Generator
-
-
-def _revolved(radius: FloatArray, height: FloatArray, around: int) -> Mesh:
-    """A surface of revolution with one ring for each radius; one of radius 0 is a point."""
-    circle = ring(around)
-    V = np.concatenate([raised(r * circle, z) for r, z in zip(radius, height, strict=True)])
-    return merged(V, lattice_faces(len(radius), around, wrap_columns=True))
 
 
 def _bounded(points: FloatArray, edges: IntArray, inside: FloatArray) -> BoolArray:
@@ -69,14 +78,8 @@ def _plate(rng: Generator, around: int, n_inside: int) -> tuple[FloatArray, IntA
 
 def _tube(centre: FloatArray, radius: float, around: int) -> Mesh:
     """An open tube of `around` sides along points (k, 3)."""
-    along = np.gradient(centre, axis=0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    u = np.cross(along, [0.31, 0.21, 0.93])
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(along, u)
-    x, y = ring(around).T
-    V = centre[:, None] + radius * (u[:, None] * x[:, None] + v[:, None] * y[:, None])
-    return Mesh(V.reshape(-1, 3), lattice_faces(len(centre), around, wrap_columns=True))
+    V = tube(centre, np.gradient(centre, axis=0), np.array([0.31, 0.21, 0.93]), radius, around)
+    return Mesh(V, lattice_faces(len(centre), around, wrap_columns=True))
 
 
 def _band(middle: FloatArray, across: FloatArray, rows: int) -> Mesh:
@@ -148,20 +151,7 @@ def spiral_ramp(rng: Generator) -> Mesh:
 def maze(rng: Generator) -> Mesh:
     """The corridors of a random tree on cells, each corridor one cell wide, walls one cell wide."""
     size, fine = int(rng.integers(4, 9)), int(rng.integers(1, 4))
-    is_open = np.zeros((2 * size - 1, 2 * size - 1), bool)
-    stack, seen = [(0, 0)], {(0, 0)}
-    is_open[0, 0] = True
-    while stack:
-        i, j = stack[-1]
-        ways = [(i + a, j + b) for a, b in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-        ways = [(a, b) for a, b in ways if 0 <= a < size and 0 <= b < size and (a, b) not in seen]
-        if not ways:
-            stack.pop()
-            continue
-        a, b = ways[rng.integers(len(ways))]
-        is_open[2 * a, 2 * b] = is_open[i + a, j + b] = True
-        seen.add((a, b))
-        stack.append((a, b))
+    is_open = corridors(rng, size)
     n = fine * len(is_open)
     mesh = grid(n)
     x, y = np.minimum((mesh.V[mesh.F].mean(axis=1)[:, :2] * len(is_open)).astype(int), len(is_open) - 1).T
@@ -179,9 +169,7 @@ def cad_plate(rng: Generator) -> Mesh:
 def thin_plate(rng: Generator) -> Mesh:
     """The same as a body: two sheets a small thickness apart, joined along the rims."""
     points, F = _plate(rng, int(rng.integers(8, 40)), int(rng.integers(0, 60)))
-    n, thickness = len(points), 10 ** rng.uniform(-2.5, -0.3)
-    V = np.concatenate([raised(points, thickness), raised(points)])
-    return compact(V, np.concatenate([F, F[:, ::-1] + n, walls(F, n)]))
+    return extruded(points, F, 10 ** rng.uniform(-2.5, -0.3))
 
 
 @family("CAD cylinder")
@@ -189,15 +177,10 @@ def cad_cylinder(rng: Generator) -> Mesh:
     """Few rings of many sides, capped by fans around one of their own vertices or left open."""
     around, rings = int(rng.integers(24, 600)), int(rng.integers(2, 5))
     height = np.sort(rng.random(rings)) * rng.uniform(0.2, 8)
-    side = _revolved(np.ones(rings), height, around)
+    V, F = revolved(np.ones(rings), height, around), lattice_faces(rings, around, wrap_columns=True)
     if rng.random() < 0.4:
-        return side
-    circle = ring(around)
-    V = np.concatenate([raised(circle, z) for z in height])
-    k = np.arange(1, around - 1)
-    cap = np.stack([np.zeros_like(k), k + 1, k], axis=1)
-    F = lattice_faces(rings, around, wrap_columns=True)
-    return Mesh(V, np.concatenate([F, cap, (rings - 1) * around + cap[:, ::-1]]))
+        return merged(V, F)
+    return Mesh(V, np.concatenate([F, caps(rings, around)]))
 
 
 @family("shell")
@@ -272,7 +255,7 @@ def vase(rng: Generator) -> Mesh:
     radius = np.maximum(profile, 0.08)
     if rng.random() < 0.5:
         radius[0] = 0.0
-    return _revolved(radius, z, around)
+    return merged(revolved(radius, z, around), lattice_faces(rings, around, wrap_columns=True))
 
 
 @family("terrain")
@@ -331,8 +314,7 @@ def extrusion(rng: Generator) -> Mesh:
     edges = np.stack([np.arange(n), np.roll(np.arange(n), -1)], axis=1)
     F = delaunay(points)
     F = F[_bounded(points, edges, points[F].mean(axis=1))]
-    V = np.concatenate([raised(points, rng.uniform(0.02, 3)), raised(points)])
-    return compact(V, np.concatenate([F, F[:, ::-1] + n, walls(F, n)]))
+    return extruded(points, F, rng.uniform(0.02, 3))
 
 
 @family("comb")

@@ -11,25 +11,12 @@ from zlib import crc32
 import numpy as np
 
 from heat_igl.mesh import Mesh
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 __all__ = [
-    "FAMILIES",
-    "SHAPES",
-    "Shape",
-    "boxes",
-    "compact",
-    "delaunay",
-    "family",
-    "hull",
-    "joined",
-    "merged",
-    "raised",
-    "ring",
-    "seeded",
-    "shape",
-    "walls",
-]
+    "FAMILIES", "SHAPES", "Shape", "boxes", "caps", "compact", "corridors", "delaunay", "extruded", "family", "hull",
+    "joined", "merged", "raised", "revolved", "ring", "seeded", "shape", "tube", "walls",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -106,6 +93,56 @@ def ring(around: int) -> FloatArray:
     """Points (around, 2) of the unit circle."""
     angle = 2 * np.pi * np.arange(around) / around
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def revolved(radius: FloatArray, height: FloatArray, around: int) -> FloatArray:
+    """Vertices of a surface of revolution, a ring for each radius (k,) and height (k,), ring after ring."""
+    circle = ring(around)
+    return np.concatenate([raised(r * circle, z) for r, z in zip(radius, height, strict=True)])
+
+
+def tube(centre: FloatArray, along: FloatArray, up: FloatArray, radius: float, around: int) -> FloatArray:
+    """Vertices of a tube: rings about points (k, 3) across the directions `along`, in frames that `up` turns."""
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    u = np.cross(along, up)
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(along, u)
+    x, y = ring(around).T
+    rings = centre[:, None] + radius * (u[:, None] * x[:, None] + v[:, None] * y[:, None])
+    return np.asarray(rings.reshape(-1, 3))
+
+
+def extruded(points: FloatArray, F: IntArray, height: float) -> Mesh:
+    """Two sheets of triangles on points (k, 2), at a height and at 0, joined along the boundary."""
+    n = len(points)
+    return compact(
+        np.concatenate([raised(points, height), raised(points)]), np.concatenate([F, F[:, ::-1] + n, walls(F, n)])
+    )
+
+
+def caps(rings: int, around: int) -> IntArray:
+    """Triangles that close the first and the last of some rings of vertices, in fans around one of their own."""
+    k = np.arange(1, around - 1)
+    first = np.stack([np.zeros_like(k), k + 1, k], axis=1)
+    return np.concatenate([first, (rings - 1) * around + first[:, ::-1]])
+
+
+def corridors(rng: np.random.Generator, n: int) -> BoolArray:
+    """The open cells (2 n - 1, 2 n - 1) of a maze: n by n rooms, joined by a random tree."""
+    is_open = np.zeros((2 * n - 1, 2 * n - 1), bool)
+    stack = [(0, 0)]
+    is_open[0, 0] = True
+    while stack:
+        i, j = stack[-1]
+        ways = [(i + a, j + b) for a, b in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+        ways = [(a, b) for a, b in ways if 0 <= a < n and 0 <= b < n and not is_open[2 * a, 2 * b]]
+        if not ways:
+            stack.pop()
+            continue
+        a, b = ways[rng.integers(len(ways))]
+        is_open[2 * a, 2 * b] = is_open[i + a, j + b] = True
+        stack.append((a, b))
+    return is_open
 
 
 def walls(F: IntArray, above: int) -> IntArray:

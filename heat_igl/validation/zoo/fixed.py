@@ -1,0 +1,626 @@
+"""The fixed shapes of the zoo."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+
+from heat_igl.mesh import Mesh
+from heat_igl.typing import FloatArray
+from heat_igl.validation.shapes import book, cone, cylinder, disk, grid, icosphere, lattice_faces, strip, torus
+from heat_igl.validation.zoo.registry import (
+    boxes,
+    caps,
+    compact,
+    corridors,
+    delaunay,
+    extruded,
+    hull,
+    joined,
+    merged,
+    raised,
+    revolved,
+    ring,
+    seeded,
+    shape,
+    tube,
+)
+
+# Smooth surfaces.
+
+
+@shape("smooth")
+def _sphere() -> Mesh:
+    return icosphere(4)
+
+
+@shape("smooth", held_out=True)
+def _latitudes() -> Mesh:
+    """A sphere by meridians and parallels, with fans of thin triangles at the poles."""
+    theta, phi = np.meshgrid(np.linspace(0, np.pi, 31), np.linspace(0, 2 * np.pi, 61)[:-1], indexing="ij")
+    V = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1).reshape(-1, 3)
+    return merged(V, lattice_faces(31, 60, wrap_columns=True))
+
+
+@shape("smooth")
+def _ellipsoid() -> Mesh:
+    """A sphere stretched to 1 : 1 : 8 with the triangles that it has."""
+    mesh = icosphere(4)
+    return Mesh(mesh.V * [1, 1, 8], mesh.F)
+
+
+@shape("smooth")
+def _torus() -> Mesh:
+    return torus(30, 60)
+
+
+@shape("smooth", held_out=True)
+def _thin_torus() -> Mesh:
+    return torus(12, 240, 0.05)
+
+
+@shape("smooth")
+def _bumpy_sphere() -> Mesh:
+    V, F = icosphere(4).V, icosphere(4).F
+    return Mesh(V * (1 + 0.15 * np.sin(6 * V[:, :1]) * np.cos(7 * V[:, 1:2]) * np.cos(5 * V[:, 2:])), F)
+
+
+@shape("smooth", held_out=True)
+def _monkey_saddle() -> Mesh:
+    V = disk(20).V
+    x, y = V[:, 0], V[:, 1]
+    return Mesh(raised(V[:, :2], x**3 - 3 * x * y**2), disk(20).F)
+
+
+@shape("smooth")
+def _cone() -> Mesh:
+    return cone(40, 30)
+
+
+@shape("smooth")
+def _regular_grid() -> Mesh:
+    return grid(40)
+
+
+@shape("smooth")
+def _long_strip() -> Mesh:
+    return strip(1500, 3)
+
+
+# Surfaces without an orientation, or with edges of many faces.
+
+
+@shape("topology")
+def _moebius_band() -> Mesh:
+    u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 121), np.linspace(-0.4, 0.4, 9), indexing="ij")
+    r = 1 + v * np.cos(u / 2)
+    V = np.stack([r * np.cos(u), r * np.sin(u), v * np.sin(u / 2)], axis=-1)
+    return merged(V.reshape(-1, 3), lattice_faces(121, 9))
+
+
+@shape("topology", held_out=True)
+def _klein_bottle() -> Mesh:
+    """The figure of eight turned by half a turn on its way around; it crosses itself without sharing vertices."""
+    u, v = np.meshgrid(np.arange(80) * 2 * np.pi / 80, np.arange(40) * 2 * np.pi / 40, indexing="ij")
+    r = 2 + np.cos(u / 2) * np.sin(v) - np.sin(u / 2) * np.sin(2 * v)
+    V = np.stack([r * np.cos(u), r * np.sin(u), np.sin(u / 2) * np.sin(v) + np.cos(u / 2) * np.sin(2 * v)], axis=-1)
+    F = lattice_faces(80, 40, wrap_columns=True)
+    # The last row is glued to the first with v turned into -v.
+    j = np.arange(40)
+    last, following = 79 * 40 + j, 79 * 40 + (j + 1) % 40
+    first, after = (-j) % 40, (-j - 1) % 40
+    seam = np.concatenate([np.stack([last, following, first], axis=1), np.stack([following, after, first], axis=1)])
+    return Mesh(V.reshape(-1, 3), np.concatenate([F, seam]))
+
+
+@shape("topology")
+def _book() -> Mesh:
+    return book(5, 12)
+
+
+@shape("topology")
+def _pinched() -> Mesh:
+    """Two cones that meet in their tips."""
+    one = cone(24, 8)
+    return merged(*(lambda m: (m.V, m.F))(joined(one, Mesh(one.V * [1, 1, -1], one.F[:, ::-1]))))
+
+
+# Parts as they leave a CAD program: few vertices, long triangles, fans.
+
+
+@shape("CAD", _128=64, _512=256)
+def _capped_cylinder(around: int) -> Mesh:
+    """Two rings, each capped by a fan around one of its own vertices."""
+    side = cylinder(around, 1, 4.0)
+    return Mesh(side.V, np.concatenate([side.F, caps(2, around)]))
+
+
+@shape("CAD", held_out=True)
+def _pill() -> Mesh:
+    """Long triangles along the side of a cylinder between two finely meshed caps of a sphere."""
+    theta = np.concatenate([np.linspace(0, np.pi / 2, 13), np.linspace(np.pi / 2, np.pi, 13)])
+    shift = np.where(np.arange(26) < 13, 6.0, 0.0)
+    V = revolved(np.sin(theta), np.cos(theta) + shift, 48)
+    return merged(V, lattice_faces(26, 48, wrap_columns=True))
+
+
+def _plate_with_holes(holes: FloatArray, around: int, seed: int) -> Mesh:
+    """The rectangle 10 by 6 with round holes (k, 3): centres and radii; vertices on the rims and few elsewhere."""
+    angle = 2 * np.pi * (np.arange(around) + 0.5) / around
+    rims = [np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=1) for x, y, r in holes]
+    corners = np.array([[0, 0], [10, 0], [10, 6], [0, 6], [5, 0], [5, 6.0]])
+    inside = seeded(seed).uniform([0.3, 0.3], [9.7, 5.7], (30, 2))
+    inside = inside[(np.linalg.norm(inside[:, None] - holes[:, :2], axis=2) > holes[:, 2] + 0.2).all(axis=1)]
+    points = np.concatenate([*rims, corners, inside])
+    F = delaunay(points)
+    middle = points[F].mean(axis=1)
+    F = F[(np.linalg.norm(middle[:, None] - holes[:, :2], axis=2) > holes[:, 2] * np.cos(np.pi / around)).all(axis=1)]
+    return compact(raised(points), F)
+
+
+@shape("CAD")
+def _plate() -> Mesh:
+    holes = np.array([[2, 1.6, 0.8], [2, 4.4, 0.8], [5, 3, 1.2], [8, 1.6, 0.8], [8, 4.4, 0.8]])
+    return _plate_with_holes(holes, 96, 1)
+
+
+@shape("CAD", held_out=True)
+def _slotted_plate() -> Mesh:
+    x, y = np.meshgrid(np.linspace(1, 9, 7), np.linspace(1, 5, 4))
+    return _plate_with_holes(np.column_stack([x.ravel(), y.ravel(), np.full(28, 0.42)]), 24, 2)
+
+
+@shape("CAD")
+def _needle_fan() -> Mesh:
+    """A disk of 300 needles around its centre."""
+    V = np.concatenate([np.zeros((1, 3)), raised(ring(300))])
+    k = np.arange(300)
+    return Mesh(V, np.stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % 300], axis=1))
+
+
+@shape("CAD", held_out=True)
+def _gear() -> Mesh:
+    """A toothed wheel of 24 teeth with a bore, extruded; its faces are Delaunay triangles between bore and teeth."""
+    angle = 2 * np.pi * np.arange(96) / 96
+    radius = np.where((np.arange(96) // 2) % 2 == 0, 3.0, 2.6)
+    rim = np.concatenate([radius[:, None] * ring(96), ring(48)])
+    F = delaunay(rim)
+    middle = rim[F].mean(axis=1)
+    r, at = np.linalg.norm(middle, axis=1), np.arctan2(middle[:, 1], middle[:, 0]) % (2 * np.pi)
+    F = F[(r > 0.998) & (r < np.interp(at, np.append(angle, 2 * np.pi), np.append(radius, radius[0])))]
+    return extruded(rim, F, 1.0)
+
+
+@shape("CAD")
+def _stairs() -> Mesh:
+    """Twelve steps of two rectangles each, every rectangle two triangles."""
+    x = np.repeat(np.arange(13), 2)[1:]
+    z = np.repeat(np.arange(13), 2)[:-1]
+    V = np.stack([np.tile(x, 2), np.repeat([0.0, 5.0], 25), np.tile(z, 2) * 0.5], axis=1)
+    return Mesh(V, lattice_faces(2, 25))
+
+
+@shape("CAD", cube=(1.0, 1.0), long=(1.0, 30.0))
+def _box(width: float, length: float) -> Mesh:
+    """Eight vertices and twelve triangles."""
+    return boxes(np.array([[0, 0, 0]]), np.array([width, width, length]))
+
+
+@shape("CAD", held_out=True)
+def _wide_funnel() -> Mesh:
+    """A cone whose rings come closer and closer to the tip, with 24 vertices each."""
+    radius: FloatArray = 0.6 ** np.arange(20.0)
+    return Mesh(revolved(radius, 2 * radius, 24), lattice_faces(20, 24, wrap_columns=True))
+
+
+# Scattered points.
+
+
+@shape("scattered", _1000=(1000, 3), _100=(100, 4))
+def _scattered_square(n: int, seed: int) -> Mesh:
+    points = seeded(seed).random((n, 2))
+    return Mesh(raised(points), delaunay(points))
+
+
+@shape("scattered", held_out=True)
+def _scattered_disk() -> Mesh:
+    r, angle = seeded(5).random((2, 1500))
+    points = np.sqrt(r)[:, None] * np.stack([np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)], axis=1)
+    return Mesh(raised(points), delaunay(points))
+
+
+@shape("scattered")
+def _clusters() -> Mesh:
+    """Points in a square, most of them in five small clusters: edges differ by a factor of a thousand."""
+    rng = seeded(6)
+    centres = rng.random((5, 2))
+    points = np.concatenate(
+        [rng.random((300, 2)), *(centre + 0.003 * rng.standard_normal((200, 2)) for centre in centres)]
+    )
+    return Mesh(raised(points), delaunay(points))
+
+
+@shape("scattered")
+def _slivers_at_the_rim() -> Mesh:
+    """A square whose boundary vertices stand on a cubic scale, with few points inside."""
+    s = np.linspace(-1, 1, 41) ** 3
+    rim = np.concatenate([np.column_stack([s, np.full(41, side)]) for side in (-1.0, 1.0)])
+    rim = np.concatenate([rim, rim[:, ::-1]])
+    points = np.unique(np.concatenate([rim, seeded(7).uniform(-0.9, 0.9, (120, 2))]), axis=0)
+    return Mesh(raised(points), delaunay(points))
+
+
+@shape("scattered", by_3=3.0, by_10=10.0)
+def _sheared_grid(shear: float) -> Mesh:
+    mesh = grid(30)
+    return Mesh(mesh.V @ np.array([[1, 0, 0], [shear, 1, 0], [0, 0, 1.0]]), mesh.F)
+
+
+@shape("scattered", held_out=True)
+def _stretched_grid() -> Mesh:
+    """Cells of 1 : 40."""
+    mesh = grid(30)
+    return Mesh(mesh.V * [40, 1, 1], mesh.F)
+
+
+@shape("scattered", held_out=True)
+def _graded_square() -> Mesh:
+    """Edges from 1 to 1 / 1000 towards a corner."""
+    x, y = np.meshgrid(np.linspace(0, 1, 41) ** 3, np.linspace(0, 1, 41) ** 3)
+    return Mesh(raised(np.stack([x.ravel(), y.ravel()], axis=1)), lattice_faces(41, 41))
+
+
+# Height fields and terrain.
+
+
+@shape("terrain", _5000=(5000, 0.3, 8), coarse=(47, 0.5, 9))
+def _height_field(n: int, height: float, seed: int) -> Mesh:
+    points = seeded(seed).random((n, 2))
+    z = height * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1])
+    return Mesh(raised(points, z), delaunay(points))
+
+
+@shape("terrain", _10_times=10.0, _100_times=100.0)
+def _noise(factor: float) -> Mesh:
+    """A grid with independent heights of a multiple of the spacing."""
+    mesh = grid(30)
+    return Mesh(raised(mesh.V[:, :2], factor / 30 * seeded(10).random(mesh.n_vertices)), mesh.F)
+
+
+@shape("terrain", held_out=True)
+def _fractal_terrain() -> Mesh:
+    """Midpoint displacement on 65 by 65 vertices, each level with 0.6 of the height of the one before."""
+    rng, z, amplitude = seeded(11), np.zeros((2, 2)), 0.5
+    while len(z) < 65:
+        finer = np.zeros((2 * len(z) - 1,) * 2)
+        finer[::2, ::2] = z
+        finer[1::2, ::2] = (z[1:] + z[:-1]) / 2
+        finer[:, 1::2] = (finer[:, 2::2] + finer[:, :-2:2]) / 2
+        new = np.ones(finer.shape, bool)
+        new[::2, ::2] = False
+        z = finer + amplitude * np.where(new, rng.standard_normal(finer.shape), 0)
+        amplitude *= 0.6
+    mesh = grid(64)
+    return Mesh(raised(mesh.V[:, :2], z.ravel()), mesh.F)
+
+
+@shape("terrain", held_out=True)
+def _ridges() -> Mesh:
+    """A folded sheet: 20 steep folds of a few triangles each."""
+    x = np.repeat(np.linspace(0, 1, 41)[:, None], 11, axis=1)
+    y = np.repeat(np.linspace(0, 1, 11)[None], 41, axis=0)
+    z = np.where(np.arange(41)[:, None] % 2 == 0, 0.0, 0.2) * np.ones((1, 11))
+    return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), lattice_faces(41, 11))
+
+
+@shape("terrain")
+def _cliff() -> Mesh:
+    mesh = grid(40)
+    return Mesh(raised(mesh.V[:, :2], 2.0 * (mesh.V[:, 0] > 0.5)), mesh.F)
+
+
+# Convex hulls.
+
+
+@shape("hull", _12=(12, 12), _35=(35, 13), _100=(100, 14), _400=(400, 15))
+def _hull_of(n: int, seed: int) -> Mesh:
+    points = seeded(seed).standard_normal((n, 3))
+    return hull(points / np.linalg.norm(points, axis=1, keepdims=True))
+
+
+@shape("hull", held_out=True)
+def _flat_hull() -> Mesh:
+    points = seeded(16).standard_normal((150, 3))
+    return hull(points / np.linalg.norm(points, axis=1, keepdims=True) * [1, 1, 0.03])
+
+
+@shape("hull", held_out=True)
+def _hull_of_a_cloud() -> Mesh:
+    return hull(seeded(17).standard_normal((300, 3)))
+
+
+# Voxels and fractals.
+
+
+@shape("voxels")
+def _cube_less_one() -> Mesh:
+    where = np.ones((2, 2, 2), bool)
+    where[1, 1, 1] = False
+    return boxes(np.argwhere(where))
+
+
+@shape("voxels")
+def _beams() -> Mesh:
+    """A lattice of square beams between 4 by 4 by 4 nodes, of genus 81."""
+    i = np.indices((7, 7, 7))
+    return boxes(np.argwhere((i % 2 == 0).sum(axis=0) >= 2))
+
+
+@shape("voxels", held_out=True)
+def _sponge() -> Mesh:
+    """Menger's sponge of level 2."""
+    i = np.indices((9, 9, 9))
+    level = [((i // step % 3) == 1).sum(axis=0) < 2 for step in (1, 3)]
+    return boxes(np.argwhere(level[0] & level[1]))
+
+
+@shape("voxels")
+def _voxel_ball() -> Mesh:
+    i = np.indices((15, 15, 15)) - 7
+    return boxes(np.argwhere((i**2).sum(axis=0) <= 42))
+
+
+@shape("voxels", held_out=True)
+def _voxel_blob() -> Mesh:
+    """Cells below a random threshold, connected or not, touching along edges and in corners."""
+    from scipy.ndimage import gaussian_filter
+
+    field = gaussian_filter(seeded(18).standard_normal((12, 12, 12)), 1.2)
+    return boxes(np.argwhere(field > np.quantile(field, 0.6)))
+
+
+# Mazes and walls.
+
+
+@shape("maze")
+def _maze() -> Mesh:
+    """A square with walls one cell wide from alternate sides."""
+    mesh, n = grid(45), 45
+    cell = mesh.V[mesh.F].mean(axis=1)[:, :2] * n
+    column, row = np.floor(cell[:, 0]).astype(int), np.floor(cell[:, 1]).astype(int)
+    is_wall = (column % 5 == 4) & np.where(column // 5 % 2 == 0, row < n - 4, row >= 4)
+    return compact(mesh.V, mesh.F[~is_wall])
+
+
+@shape("maze")
+def _spiral() -> Mesh:
+    """A corridor that winds in, four turns."""
+    turn = np.linspace(0, 8 * np.pi, 400)
+    radius = 1 + turn / 3
+    points = np.concatenate(
+        [r[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1) for r in (radius, radius + 0.6, radius + 1.2)]
+    )
+    return Mesh(raised(points), lattice_faces(3, 400))
+
+
+@shape("maze")
+def _labyrinth() -> Mesh:
+    """A random spanning tree of rooms, carved out of a grid of cells."""
+    rng, n = seeded(19), 12
+    fine = np.kron(np.pad(corridors(rng, n), 1), np.ones((2, 2), bool))
+    side = len(fine)
+    x, y = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))
+    open_cells = np.concatenate([fine.ravel(), fine.ravel()])
+    return compact(raised(np.stack([x.ravel(), y.ravel()], axis=1)), lattice_faces(side + 1, side + 1)[open_cells])
+
+
+# Rough and thin surfaces.
+
+
+@shape("rough")
+def _spiky_sphere() -> Mesh:
+    mesh = icosphere(3)
+    out = np.where(seeded(20).random(mesh.n_vertices) < 0.05, 3.0, 1.0)
+    return Mesh(mesh.V * out[:, None], mesh.F)
+
+
+@shape("rough")
+def _noisy_sphere() -> Mesh:
+    mesh = icosphere(4)
+    return Mesh(mesh.V + 0.05 * seeded(21).standard_normal(mesh.V.shape), mesh.F)
+
+
+@shape("rough", held_out=True)
+def _crumpled() -> Mesh:
+    mesh = disk(18)
+    return Mesh(mesh.V + 0.04 * seeded(22).standard_normal(mesh.V.shape), mesh.F)
+
+
+@shape("rough", _40_by_400=(40, 400), _12_by_60=(12, 60))
+def _lantern(around: int, along: int) -> Mesh:
+    """Schwarz's lantern: rings of a cylinder, every other one turned by half a step."""
+    ring, k = np.divmod(np.arange(around * (along + 1)), around)
+    angle = 2 * np.pi * (k + 0.5 * (ring % 2)) / around
+    V = np.stack([np.cos(angle), np.sin(angle), 3 * ring / along], axis=1)
+    faces = []
+    for i in range(along):
+        a, b = i * around + np.arange(around), (i + 1) * around + np.arange(around)
+        ahead = np.roll(np.arange(around), -1)
+        if i % 2 == 0:
+            faces += [np.stack([a, a[ahead], b], axis=1), np.stack([a[ahead], b[ahead], b], axis=1)]
+        else:
+            faces += [np.stack([a, b[ahead], b], axis=1), np.stack([a, a[ahead], b[ahead]], axis=1)]
+    return Mesh(V, np.concatenate(faces))
+
+
+@shape("rough")
+def _sphere_with_slivers() -> Mesh:
+    """A tenth of the faces split close to the middle of a side."""
+    mesh = icosphere(3)
+    rng = seeded(23)
+    chosen = rng.choice(mesh.n_faces, mesh.n_faces // 10, replace=False)
+    weights = np.array([0.499, 0.499, 0.002])
+    new = (mesh.V[mesh.F[chosen]] * weights[:, None]).sum(axis=1)
+    a, b, c = mesh.F[chosen].T
+    p = mesh.n_vertices + np.arange(len(chosen))
+    split = [np.stack([a, b, p], axis=1), np.stack([b, c, p], axis=1), np.stack([c, a, p], axis=1)]
+    return Mesh(np.concatenate([mesh.V, new]), np.concatenate([np.delete(mesh.F, chosen, axis=0), *split]))
+
+
+@shape("rough", held_out=True)
+def _dense_pole() -> Mesh:
+    """A sphere whose triangles shrink to a thousandth towards a pole."""
+    t = np.concatenate([np.linspace(0, 1, 60) ** 4 * np.pi / 2, np.linspace(np.pi / 2, np.pi, 20)[1:-1]])
+    return merged(revolved(np.sin(t), np.cos(t), 40), lattice_faces(len(t), 40, wrap_columns=True))
+
+
+# Several components.
+
+
+@shape("components", _1_to_1=1.0, _1_to_10=10.0, _1_to_100=100.0)
+def _two_spheres(ratio: float) -> Mesh:
+    one = icosphere(3)
+    return joined(one, Mesh(one.V * ratio + [2 * ratio + 2, 0, 0], one.F))
+
+
+@shape("components", held_out=True)
+def _part_and_plate() -> Mesh:
+    """A small torus beside a square of two triangles, a thousand times larger."""
+    return joined(
+        torus(16, 32), Mesh(np.array([[0, 0, -1], [1e3, 0, -1], [1e3, 1e3, -1], [0, 1e3, -1]]), [[0, 1, 2], [0, 2, 3]])
+    )
+
+
+@shape("components")
+def _dust() -> Mesh:
+    """Twenty hulls of 60 points beside one another, from 1 to a thousandth in size."""
+    parts, at = [], 0.0
+    for k, size in enumerate(np.logspace(0, -3, 20)):
+        points = seeded(40 + k).standard_normal((60, 3))
+        part = hull(points / np.linalg.norm(points, axis=1, keepdims=True))
+        parts.append(Mesh(size * part.V + [at, 0, 0], part.F))
+        at += 3 * size
+    return joined(*parts)
+
+
+# The smallest meshes.
+
+
+@shape("small")
+def _triangle() -> Mesh:
+    return Mesh([[0, 0, 0], [3, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+
+
+@shape("small", held_out=True)
+def _needle() -> Mesh:
+    return Mesh(np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-4, 0], [0.5, -1e-4, 0]]), [[0, 1, 2], [1, 0, 3]])
+
+
+@shape("small")
+def _tetrahedron() -> Mesh:
+    return Mesh([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+
+
+@shape("small", held_out=True)
+def _octahedron() -> Mesh:
+    V = np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3]
+    return hull(V)
+
+
+# Made after every default had been chosen, all held out.
+
+
+@shape("smooth", held_out=True)
+def _gyroid() -> Mesh:
+    """A piece of the gyroid by marching cubes, with their slivers and a boundary of many loops."""
+    n = 22
+    z, y, x = np.meshgrid(*(np.linspace(0, 2 * np.pi, n),) * 3, indexing="ij")
+    field = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
+    points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    V, F, _ = igl.marching_cubes(field.ravel(), points, n, n, n, 0.1)
+    return merged(np.asarray(V), np.asarray(F, np.int64))
+
+
+@shape("smooth", held_out=True)
+def _trefoil() -> Mesh:
+    """A tube around a knot, with rings closer together than the vertices on them."""
+    t = 2 * np.pi * np.arange(300) / 300
+    centre = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1)
+    along = np.roll(centre, -1, axis=0) - np.roll(centre, 1, axis=0)
+    V = tube(centre, along, np.array([0.3, 0.2, 1.0]), 0.35, 8)
+    return merged(np.concatenate([V, V[:8]]), lattice_faces(301, 8, wrap_columns=True))
+
+
+@shape("CAD", held_out=True)
+def _elbow() -> Mesh:
+    """A pipe: two straight pieces of one ring each, and a bend of 24 rings between them."""
+    bend = np.pi / 2 * np.linspace(0, 1, 24)
+    x = np.concatenate([[-8.0], 2 * np.sin(bend), [2.0]])
+    y = np.concatenate([[0.0], 2 - 2 * np.cos(bend), [12.0]])
+    slope = np.concatenate([[0.0], bend, [np.pi / 2]])
+    angle = 2 * np.pi * np.arange(32) / 32
+    outward = np.stack([-np.sin(slope), np.cos(slope), np.zeros(26)], axis=1)
+    rings = np.stack([x, y, np.zeros(26)], axis=1)[:, None] + outward[:, None] * np.cos(angle)[:, None]
+    rings += np.array([0, 0, 1.0]) * np.sin(angle)[:, None]
+    return Mesh(rings.reshape(-1, 3), lattice_faces(26, 32, wrap_columns=True))
+
+
+@shape("CAD", held_out=True)
+def _drum() -> Mesh:
+    """The hull of two circles in tilted planes: long triangles between two polygons that are fans."""
+    flat = raised(ring(120))
+    tilt = np.array([[np.cos(0.7), 0, np.sin(0.7)], [0, 1, 0], [-np.sin(0.7), 0, np.cos(0.7)]])
+    return hull(np.concatenate([flat * 1.5, 0.6 * flat @ tilt + [0.4, 0.1, 3.0]]))
+
+
+@shape("scattered", held_out=True)
+def _sunflower() -> Mesh:
+    """Seeds at the golden angle, denser towards the centre by the cube of the radius."""
+    k = np.arange(1200) + 0.5
+    radius, angle = (k / 1200) ** 1.5, k * np.pi * (3 - np.sqrt(5))
+    points = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return Mesh(raised(points), delaunay(points))
+
+
+@shape("terrain", held_out=True)
+def _dunes() -> Mesh:
+    """Waves on cells of 1 : 6 whose corners are moved."""
+    mesh, rng = grid(36), seeded(31)
+    x, y = mesh.V[:, 0] + 0.2 / 36 * rng.uniform(-1, 1, mesh.n_vertices), 6 * mesh.V[:, 1]
+    return Mesh(np.stack([x, y, 0.08 * np.sin(25 * x + np.sin(2 * y))], axis=1), mesh.F)
+
+
+@shape("voxels", held_out=True)
+def _wandering_cells() -> Mesh:
+    """Cells that a random walk visits."""
+    steps = seeded(32).integers(0, 6, 150)
+    step = np.concatenate([np.eye(3, dtype=int), -np.eye(3, dtype=int)])[steps]
+    return boxes(np.unique(np.cumsum(step, axis=0), axis=0))
+
+
+@shape("maze", held_out=True)
+def _fern() -> Mesh:
+    """A stem of cells with leaves on both sides, which are two cells wide and one cell apart."""
+    mesh, n = grid(36), 36
+    cell = np.floor(mesh.V[mesh.F].mean(axis=1)[:, :2] * n).astype(int)
+    is_leaf = (cell[:, 1] % 3 < 2) & (np.abs(cell[:, 0] - 18) < 17 - cell[:, 1] // 3)
+    return compact(mesh.V, mesh.F[is_leaf | (np.abs(cell[:, 0] - 17.5) < 1)])
+
+
+@shape("topology", held_out=True)
+def _crossed_sheets() -> Mesh:
+    """Two rectangles through one another along a common edge path, each with its own spacing."""
+    s, t = np.linspace(0, 1, 25), np.linspace(-1, 1, 21) ** 3
+    a, b = np.meshgrid(s, t, indexing="ij")
+    one = np.stack([a, b, np.zeros_like(a)], axis=-1).reshape(-1, 3)
+    other = np.stack([a, 0.3 * b, b], axis=-1).reshape(-1, 3)
+    F = lattice_faces(25, 21)
+    return merged(np.concatenate([one, other]), np.concatenate([F, F + len(one)]))
+
+
+@shape("rough", held_out=True)
+def _folded_paper() -> Mesh:
+    """Miura's fold: parallelograms of two triangles, mountains and valleys."""
+    i, j = np.meshgrid(np.arange(25), np.arange(25), indexing="ij")
+    V = np.stack([i + 0.5 * (j % 2), 0.9 * j, 0.7 * (i % 2)], axis=-1).reshape(-1, 3).astype(float)
+    return Mesh(V, lattice_faces(25, 25))
