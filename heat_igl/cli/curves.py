@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 import heat_igl
+from heat_igl import drawing
 from heat_igl.cli.options import (
     CurveOutput,
     JsonOption,
@@ -134,7 +135,7 @@ def signed(
     shown = np.where(np.isfinite(phi), phi, np.inf)
     written = write_results(
         loaded, phi, output, picture,
-        lambda: heat_igl.plots.plot_field(loaded, shown, label="signed distance", curves=drawn_on),
+        lambda: drawing.plot_field(loaded, shown, label="signed distance", curves=drawn_on),
     )  # fmt: skip
     finite = phi[np.isfinite(phi)]
     low, high, left, right = float(finite.min()), float(finite.max()), int((finite < 0).sum()), int((finite > 0).sum())

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 
 import heat_igl
+from heat_igl import drawing
 from heat_igl.cli.options import (
     BoundaryOption,
     CurveOutput,
@@ -97,7 +98,7 @@ def distance(
     with Console(stderr=True).status("measuring"):
         _warm_up(loaded, chosen)
         phi, about = _measured(loaded, sources, chosen, cutoff, mask)
-    written = write_results(loaded, phi, output, picture, lambda: heat_igl.plots.plot(loaded, phi, sources=vertices))
+    written = write_results(loaded, phi, output, picture, lambda: drawing.plot(loaded, phi, sources=vertices))
     print_rows([*_summary(mesh, loaded, phi, cutoff), *about, *gaps, *written], json_file)
 
 
