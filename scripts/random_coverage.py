@@ -24,7 +24,7 @@ from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES
 from heat_igl.windows.exact import ExactSurface
-from heat_igl.windows.half_edges import MARGIN, from_mesh
+from heat_igl.windows.tables import MARGIN, from_mesh
 
 from harness import Table, parsed, publish
 

@@ -35,7 +35,7 @@ from heat_igl.intrinsic import mollify
 from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.typing import FloatArray
 from heat_igl.windows import exact_distance
-from heat_igl.windows.half_edges import MARGIN
+from heat_igl.windows.tables import MARGIN
 
 from harness import Table, parsed, publish
 

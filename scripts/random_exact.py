@@ -35,7 +35,7 @@ from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo.registry import compact, hull, joined
 from heat_igl.windows import exact_distance
 from heat_igl.windows.exact import ExactSurface
-from heat_igl.windows.half_edges import MARGIN
+from heat_igl.windows.tables import MARGIN
 
 from harness import Row, Table, on_sphere, parsed, publish
 

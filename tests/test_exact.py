@@ -29,10 +29,9 @@ from surfaces import (
 )
 
 from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
-from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.kernels.mesh import flipping, gluing
+from heat_igl.intrinsic import HalfEdges, intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.windows.exact import ExactSurface, exact_distance
-from heat_igl.windows.half_edges import from_mesh
+from heat_igl.windows.tables import from_mesh
 from tests.steiner import graph_distance
 
 
@@ -356,16 +355,16 @@ def test_random_coarse_meshes():
 def test_compiled_flips_are_those_of_the_triangulation():
     """The intrinsic Delaunay triangulation of points in general position is unique."""
     mesh = sheared(random_disk(300, 1), 2.0)
-    vertex, twin, ring, aligned, length, n_across = gluing.glue(mesh.F, mesh.V, 1.0)
+    edges, exponent = HalfEdges.of_mesh(mesh)
     plain = intrinsic_triangulation(mesh)
-    np.testing.assert_array_equal(twin, plain.twin)
-    np.testing.assert_allclose(length, plain.l.ravel(), rtol=1e-15)
-    assert n_across == 0
-    assert aligned.all()
-    assert flipping.flip(vertex, twin, ring, length, 1e-7, 10**6) > 100
+    assert exponent == 0
+    for found, expected in zip(edges, HalfEdges.of(plain), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-15)
+    edges.flip(mesh.F, 0.0)
     flipped = intrinsic_delaunay(plain)
-    np.testing.assert_allclose(np.sort(length), np.sort(flipped.l.ravel()), rtol=1e-12)
-    np.testing.assert_array_equal(length[twin[twin >= 0]], length[twin >= 0])
+    assert flipped.n_flips > 100
+    np.testing.assert_allclose(np.sort(edges.length), np.sort(flipped.l.ravel()), rtol=1e-12)
+    np.testing.assert_array_equal(edges.length[edges.twin[edges.twin >= 0]], edges.length[edges.twin >= 0])
 
 
 def test_the_order_of_vertices_and_faces_does_not_matter():

@@ -25,7 +25,7 @@ from heat_igl import (
 )
 from heat_igl.plan import SurfaceMeasures, distance_plan, sweep_plan
 from heat_igl.windows import engine
-from heat_igl.windows.half_edges import from_mesh
+from heat_igl.windows.tables import from_mesh
 
 # --- `geodesic_distance`, and `as_mesh` in front of everything that takes a mesh
 

@@ -223,7 +223,7 @@ def test_flat_faces_leave_distances_as_they_are(share, cap):
 @pytest.mark.parametrize("mollification", [1e-8, 1e-11, 1e-12])
 def test_flips_come_to_an_end_on_flat_faces(cow, monkeypatch, mollification):
     """Rounding makes some flips of flat triangles undo each other; with hardly any mollification, for ever."""
-    monkeypatch.setattr(heat_igl.intrinsic.mollification, "_MARGIN", mollification)
+    monkeypatch.setattr(heat_igl.intrinsic.half_edges, "_MARGIN", mollification)
     rounds = []
     flip = heat_igl.intrinsic.delaunay._Flips.flip
 

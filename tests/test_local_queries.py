@@ -34,7 +34,7 @@ from heat_igl.windows import (
     write_distances_within,
 )
 from heat_igl.windows.exact import ExactSurface, exact_distance
-from heat_igl.windows.half_edges import from_mesh
+from heat_igl.windows.tables import from_mesh
 from heat_igl.windows.window_search import Found
 
 # --- Local queries: equal to the full search, ended where asked, cleared after each; errors that name the remedy

@@ -16,7 +16,7 @@ from heat_igl.mesh import Mesh
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.windows import ExactSurface
-from heat_igl.windows.half_edges import from_mesh
+from heat_igl.windows.tables import from_mesh
 
 __all__ = ["PyGeodesicAlgorithmExact", "read_mesh_from_file"]
 

@@ -14,7 +14,7 @@ from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import PathDirections, WindowWays, contradicted, in_circle, local_searches
-from heat_igl.windows.half_edges import MARGIN, HalfEdges, from_triangulation
+from heat_igl.windows.tables import MARGIN, Tables, from_triangulation
 
 __all__ = ["LogMapsWithin", "log_maps_within"]
 
@@ -105,8 +105,8 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     n = triangles.n_vertices
     chosen = triangles.originals[np.arange(n) if sources is None else named_vertices(sources, n)]
     surface = unfolding_surface(triangles, MARGIN)
-    directions, edges = PathDirections(surface), from_triangulation(surface.unfolding)
-    indptr, ways, distance = _paths(edges, triangles.V, chosen, limit)
+    directions, tables = PathDirections(surface), from_triangulation(surface.unfolding)
+    indptr, ways, distance = _paths(tables, triangles.V, chosen, limit)
     angles, polar = directions.of_ways(ways), directions.angles
     back, departure = (
         rigid_angles(angle, polar, at)
@@ -120,31 +120,31 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     return LogMapsWithin(*(array[:, triangles.originals] if triangles.has_copies else array for array in found))
 
 
-def _paths(edges: HalfEdges, V: FloatArray, chosen: IntArray, radius: float) -> tuple[IntArray, WindowWays, FloatArray]:
+def _paths(tables: Tables, V: FloatArray, chosen: IntArray, radius: float) -> tuple[IntArray, WindowWays, FloatArray]:
     """Of paths from vertices (k,), source after source: the ends (k + 1,), how they run, and their lengths."""
-    number = edges.number[chosen]
+    number = tables.number[chosen]
     order = np.argsort(number, kind="stable")
-    limit = float(edges.scaled(radius))
+    limit = float(tables.scaled(radius))
     parts = local_searches.in_chunks(
-        edges, number[order], lambda work, part: local_searches.within(work, part, limit), V, directed=True
+        tables, number[order], lambda work, part: local_searches.within(work, part, limit), V, directed=True
     )
     counts, vertex, distance, way, line, is_wrong = (np.concatenate(column) for column in zip(*parts, strict=True))
     if is_wrong.any():
         raise contradicted(f"from vertex {chosen[order[np.argmax(is_wrong)]]}")
     # In the order of the sources, and of each in the order of the vertices.
     source = np.repeat(order, counts)
-    key = source * edges.n + vertex
+    key = source * tables.n + vertex
     sort = np.argsort(key, kind="stable")
     key, vertex, way, line = key[sort], vertex[sort], way[sort], line[sort]
-    root = edges.old_vertex[way[:, 0]]
+    root = tables.old_vertex[way[:, 0]]
     # Roots are nearer than the vertices, so they are there too.
     ways = WindowWays(
         vertex.astype(np.int64),
-        np.searchsorted(key, source[sort] * edges.n + root),
-        edges.old_half_edge(way[:, 1]),
+        np.searchsorted(key, source[sort] * tables.n + root),
+        tables.old_half_edge(way[:, 1]),
         line[:, :2],
-        edges.old_half_edge(way[:, 2]),
-        edges.unscaled(line[:, 2]),
+        tables.old_half_edge(way[:, 2]),
+        tables.unscaled(line[:, 2]),
     )
     indptr = np.append(0, np.cumsum(np.bincount(source, minlength=len(chosen))))
-    return indptr, ways, edges.unscaled(distance[sort])
+    return indptr, ways, tables.unscaled(distance[sort])

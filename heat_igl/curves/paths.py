@@ -10,7 +10,7 @@ from heat_igl.mesh import Mesh, MeshLike, MeshPart, SurfaceCurve, SurfacePoints,
 from heat_igl.sources import Sources, SourceSet, named_vertices, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import exact_paths
-from heat_igl.windows.half_edges import MARGIN
+from heat_igl.windows.tables import MARGIN
 
 __all__ = ["shortest_path", "shortest_paths"]
 

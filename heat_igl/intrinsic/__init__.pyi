@@ -8,6 +8,8 @@ from heat_igl.intrinsic.gluing import from_gluing as from_gluing
 from heat_igl.intrinsic.gluing import intrinsic_triangulation as intrinsic_triangulation
 from heat_igl.intrinsic.gluing import oriented as oriented
 from heat_igl.intrinsic.gradient import intrinsic_gradient as intrinsic_gradient
+from heat_igl.intrinsic.half_edges import HalfEdges as HalfEdges
+from heat_igl.intrinsic.half_edges import mollify as mollify
 from heat_igl.intrinsic.history import Covered as Covered
 from heat_igl.intrinsic.history import Flipped as Flipped
 from heat_igl.intrinsic.history import Merged as Merged
@@ -16,7 +18,6 @@ from heat_igl.intrinsic.history import Turned as Turned
 from heat_igl.intrinsic.layout import apex as apex
 from heat_igl.intrinsic.layout import corner_angles as corner_angles
 from heat_igl.intrinsic.layout import lay_out as lay_out
-from heat_igl.intrinsic.mollification import mollify as mollify
 from heat_igl.intrinsic.oriented_cover import double_cover as double_cover
 from heat_igl.intrinsic.refinement import delaunay_refinement as delaunay_refinement
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation as IntrinsicTriangulation

@@ -8,8 +8,8 @@ import igl
 import numpy as np
 
 from heat_igl.errors import MeshError, real_numbers
+from heat_igl.intrinsic.half_edges import mollify
 from heat_igl.intrinsic.history import Turned
-from heat_igl.intrinsic.mollification import mollify
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, half_edge_head, half_edge_tail
 from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import ArrayLike, FloatArray, IntArray

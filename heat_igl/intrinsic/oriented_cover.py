@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.intrinsic.half_edges import HalfEdges
 from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
-from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["double_cover"]
 
 
-def double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, FloatArray, IntArray]:
+def double_cover(triangulation: IntrinsicTriangulation) -> HalfEdges:
     """The oriented double cover: each face as it is on one sheet and turned over on the other, glued along equal sides.
 
     Parameters
@@ -22,12 +22,11 @@ def double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, Float
 
     Returns
     -------
-    F, l : (2 m, 3) int64, (2 m, 3) float64
-        Faces and lengths of their sides; face f is f on the first sheet and m + f on the second. Turning a face over
-        swaps corners 1 and 2. Vertex v becomes v and v + n, one for each orientation of the faces around it. Fans that
-        meet in v alone are assigned to the two copies arbitrarily: in v, a path may change sheets.
-    twin : (6 m,) int64
-        The half-edge glued to each; -1 on the boundary and at edges of more than two faces.
+    HalfEdges
+        Of 2 m faces; face f is f on the first sheet and m + f on the second. Turning a face over swaps corners 1 and 2.
+        Vertex v becomes v and v + n, one for each orientation of the faces around it. Fans that meet in v alone are
+        assigned to the two copies arbitrarily: in v, a path may change sheets. Edges of more than two faces become
+        boundaries.
     """
     F, n = triangulation.F, triangulation.n
     size = F.size
@@ -63,4 +62,6 @@ def double_cover(triangulation: IntrinsicTriangulation) -> tuple[IntArray, Float
     is_second = np.empty(2 * size, bool)
     is_second[sheet_of_first[:size]] = first > second
     is_second[sheet_of_first[size:]] = second > first
-    return (vertex + n * is_second).reshape(-1, 3), lengths, twin
+    vertex = (vertex + n * is_second).astype(np.int32)
+    itself, aligned = np.arange(2 * size, dtype=np.int32), np.ones(2 * size, np.uint8)
+    return HalfEdges(vertex, twin.astype(np.int32), itself, aligned, lengths.ravel())

@@ -13,8 +13,8 @@ from dataclasses import replace
 import igl
 import numpy as np
 
+from heat_igl.intrinsic.half_edges import mollify
 from heat_igl.intrinsic.history import BACK_CORNERS, Covered
-from heat_igl.intrinsic.mollification import mollify
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.mesh import Mesh, grouping
 from heat_igl.typing import FloatArray

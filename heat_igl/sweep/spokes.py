@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.intrinsic import IntrinsicTriangulation, double_cover
-from heat_igl.kernels.mesh import numbering
-from heat_igl.kernels.sweep import half_edges
+from heat_igl.intrinsic import HalfEdges, IntrinsicTriangulation, double_cover
+from heat_igl.kernels.sweep import spokes
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
 __all__ = ["Spokes", "aligned", "numbered_spokes"]
@@ -52,17 +51,12 @@ def numbered_spokes(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, Sp
     come in an arbitrary order. A surface whose faces are not aligned is replaced by its oriented double cover, with
     2 n rows.
     """
-    F, lengths, twin, n = triangulation.F, triangulation.l, triangulation.twin, triangulation.n
-    if not triangulation.aligned.all():
-        F, lengths, twin = double_cover(triangulation)
-        n = 2 * n
-    vertex, twin, _, _, lengths, number, _ = numbering.breadth_first(
-        F.ravel().astype(np.int32), twin.astype(np.int32), None, None, np.ascontiguousarray(lengths).ravel(), n, 0
-    )
-    F, lengths = vertex.reshape(-1, 3), lengths.reshape(-1, 3)
-    first = half_edges.first_spokes(F, twin, n)
+    is_oriented = triangulation.aligned.all()
+    given = HalfEdges.of(triangulation) if is_oriented else double_cover(triangulation)
+    edges, number, _ = given.numbered(triangulation.n if is_oriented else 2 * triangulation.n)
+    first = spokes.first_spokes(edges, len(number))
     spoke = aligned(first[-1], _SPOKE)
-    total, is_flat = half_edges.fill(F, lengths, twin, first, spoke)
+    total, is_flat = spokes.fill(edges, first, spoke)
     return number, Spokes(first, spoke, total, is_flat)
 
 

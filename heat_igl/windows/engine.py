@@ -14,7 +14,7 @@ from heat_igl.mesh import Mesh
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.exact import ExactSurface
-from heat_igl.windows.half_edges import MARGIN, HalfEdges, from_mesh, from_triangulation
+from heat_igl.windows.tables import MARGIN, Tables, from_mesh, from_triangulation
 
 if TYPE_CHECKING:
     from heat_igl.intrinsic import IntrinsicTriangulation
@@ -120,7 +120,7 @@ class Triangles(ABC):
         """The triangles, with their history, which carries points and curves to them."""
 
     @abstractmethod
-    def half_edges(self) -> HalfEdges:
+    def tables(self) -> Tables:
         """Tables for distance from vertices, which need no history."""
 
     @property
@@ -171,7 +171,7 @@ class MeshTriangles(Triangles):
         """The faces (m, 3) of the mesh."""
         return self._mesh.F
 
-    def half_edges(self) -> HalfEdges:
+    def tables(self) -> Tables:
         """Tables for distance from vertices."""
         return from_mesh(self._mesh, 0)
 
@@ -202,7 +202,7 @@ class OperatorTriangles(Triangles):
         """The triangles with their history."""
         return self._surface
 
-    def half_edges(self) -> HalfEdges:
+    def tables(self) -> Tables:
         """Tables for distance from vertices."""
         return from_triangulation(self._surface.unfolding)
 

@@ -13,10 +13,9 @@ from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.runtime import n_threads
 from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
-from heat_igl.windows.half_edges import HalfEdges, from_mesh, from_triangulation
 from heat_igl.windows.leaving import with_places, with_turns
-from heat_igl.windows.window_search import Found, Leaving, Searched, search
-from heat_igl.windows.window_starts import starts_at
+from heat_igl.windows.tables import Tables, from_mesh, from_triangulation
+from heat_igl.windows.window_search import Found, Leaving, Searched, search, starts_at
 
 __all__ = ["ExactSolution", "ExactSurface", "Origin", "exact_distance"]
 
@@ -82,7 +81,7 @@ class ExactSurface:
 
     Parameters
     ----------
-    triangulation : IntrinsicTriangulation or HalfEdges
+    triangulation : IntrinsicTriangulation or Tables
         m triangles on n vertices; of an intrinsic Delaunay one fewest edges are crossed.
 
     Raises
@@ -96,11 +95,11 @@ class ExactSurface:
     fans, and components are all allowed. Immutable; threads may share it, and a query releases the interpreter's lock.
     """
 
-    def __init__(self, triangulation: IntrinsicTriangulation | HalfEdges) -> None:
+    def __init__(self, triangulation: IntrinsicTriangulation | Tables) -> None:
         if isinstance(triangulation, IntrinsicTriangulation):
             triangulation = from_triangulation(triangulation)
-        self._half_edges = triangulation
-        self.n = self._half_edges.n
+        self._tables = triangulation
+        self.n = self._tables.n
 
     def solve(
         self,
@@ -156,9 +155,9 @@ class ExactSurface:
         ValueError
             If there are segments or points, and the surface does not know the faces that they refer to.
         """
-        starts = starts_at(self._half_edges, sources, offsets, points, point_offsets, segments)
+        starts = starts_at(self._tables, sources, offsets, points, point_offsets, segments)
         done = search(
-            self._half_edges,
+            self._tables,
             starts,
             cutoff=cutoff,
             targets=targets,
@@ -168,7 +167,7 @@ class ExactSurface:
         )
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
-            *self._result(done.found, done, self._half_edges.number, cutoff),
+            *self._result(done.found, done, self._tables.number, cutoff),
             *self._result(done.targets.found, done, which, cutoff),
             done.n_windows,
             done.n_crossings,
@@ -183,10 +182,10 @@ class ExactSurface:
         threads: int = 1,
     ) -> FloatArray:
         """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths."""
-        edges = self._half_edges
-        starts = starts_at(edges, sources, offsets, None, None, None)
-        done = search(edges, starts, cutoff=cutoff, threads=threads)
-        distance = edges.unscaled(done.found.distance[edges.number])
+        tables = self._tables
+        starts = starts_at(tables, sources, offsets, None, None, None)
+        done = search(tables, starts, cutoff=cutoff, threads=threads)
+        distance = tables.unscaled(done.found.distance[tables.number])
         if cutoff < np.inf:
             distance[distance > cutoff] = np.inf
         return distance
@@ -196,8 +195,8 @@ class ExactSurface:
 
         A point on a side is there once for each triangle.
         """
-        place = self._half_edges.located(points)
-        return self._half_edges.face[place.faces].astype(np.int64), place.barycentric, place.point
+        place = self._tables.located(points)
+        return self._tables.face[place.faces].astype(np.int64), place.barycentric, place.point
 
     def located_segments(self, segments: SourceSegments) -> tuple[IntArray, FloatArray]:
         """Triangles (q,) that hold segments, and coordinates (q, 2, 3) of both ends; one on a side is there twice.
@@ -207,34 +206,34 @@ class ExactSurface:
         ValueError
             If the triangles are not those that the segments were given in.
         """
-        place = self._half_edges.located_segments(segments)
-        return self._half_edges.face[place.faces].astype(np.int64), place.barycentric
+        place = self._tables.located_segments(segments)
+        return self._tables.face[place.faces].astype(np.int64), place.barycentric
 
     def _leaving(self, done: Searched) -> Leaving | None:
         """How paths leave the roots, in the caller's numbers."""
         if done.leaving is None:
             return None
-        edges = self._half_edges
-        leaving = (with_places if len(done.starts.segments.faces) else with_turns)(edges, done, done.leaving)
-        corner, direction = leaving.corner[edges.number], leaving.direction[edges.number]
-        place, turn = (None if of is None else of[edges.number] for of in (leaving.place, leaving.turn))
-        return Leaving(edges.old_half_edge(corner), direction, place, turn)
+        tables = self._tables
+        leaving = (with_places if len(done.starts.segments.faces) else with_turns)(tables, done, done.leaving)
+        corner, direction = leaving.corner[tables.number], leaving.direction[tables.number]
+        place, turn = (None if of is None else of[tables.number] for of in (leaving.place, leaving.turn))
+        return Leaving(tables.old_half_edge(corner), direction, place, turn)
 
     def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
         """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""
-        edges, starts, label = self._half_edges, done.starts, done.found.label
-        distance = edges.unscaled(found.distance[which])
+        tables, starts, label = self._tables, done.starts, done.found.label
+        distance = tables.unscaled(found.distance[which])
         within: BoolArray = (distance <= cutoff) & (found.root[which] >= 0)
         root = np.where(within, found.root[which], -1)
         # Copies of a point or segment on a side are one, and the ends of a segment belong to it.
-        names = np.concatenate([edges.old_vertex, np.where(starts.place < 0, -1, self.n + starts.place)])
+        names = np.concatenate([tables.old_vertex, np.where(starts.place < 0, -1, self.n + starts.place)])
         # Roots are labelled as vertices are.
         first = found.label[which] if len(found.label) else label[root]
         origin = Origin(
             starts.label[np.where(within, first, -1)],
             names[root],
-            edges.old_half_edge(np.where(within, found.entered[which], -1)),
-            edges.unscaled(found.crossing[which]),
+            tables.old_half_edge(np.where(within, found.entered[which], -1)),
+            tables.unscaled(found.crossing[which]),
         )
         return np.where(within, distance, np.inf), origin
 

@@ -12,9 +12,8 @@ from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.kernels.windows.surface import SEVERAL_FANS
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.windows.half_edges import HalfEdges, from_mesh
-from heat_igl.windows.window_search import Leaving, Searched, search
-from heat_igl.windows.window_starts import starts_at
+from heat_igl.windows.tables import Tables, from_mesh
+from heat_igl.windows.window_search import Leaving, Searched, search, starts_at
 
 __all__ = ["vectors_from"]
 
@@ -55,27 +54,27 @@ def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
     if given is None:
         return None
     spokes, scale, on_boundary = given
-    edges = from_mesh(mesh, source)
-    if (edges.tables.twin == -2).any() or not edges.tables.aligned.all():
+    tables = from_mesh(mesh, source)
+    if (tables.edges.twin == -2).any() or not tables.edges.aligned.all():
         return None
-    around = _around(edges, source)
+    around = _around(tables, source)
     first = _first_angle(spokes, around, scale)
     if first is None:
         return None
-    done = search(edges, starts_at(edges, np.array([source]), None, None, None, None), directed=True)
+    done = search(tables, starts_at(tables, np.array([source]), None, None, None, None), directed=True)
     leaving = done.leaving
-    if leaving is None or (edges.tables.kind == SEVERAL_FANS).any():
+    if leaving is None or (tables.kind == SEVERAL_FANS).any():
         return None
-    begin = np.zeros(len(edges.tables.vertex))
+    begin = np.zeros(len(tables.edges.vertex))
     begin[around.corner] = first + scale * around.angle
-    top, straight, seen = _first_parts(done, leaving, int(edges.number[source]))
+    top, straight, seen = _first_parts(done, leaving, int(tables.number[source]))
     angle = begin[leaving.corner[straight]] + scale * seen
     if on_boundary:
         angle = np.clip(angle, 0.0, np.pi)
     unit = np.zeros((len(top), 2))
     unit[straight, 0], unit[straight, 1] = np.cos(angle), np.sin(angle)
-    length = edges.unscaled(np.where(done.found.root < 0, 0.0, done.found.distance))
-    return np.asarray((length[:, None] * unit[top])[edges.number])
+    length = tables.unscaled(np.where(done.found.root < 0, 0.0, done.found.distance))
+    return np.asarray((length[:, None] * unit[top])[tables.number])
 
 
 def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None:
@@ -98,15 +97,15 @@ def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None
     return spokes, float(polar.scale[centre]), bool(polar.on_boundary[centre])
 
 
-def _around(edges: HalfEdges, source: int) -> _Spokes:
+def _around(tables: Tables, source: int) -> _Spokes:
     """The edges at a vertex of the tables, counterclockwise, with the sums of the angles of the faces before them."""
-    t = edges.tables
-    start = int(t.corner_of_vertex[edges.number[source]])
+    t = tables.edges
+    start = int(tables.corner_of_vertex[tables.number[source]])
     clockwise, is_closed = _fan(t.twin, start, 2)
     found = np.array(_fan(t.twin, start if is_closed else clockwise[-1], 1)[0])
     angles = corner_angles(t.length.reshape(-1, 3)[found // 3])[np.arange(len(found)), found % 3]
-    end = edges.old_vertex[t.vertex[next_half_edge(found)]]
-    return _Spokes(end, edges.unscaled(t.length[previous_half_edge(found)]), np.cumsum(angles) - angles, found)
+    end = tables.old_vertex[t.vertex[next_half_edge(found)]]
+    return _Spokes(end, tables.unscaled(t.length[previous_half_edge(found)]), np.cumsum(angles) - angles, found)
 
 
 def _fan(twin: AnyArray, start: int, step: int) -> tuple[list[int], bool]:

@@ -14,7 +14,7 @@ from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import local_searches
 from heat_igl.windows.guarded import distances_instead
-from heat_igl.windows.half_edges import HalfEdges, from_mesh
+from heat_igl.windows.tables import Tables, from_mesh
 
 __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]
 
@@ -94,31 +94,31 @@ def blocks_within(
     limit = positive("radius", radius, infinite=True)
     triangles, part = _triangles(mesh)
     chosen = _chosen(sources, triangles, part)
-    edges = from_mesh(triangles, int(chosen[0]))
+    tables = from_mesh(triangles, int(chosen[0]))
     least = local_searches.CHUNK * n_threads()
     start, rows = 0, least
     while start < len(chosen):
-        block = _rows_within(triangles, edges, chosen[start : start + rows], limit)
+        block = _rows_within(triangles, tables, chosen[start : start + rows], limit)
         yield block
         start += rows
         rows = max(int(most_entries * block.shape[0] / max(block.nnz, 1)) // least, 1) * least
 
 
-def _rows_within(triangles: Mesh, edges: HalfEdges, chosen: IntArray, limit: float) -> sp.csr_array:
-    number = edges.number[chosen]
+def _rows_within(triangles: Mesh, tables: Tables, chosen: IntArray, limit: float) -> sp.csr_array:
+    number = tables.number[chosen]
     order = np.argsort(number, kind="stable")
     count = _Count(len(chosen), available_memory() / _BYTES)
     parts = local_searches.in_chunks(
-        edges,
+        tables,
         number[order],
-        lambda work, part: count(local_searches.within(work, part, float(edges.scaled(limit)))),
+        lambda work, part: count(local_searches.within(work, part, float(tables.scaled(limit)))),
         triangles.V,
     )
     counts = np.concatenate([part.counts for part in parts])
     ends = np.concatenate([[0], np.cumsum(counts)])
     columns = np.concatenate([part.vertex for part in parts])
-    values = edges.unscaled(np.concatenate([part.distance for part in parts]))
-    found = sp.csr_array((values, columns, ends), shape=(len(chosen), edges.n))
+    values = tables.unscaled(np.concatenate([part.distance for part in parts]))
+    found = sp.csr_array((values, columns, ends), shape=(len(chosen), tables.n))
     wrong = _wrong(parts)
     if len(wrong):
         rows = distances_instead(triangles, chosen[order[wrong]])
@@ -177,18 +177,18 @@ def nearest_vertices(
         raise ValueError(f"k must be a positive integer, not {shown(k)}")
     triangles, part = _triangles(mesh, region)
     chosen = _chosen(sources, triangles, part)
-    edges = from_mesh(triangles, int(chosen[0]))
+    tables = from_mesh(triangles, int(chosen[0]))
     # More than all vertices cannot be found.
     wanted = min(int(k), triangles.n_vertices)
     indices, distances = _unfilled(len(chosen), int(k), triangles.n_vertices)
-    number = edges.number[chosen]
+    number = tables.number[chosen]
     order = np.argsort(number, kind="stable")
     parts = local_searches.in_chunks(
-        edges, number[order], lambda work, part: local_searches.nearest(work, part, wanted), triangles.V
+        tables, number[order], lambda work, part: local_searches.nearest(work, part, wanted), triangles.V
     )
     i, j = np.nonzero(np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None])
     indices[order[i], j] = np.concatenate([part.vertex for part in parts])
-    distances[order[i], j] = edges.unscaled(np.concatenate([part.distance for part in parts]))
+    distances[order[i], j] = tables.unscaled(np.concatenate([part.distance for part in parts]))
     wrong = order[_wrong(parts)]
     if len(wrong):
         rows = distances_instead(triangles, chosen[wrong])
@@ -257,19 +257,19 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None
     joined = np.flatnonzero(components[first] == components[second])
     if not len(joined):
         return distance
-    edges = from_mesh(triangles, int(first[joined].min()))
-    joined = joined[np.argsort(edges.number[first[joined]], kind="stable")]
-    sources, begin = np.unique(edges.number[first[joined]], return_index=True)
+    tables = from_mesh(triangles, int(first[joined].min()))
+    joined = joined[np.argsort(tables.number[first[joined]], kind="stable")]
+    sources, begin = np.unique(tables.number[first[joined]], return_index=True)
     ends = np.append(begin, len(joined))
-    goals = edges.number[second[joined]]
+    goals = tables.number[second[joined]]
     parts = local_searches.in_chunks(
-        edges,
+        tables,
         sources,
         lambda work, part: local_searches.to_goals(work, part, goals[ends[part.start] : ends[part.stop]], ends),
         triangles.V,
     )
-    distance[joined] = edges.unscaled(np.concatenate([part.distance for part in parts]))
-    wrong = edges.old_vertex[sources[_wrong(parts)]]
+    distance[joined] = tables.unscaled(np.concatenate([part.distance for part in parts]))
+    wrong = tables.old_vertex[sources[_wrong(parts)]]
     for source, row in zip(wrong, distances_instead(triangles, wrong), strict=True):
         distance[first == source] = row[second[first == source]]
     return distance

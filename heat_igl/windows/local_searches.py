@@ -13,8 +13,8 @@ from heat_igl.kernels.signals import raise_caught
 from heat_igl.kernels.windows import windows
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
-from heat_igl.windows.half_edges import HalfEdges
 from heat_igl.windows.invariants import ROUNDING
+from heat_igl.windows.tables import Tables
 from heat_igl.windows.window_search import TOLERANCE, Found, Leaving
 
 __all__ = [
@@ -66,18 +66,18 @@ class Workspace:
     With `directed`, searches find in which directions paths leave; the faces must be oriented alike.
     """
 
-    def __init__(self, edges: HalfEdges, position: FloatArray, directed: bool = False) -> None:
-        self._edges, self.names, self.is_directed = edges, edges.old_vertex, directed
-        self._found, self._position, self._scratch = Found.of(edges.n, edges.n), position, np.full(edges.n, np.inf)
-        leaving = Leaving.of(edges.n) if directed else None
-        self._front = windows.Front(edges.tables, self._found, TOLERANCE, leaving, position.ravel())
+    def __init__(self, tables: Tables, position: FloatArray, directed: bool = False) -> None:
+        self._tables, self.names, self.is_directed = tables, tables.old_vertex, directed
+        self._found, self._position, self._scratch = Found.of(tables.n, tables.n), position, np.full(tables.n, np.inf)
+        leaving = Leaving.of(tables.n) if directed else None
+        self._front = windows.Front(tables, self._found, TOLERANCE, leaving, position.ravel())
 
     def checked(self, part: Chunk, near: Near, limit: FloatArray | float) -> Near:
         """The answers of `part` with those that are wrong marked; each holds all vertices up to its limit."""
-        edges, limits = self._edges, np.broadcast_to(limit, len(near.counts)).astype(np.float64)
-        found = edges.number[near.vertex]
+        tables, limits = self._tables, np.broadcast_to(limit, len(near.counts)).astype(np.float64)
+        found = tables.number[near.vertex]
         answers = part.vertices, near.counts, found, near.distance, limits
-        wrong = checking.wrong_rows(edges.tables, self._position, *answers, self._scratch, ROUNDING)
+        wrong = checking.wrong_rows(tables, self._position, *answers, self._scratch, ROUNDING)
         return near._replace(is_wrong=wrong)
 
     def search(
@@ -150,7 +150,7 @@ def to_goals(work: Workspace, part: Chunk, goals: AnyArray, ends: IntArray) -> N
 
 
 def in_chunks(
-    edges: HalfEdges,
+    tables: Tables,
     sources: AnyArray,
     search: Callable[[Workspace, Chunk], Near],
     V: FloatArray,
@@ -161,7 +161,7 @@ def in_chunks(
     Sources are numbers in the tables. In ascending order, a search often finds its data in the processor's cache. V are
     the positions (n, 3) of the vertices.
     """
-    position = np.ascontiguousarray(edges.scaled(V[edges.old_vertex]))
+    position = np.ascontiguousarray(tables.scaled(V[tables.old_vertex]))
     starts = range(0, len(sources), CHUNK)
     waiting = deque(enumerate(starts))
     parts: list[Any] = [None] * len(starts)
@@ -179,5 +179,5 @@ def in_chunks(
                 waiting.clear()  # for a Ctrl-C, other threads end with the chunk at hand
                 raise
 
-    side_by_side(run, [Workspace(edges, position, directed) for _ in range(min(n_threads(), len(starts)))])
+    side_by_side(run, [Workspace(tables, position, directed) for _ in range(min(n_threads(), len(starts)))])
     return parts

@@ -11,26 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.intrinsic import HalfEdges
 from heat_igl.kernels.windows import derivatives as kernels
 from heat_igl.mesh import SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
-from heat_igl.windows.half_edges import rings
 
-__all__ = ["Change", "Paths", "Places", "Starts", "Triangles", "Ways", "half_edge_arrays"]
+__all__ = ["Change", "Paths", "Places", "Starts", "Ways"]
 
 _AT_SOURCE, _ALONG_EDGE, _IN_FACE, _ACROSS = range(4)
-
-
-class Triangles(NamedTuple):
-    """Triangles by half-edges, (3 m,) each: corners' vertices, lengths, twins, the ring of -2, and aligned or not."""
-
-    vertex: AnyArray
-    length: FloatArray
-    twin: AnyArray
-    ring: AnyArray
-    aligned: AnyArray
 
 
 class Places(NamedTuple):
@@ -121,7 +110,7 @@ class Paths:
 
     Parameters
     ----------
-    triangles : Triangles
+    triangles : HalfEdges
         m triangles on n vertices.
     places : Places
         The source points.
@@ -136,7 +125,7 @@ class Paths:
         Vertices that are reached and whose path was not found. Their derivative is 0.
     """
 
-    def __init__(self, triangles: Triangles, places: Places, ways: Ways, is_source: BoolArray) -> None:
+    def __init__(self, triangles: HalfEdges, places: Places, ways: Ways, is_source: BoolArray) -> None:
         n, e = len(ways.distance), len(places.faces)
         self.n = n
         distance = np.concatenate([ways.distance, places.offset])
@@ -214,7 +203,7 @@ class Paths:
         return change[: self.n]
 
 
-def _along_edges(triangles: Triangles, distance: FloatArray, vertices: IntArray) -> IntArray:
+def _along_edges(triangles: HalfEdges, distance: FloatArray, vertices: IntArray) -> IntArray:
     """The half-edge (k,) along which the path of each of k vertices begins; -1 where none leads to its distance."""
     side = np.full(len(vertices), -1)
     if not len(vertices):
@@ -239,7 +228,7 @@ def _along_edges(triangles: Triangles, distance: FloatArray, vertices: IntArray)
 
 
 def _in_faces(
-    triangles: Triangles, places: Places, distance: FloatArray, vertices: IntArray
+    triangles: HalfEdges, places: Places, distance: FloatArray, vertices: IntArray
 ) -> tuple[IntArray, FloatArray]:
     """The entry of `places` (k,) that the path of each of k vertices ends at inside a face, and the corner there."""
     entry, corner = np.full(len(vertices), -1), np.zeros(len(vertices))
@@ -257,14 +246,3 @@ def _in_faces(
                 best[at[j]], entry[at[j]], corner[at[j]] = length[j], j, 3 * places.faces[j] + c
     entry[best > distance[vertices] * (1 + 1e-7)] = -1
     return entry, corner
-
-
-def half_edge_arrays(triangulation: IntrinsicTriangulation) -> Triangles:
-    """The arrays of a triangulation."""
-    return Triangles(
-        np.ascontiguousarray(triangulation.F.ravel(), np.int32),
-        np.ascontiguousarray(triangulation.l).ravel(),
-        np.ascontiguousarray(triangulation.twin, np.int32),
-        rings(triangulation),
-        np.ascontiguousarray(triangulation.aligned).view(np.uint8),
-    )

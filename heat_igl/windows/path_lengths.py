@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.intrinsic import HalfEdges, IntrinsicTriangulation
 from heat_igl.mesh import SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows.exact import ExactSurface
-from heat_igl.windows.path_derivatives import Change, Paths, Places, Starts, Ways, half_edge_arrays
+from heat_igl.windows.path_derivatives import Change, Paths, Places, Starts, Ways
 
 __all__ = ["PathLengths", "SideChange", "from_windows"]
 
@@ -122,5 +122,5 @@ def from_windows(surface: ExactSurface, triangulation: IntrinsicTriangulation, s
         begins = np.concatenate([found.distance, starts.point_offsets, [0.0]])
     length = triangulation.l.ravel()[origin.entered]
     ways = Ways(found.distance, origin.entered, origin.crossing / length, found.distance - begins[origin.root])
-    paths = Paths(half_edge_arrays(triangulation), places, ways, is_source=origin.root == np.arange(n))
+    paths = Paths(HalfEdges.of(triangulation), places, ways, is_source=origin.root == np.arange(n))
     return PathLengths(triangulation, paths, starts.points)

@@ -12,9 +12,8 @@ from heat_igl.kernels.windows import paths
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.windows.half_edges import MARGIN, HalfEdges, from_triangulation
-from heat_igl.windows.window_search import Searched, search
-from heat_igl.windows.window_starts import starts_at
+from heat_igl.windows.tables import MARGIN, Tables, from_triangulation
+from heat_igl.windows.window_search import Searched, search, starts_at
 
 __all__ = ["ExactPaths", "PathStarts", "exact_paths"]
 
@@ -92,14 +91,14 @@ def exact_paths(
     MemoryError
         If the windows do not fit into memory.
     """
-    edges = from_triangulation(intrinsic_triangulation(mesh, margin))
+    tables = from_triangulation(intrinsic_triangulation(mesh, margin))
     is_corner = barycentric.max(axis=1) == 1
     vertex = np.full(len(faces), -1)
     vertex[is_corner] = mesh.F[faces[is_corner], barycentric[is_corner].argmax(axis=1)]
     points, segments = sources.points, sources.segments
     begin = float(sources.offsets.min())
     sources_there = starts_at(
-        edges,
+        tables,
         sources.vertices,
         sources.vertex_offset - begin,
         SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
@@ -107,21 +106,21 @@ def exact_paths(
         replace(segments, offset=segments.offset - begin) if len(segments.faces) else None,
     )
     inside = SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None
-    done = search(edges, sources_there, targets=inside, goals=np.unique(vertex[is_corner]))
-    starts = _starts(edges, done, vertex)
-    where, places, ends = _traced(edges, done, starts)
+    done = search(tables, sources_there, targets=inside, goals=np.unique(vertex[is_corner]))
+    starts = _starts(tables, done, vertex)
+    where, places, ends = _traced(tables, done, starts)
     return ExactPaths(
-        edges.face[where].astype(np.int64), places, np.append(0, ends), edges.unscaled(starts.distance) + begin
+        tables.face[where].astype(np.int64), places, np.append(0, ends), tables.unscaled(starts.distance) + begin
     )
 
 
-def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> PathStarts:
+def _starts(tables: Tables, done: Searched, vertex: IntArray) -> PathStarts:
     """Starts of paths, by the caller's numbers: `vertex`, or where that is -1, the targets one after the other."""
     at, place = done.targets.found, done.targets.place
     k, of_target = len(vertex), np.flatnonzero(vertex < 0)
     which = done.nearest_copy(len(of_target))
-    number = edges.number[vertex]
-    corner = edges.tables.corner_of_vertex[number]
+    number = tables.number[vertex]
+    corner = tables.corner_of_vertex[number]
     starts = PathStarts(
         np.where(vertex < 0, -1, number).astype(np.int32),
         (corner // 3).astype(np.int32),
@@ -137,12 +136,12 @@ def _starts(edges: HalfEdges, done: Searched, vertex: IntArray) -> PathStarts:
     return starts
 
 
-def _traced(edges: HalfEdges, done: Searched, starts: PathStarts) -> tuple[AnyArray, FloatArray, IntArray]:
+def _traced(tables: Tables, done: Searched, starts: PathStarts) -> tuple[AnyArray, FloatArray, IntArray]:
     """Faces and ends of all segments, and the end of each path's segments; the arrays are doubled until they fit."""
     room = _ROOM
     while True:
         face, place, ends = np.empty(room, np.int32), np.empty((room, 2, 3)), np.zeros(len(starts.vertex), np.int64)
-        n_done = paths.trace_back(edges.tables, done.found, done.starts, starts, face, place, ends)
+        n_done = paths.trace_back(tables, done.found, done.starts, starts, face, place, ends)
         if n_done == len(starts.vertex):
             n = ends[-1] if n_done else 0
             return face[:n], place[:n], ends

@@ -29,7 +29,7 @@ class WindowEngine(TriangleEngine):
     def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
         super().__init__(triangles, originals)
         # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
-        self._from_vertices = ExactSurface(triangles.half_edges())
+        self._from_vertices = ExactSurface(triangles.tables())
 
     @cached_property
     def _directions(self) -> PathDirections:

@@ -1,4 +1,4 @@
-"""One search by windows on the tables of a surface: arguments and results of the kernel."""
+"""One search by windows on the tables of a surface: sources, arguments and results of the kernel."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from heat_igl.kernels.windows import windows
 from heat_igl.kernels.windows.surface import FLAT_VERTEX
 from heat_igl.mesh import SurfacePoints
 from heat_igl.runtime import side_by_side
+from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.windows.half_edges import HalfEdges, Located
-from heat_igl.windows.window_starts import NO_STARTS, Starts
+from heat_igl.windows.tables import NO_POINTS, NO_SEGMENTS, Located, Tables
 
-__all__ = ["TOLERANCE", "Found", "Leaving", "Searched", "Targets", "search"]
+__all__ = ["TOLERANCE", "Found", "Leaving", "NO_STARTS", "Searched", "Starts", "Targets", "search", "starts_at"]
 
 #: A window is cut where another path is shorter by this fraction of the distance: more than rounding adds up to. A
 #: larger number keeps more windows, all of them paths, and changes no distance.
@@ -30,8 +30,77 @@ _ROUND = 3.0
 _PLENTY = 1000
 _NO_VERTICES = np.empty(0, np.int64)
 
-# A search of the kernel on a front, from some sources; it fills statistics, and returns whether memory sufficed.
-_Run = Callable[[windows.Front, Starts, IntArray], bool]
+
+class Starts(NamedTuple):
+    """k vertices, p points and q segments that distance starts from.
+
+    Attributes
+    ----------
+    vertices, offset : (k,)
+        Vertices, and when each starts.
+    points, point_offset : (p,)
+        Points inside faces; ends of segments are among them.
+    segments, segment_offset : (q,)
+        Segments inside faces.
+    place : (p + q + 1,) int64
+        The number of each point and segment, counted as the caller does: points, then segments; then -1 for nothing.
+    label : (k + p + q + 1,) int64
+        The same after those of the vertices.
+    """
+
+    vertices: AnyArray
+    offset: FloatArray
+    points: Located
+    point_offset: FloatArray
+    segments: Located
+    segment_offset: FloatArray
+    place: IntArray
+    label: IntArray
+
+
+#: No sources.
+NO_STARTS = Starts(
+    np.empty(0, np.int32), np.zeros(0), NO_POINTS, np.zeros(0), NO_SEGMENTS, np.zeros(0), *np.full((2, 1), -1)
+)
+
+
+def starts_at(
+    tables: Tables,
+    sources: IntArray,
+    offsets: FloatArray | None,
+    points: SurfacePoints | None,
+    point_offsets: FloatArray | None,
+    segments: SourceSegments | None,
+) -> Starts:
+    """Sources for the kernel, as `ExactSurface.solve` takes them; points at corners become vertices."""
+    k, p = len(sources), 0 if points is None else len(points)
+    begin = np.zeros(k) if offsets is None else tables.scaled(np.asarray(offsets, np.float64))
+    if points is None and segments is None:
+        label = np.append(np.arange(k), -1)
+        return NO_STARTS._replace(vertices=tables.number[sources], offset=begin, place=label[k:], label=label)
+    late = np.zeros(p) if point_offsets is None else tables.scaled(np.asarray(point_offsets, np.float64))
+    counted = np.arange(p)
+    if segments is not None:
+        ends, number = segments.ends(), p + np.arange(len(segments.faces))
+        all_faces = np.concatenate([np.empty(0, np.int64) if points is None else points.faces, ends.faces])
+        all_places = np.concatenate([np.empty((0, 3)) if points is None else points.barycentric, ends.barycentric])
+        points = SurfacePoints(all_faces, all_places)
+        late, counted = np.concatenate([late, tables.scaled(ends.offset)]), np.concatenate([counted, number, number])
+    place, lines = tables.located(points), tables.located_segments(segments)
+    late, counted = late[place.point], counted[place.point]
+    is_corner = (place.barycentric == 0).sum(axis=1) == 2
+    corner = 3 * place.faces[is_corner] + place.barycentric[is_corner].argmax(axis=1)
+    numbers = np.concatenate([counted[~is_corner], p + lines.point, [-1]])
+    return Starts(
+        np.concatenate([tables.number[sources], tables.edges.vertex[corner]]),
+        np.concatenate([begin, late[is_corner]]),
+        Located(*(column[~is_corner] for column in place)),
+        late[~is_corner],
+        lines,
+        np.zeros(0) if segments is None else tables.scaled(segments.offset)[lines.point],
+        numbers,
+        np.concatenate([np.arange(k), k + counted[is_corner], np.where(numbers < 0, -1, k + numbers)]),
+    )
 
 
 class Found(NamedTuple):
@@ -142,8 +211,12 @@ class Searched(NamedTuple):
         return which
 
 
+# A search of the kernel on a front, from some sources; it fills statistics, and returns whether memory sufficed.
+_Run = Callable[[windows.Front, Starts, IntArray], bool]
+
+
 def search(
-    edges: HalfEdges,
+    tables: Tables,
     starts: Starts,
     *,
     cutoff: float = np.inf,
@@ -153,10 +226,10 @@ def search(
     threads: int = 1,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
-    n, wanted = edges.n, _targets_at(edges, targets)
+    n, wanted = tables.n, _targets_at(tables, targets)
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
     found, leaving = Found.of(n, n_labels), Leaving.of(n) if directed else None
-    goal, limit = edges.number[_NO_VERTICES if goals is None else goals], float(edges.scaled(cutoff))
+    goal, limit = tables.number[_NO_VERTICES if goals is None else goals], float(tables.scaled(cutoff))
 
     def run(front: windows.Front, starts: Starts, statistics: IntArray) -> bool:
         return windows.search(front, starts, goal, wanted, goals is not None, limit, statistics)
@@ -165,13 +238,13 @@ def search(
     # Vertices are found flat by the first search.
     asks_for_all = not len(wanted.place.faces) and goals is None and not directed
     shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all
-    if shares and not (edges.tables.kind == FLAT_VERTEX).any():
-        statistics = _beside(edges, starts, found, run)
+    if shares and not (tables.kind == FLAT_VERTEX).any():
+        statistics = _beside(tables, starts, found, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        _require(run(windows.Front(edges.tables, found, TOLERANCE, leaving), starts, statistics))
+        _require(run(windows.Front(tables, found, TOLERANCE, leaving), starts, statistics))
     return Searched(starts, found, wanted, int(statistics[1]), int(statistics[2]), leaving)
 
 
@@ -181,12 +254,12 @@ def _require(is_done: bool) -> None:
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 
-def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArray | None:
+def _beside(tables: Tables, starts: Starts, found: Found, run: _Run) -> IntArray | None:
     """Search on two threads; returns the statistics of both, or None if one thread must repeat the search."""
-    also, statistics, done = Found.of(edges.n, len(found.label)), np.zeros((2, 3), np.int64), []
-    first, second = (windows.Front(edges.tables, each, TOLERANCE) for each in (found, also))
-    bounds = np.full((2, edges.n), np.inf)
-    windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(edges.tables.length.mean()), _PLENTY)
+    also, statistics, done = Found.of(tables.n, len(found.label)), np.zeros((2, 3), np.int64), []
+    first, second = (windows.Front(tables, each, TOLERANCE) for each in (found, also))
+    bounds = np.full((2, tables.n), np.inf)
+    windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(tables.edges.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [
         lambda: run(first, starts, statistics[0]),
         lambda: run(second, NO_STARTS, statistics[1]),
@@ -200,7 +273,7 @@ def _beside(edges: HalfEdges, starts: Starts, found: Found, run: _Run) -> IntArr
     return np.asarray(statistics.sum(axis=0)) if is_same else None
 
 
-def _targets_at(edges: HalfEdges, points: SurfacePoints | None) -> Targets:
+def _targets_at(tables: Tables, points: SurfacePoints | None) -> Targets:
     """Target points for the kernel, with initial values."""
-    place = edges.located(points)
-    return Targets(place, *edges.by_face(place), edges.largest_circle(place), Found.of(len(place.faces), 0))
+    place = tables.located(points)
+    return Targets(place, *tables.by_face(place), tables.largest_circle(place), Found.of(len(place.faces), 0))

@@ -286,8 +286,8 @@ def wrong_rows(
     """
     marks = np.zeros(source.shape[0], np.uint8)
     is_wrong: cython.uchar[::1] = marks
-    vertex: cython.const[cython.int][::1] = tables.vertex
-    length: cython.const[cython.double][::1] = tables.length
+    vertex: cython.const[cython.int][::1] = tables.edges.vertex
+    length: cython.const[cython.double][::1] = tables.edges.length
     corner_of_vertex: cython.const[cython.int][::1] = tables.corner_of_vertex
     next_corner: cython.const[cython.int][::1] = tables.next_corner
     i: cython.Py_ssize_t

@@ -21,21 +21,16 @@ def _move(ring: cython.int[::1], old: cython.int, new: cython.int) -> cython.voi
     ring[old] = old
 
 
-def flip(
-    vertex: cython.int[::1],
-    twin: cython.int[::1],
-    ring: cython.int[::1],
-    length: cython.double[::1],
-    tolerance: cython.double,
-    most: cython.longlong,
-) -> int:
-    """Flip edges in place until the triangulation is intrinsic Delaunay (Fisher et al. 2007); how many were flipped.
+def flip(edges, tolerance: cython.double, most: cython.longlong) -> int:
+    """Flip edges of a `HalfEdges` in place until it is intrinsic Delaunay (Fisher et al. 2007); how many were flipped.
 
     All glued faces must run along their edge in opposite directions. An edge is flipped if the cotangents opposite
     it sum to less than `-tolerance`, and by more than their rounding.
     """
     flips = _Flips()
-    flips.vertex, flips.twin, flips.ring, flips.length = vertex, twin, ring, length
+    flips.vertex, flips.twin, flips.ring, flips.length = edges.vertex, edges.twin, edges.ring, edges.length
+    twin: cython.int[::1] = edges.twin
+    length: cython.double[::1] = edges.length
     flips.area = np.empty(twin.shape[0] // 3)
     flips.waiting, flips.is_waiting = np.empty(twin.shape[0], np.int32), np.zeros(twin.shape[0], np.uint8)
     flips.is_obtuse = np.empty(twin.shape[0], np.uint8)

@@ -27,15 +27,8 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
 
     Returns
     -------
-    vertex, twin, ring : (3 m,) int32
-        Vertex of each corner. The half-edge glued to each: -1 on the boundary, -2 where more than two faces meet. There
-        the next half-edge of the same edge, elsewhere the half-edge itself.
-    aligned : (3 m,) uint8
-        Whether the faces at a glued half-edge run along it in opposite directions.
-    length : (3 m,) float64
-        Of each half-edge, of glued ones the same.
-    n_across : int
-        Half-edges that are not aligned.
+    vertex, twin, ring, aligned, length : (3 m,)
+        The fields of `heat_igl.intrinsic.HalfEdges`.
     """
     m: cython.int = F.shape[0]
     n: cython.int = V.shape[0]
@@ -46,18 +39,13 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
     ring: cython.int[::1] = rings
     aligned: cython.uchar[::1] = alignment
     length: cython.double[::1] = lengths
-    h: cython.int
     sides: cython.int[:, ::1] = np.empty((3 * m, 2), np.int32)
     begin: cython.int[::1] = np.zeros(n + 1, np.int32)
     seen: cython.int[::1] = np.zeros(n, np.int32)
-    n_across: cython.int = 0
     with cython.nogil:
         _by_lower_end(F, vertex, sides, begin)
         _glue_sides(V, scale, sides, begin, seen, vertex, twin, ring, aligned, length)
-        n_across = 3 * m
-        for h in range(3 * m):
-            n_across -= aligned[h]
-    return vertices, twins, rings, alignment, lengths, n_across
+    return vertices, twins, rings, alignment, lengths
 
 
 @cython.cfunc

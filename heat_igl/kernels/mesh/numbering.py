@@ -16,15 +16,7 @@ def n_near(twin: cython.int[::1], reach: cython.int) -> int:
     return n
 
 
-def breadth_first(
-    vertex: cython.const[cython.int][::1],
-    twin: cython.const[cython.int][::1],
-    ring,
-    aligned,
-    length: cython.const[cython.double][::1],
-    n: cython.int,
-    start: cython.int,
-):
+def breadth_first(edges, n: cython.int, start: cython.int):
     """Number vertices and faces in the order in which a breadth-first search over the faces meets them.
 
     The data of a front is then contiguous in memory. The search begins at face `start`; each further component begins
@@ -32,8 +24,8 @@ def breadth_first(
 
     Parameters
     ----------
-    vertex, twin, ring, aligned, length : (3 m,)
-        As `gluing.glue` returns them; None for `ring` and `aligned` if they are not needed.
+    edges : HalfEdges
+        m triangles.
     n : int
         Number of vertices; those of no face come last.
     start : int
@@ -48,20 +40,16 @@ def breadth_first(
     face : (m,) int32
         Old number of each face; corners stay in place.
     """
-    m: cython.int = twin.shape[0] // 3
-    # One array after the other, so that memory is freed as soon as possible.
-    vertices, twins, lengths = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m)
-    rings = None if ring is None else np.empty(3 * m, np.int32)
-    alignment = None if aligned is None else np.empty(3 * m, np.uint8)
+    m: cython.int = len(edges.twin) // 3
+    vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
+    alignment, lengths = np.empty(3 * m, np.uint8), np.empty(3 * m)
     numbers, faces = np.full(n, -1, np.int32), np.empty(m, np.int32)
     search: _Search = _Search()
-    search.vertex, search.twin, search.aligned, search.length = vertex, twin, aligned, length
+    search.vertex, search.twin, search.aligned, search.length = edges.vertex, edges.twin, edges.aligned, edges.length
     search.new_vertex, search.new_twin, search.new_aligned, search.new_length = vertices, twins, alignment, lengths
-    search.has_aligned = aligned is not None
     search.number, search.face, search.place = numbers, faces, np.full(m, -1, np.int32)
-    old_ring: cython.const[cython.int][::1] = ring
+    old_ring: cython.const[cython.int][::1] = edges.ring
     new_ring: cython.int[::1] = rings
-    n_rings: cython.int = 0 if ring is None else 3 * m
     first: cython.int
     h: cython.int
     t: cython.int
@@ -74,7 +62,7 @@ def breadth_first(
             if search.number[v] < 0:
                 search.number[v] = search.n_numbered
                 search.n_numbered += 1
-        for h in range(n_rings):
+        for h in range(3 * m):
             new_ring[h] = h
             if search.has_many:
                 t = old_ring[3 * search.face[h // 3] + h % 3]
@@ -101,7 +89,6 @@ class _Search:
     n_met: cython.int
     n_done: cython.int
     n_numbered: cython.int
-    has_aligned: cython.bint
     has_many: cython.bint  # whether more than two faces meet at an edge
 
     @cython.cfunc
@@ -125,8 +112,7 @@ class _Search:
                     self.n_numbered += 1
                 self.new_vertex[g + c] = self.number[v]
                 self.new_length[g + c] = self.length[h + c]
-                if self.has_aligned:
-                    self.new_aligned[g + c] = self.aligned[h + c]
+                self.new_aligned[g + c] = self.aligned[h + c]
                 t = self.twin[h + c]
                 if t >= 0:
                     self.meet(t // 3)

@@ -3,7 +3,7 @@
 *Unfolding* (`heat_igl.sweep.sweep`). Two neighbours a and b of v that know their distances from one source place it
 in the plane of their triangle; the distance of v is that of the straight line to it, if this line crosses ab.
 
-- `half_edges` fills a record per spoke, an edge seen from v: its length, the triangle to its left laid out flat, and
+- `spokes` fills a record per spoke, an edge seen from v: its length, the triangle to its left laid out flat, and
   the corner w of the triangle beyond the side ab.
 - `visit_order` finds the order of the vertices as Dijkstra's algorithm does, by lengths of edges; its queue sorts by
   bands of distance, without a heap (`band_queue.pxd`).

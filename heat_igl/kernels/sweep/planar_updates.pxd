@@ -4,7 +4,7 @@
 # the origin, b lies on the first axis at s.base, v above it at (s.along, s.height); w, the corner of the triangle beyond
 # ab, lies below it at (s.beyond_along, -s.beyond_depth). da, db, dw, dv are distances from one source at these corners.
 
-from heat_igl.kernels.sweep.half_edges cimport Spoke
+from heat_igl.kernels.sweep.spokes cimport Spoke
 from libc.math cimport INFINITY, fabs, sqrt
 
 cdef extern from *:

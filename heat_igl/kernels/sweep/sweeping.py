@@ -9,7 +9,6 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
-from cython.cimports.heat_igl.kernels.sweep.half_edges import HalfEdges
 from cython.cimports.heat_igl.kernels.sweep.planar_updates import (
     across_side,
     across_two,
@@ -19,6 +18,7 @@ from cython.cimports.heat_igl.kernels.sweep.planar_updates import (
     front_across_side,
     over_one,
 )
+from cython.cimports.heat_igl.kernels.sweep.spokes import SpokeTable
 from cython.cimports.heat_igl.kernels.sweep.sweeping import (
     AHEAD,
     CACHED,
@@ -60,7 +60,7 @@ def sweep(
     """
     n = d.shape[0]
     one = _Sweep()
-    one.t = HalfEdges(spokes)
+    one.t = SpokeTable(spokes)
     one.is_large = one.t.spoke.shape[0] > CACHED
     one.d, one.is_stale, one.offset, one.group = d, is_stale, offset, group
     one.n_ordered = 0
@@ -83,7 +83,7 @@ class _Sweep:
     The first `n_ordered` entries of `order` are known, and `visits` finds the others.
     """
 
-    t: HalfEdges
+    t: SpokeTable
     order: cython.int[::1]
     rank: cython.int[::1]
     is_large: cython.bint

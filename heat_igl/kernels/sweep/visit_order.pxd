@@ -1,8 +1,8 @@
 from heat_igl.kernels.sweep.band_queue cimport BandQueue, Waiting
-from heat_igl.kernels.sweep.half_edges cimport HalfEdges
+from heat_igl.kernels.sweep.spokes cimport SpokeTable
 
 cdef class VisitOrder:
-    cdef HalfEdges t
+    cdef SpokeTable t
     cdef double[::1] d
     cdef int[::1] order
     cdef int[::1] rank

@@ -21,7 +21,7 @@ class VisitOrder:
 
     Parameters
     ----------
-    t : HalfEdges
+    t : SpokeTable
         The triangulation.
     d : (n,) float64
         Distances, which are changed outside; the order begins with those that are finite.

@@ -32,7 +32,7 @@ class Lines:
     """The triangles, how the path of each vertex begins, and the line that is being followed."""
 
     def __init__(self, triangles, points, ways):
-        self.vertex, self.length, self.twin, self.ring, self.aligned = triangles
+        self.vertex, self.twin, self.ring, self.aligned, self.length = triangles
         self.first_inside, self.following, self.inside = points
         self.distance, self.kind, self.entered, self.share, self.reach = ways
         self.gate = np.zeros(256, _GATE)

@@ -13,7 +13,7 @@ __all__ = ["InnerSources", "PathSegments", "trace_back"]
 class InnerSources:
     """Source points and, after them, source segments of a search by windows.
 
-    `n` is the number of vertices, and `starts` are the sources, see `heat_igl.windows.window_starts.Starts`.
+    `n` is the number of vertices, and `starts` are the sources, see `heat_igl.windows.window_search.Starts`.
     """
 
     def __init__(self, n, starts):
@@ -158,8 +158,8 @@ class _PathTracer:
     n_lines: cython.int
 
     def __init__(self, tables, found, sources: InnerSources, segments: PathSegments):
-        self.vertex, self.length, self.twin = tables.vertex, tables.length, tables.twin
-        self.aligned, self.ring, self.double_area = tables.aligned, tables.ring, tables.double_area
+        self.vertex, self.twin, self.ring, self.aligned, self.length = tables.edges
+        self.double_area = tables.double_area
         self.distance, self.root = found.distance, found.root
         self.entered, self.crossing = found.entered, found.crossing
         self.sources, self.segments = sources, segments

@@ -26,36 +26,28 @@ SEVERAL_FANS = cython.cast(cython.int, JOINS)
 FLAT_VERTEX = cython.cast(cython.int, FLAT)
 
 
-def shapes(
-    vertex: cython.int[::1],
-    length: cython.double[::1],
-    twin: cython.int[::1],
-    kind: cython.uchar[::1],
-    n_corners: cython.int[::1],
-    double_area: cython.double[::1],
-    bulge: cython.double[::1],
-    corner_of_vertex: cython.int[::1],
-    next_corner: cython.int[::1],
-) -> bool:
-    """Fill the tables that `windows.Front` takes of a surface; returns whether it is intrinsic Delaunay.
+def shapes(tables) -> bool:
+    """Fill what `heat_igl.windows.tables.Tables` holds beside its half-edges; returns whether it is intrinsic Delaunay.
 
-    Parameters
-    ----------
-    vertex, length, twin : (3 m,)
-        Vertex of each corner, length of each half-edge, and the half-edge glued to it: -1 on the boundary, -2 where
-        more than two faces meet.
-    kind : (n,)
-        Takes JOINS at the ends of edges of more than two faces; the rest must come as UNKNOWN.
-    n_corners : (n,)
-        Takes the number of corners of each vertex; must come full of 0.
-    double_area : (m,)
-        Takes twice the area of each face.
-    bulge : (3 m,)
-        Takes the length of each half-edge times the cotangent of the angle opposite: the circle around the face has the
-        power ``x (x - length) + y (y + bulge)`` at the point (x, -y) of the frame of the half-edge.
-    corner_of_vertex, next_corner : (n,), (3 m,)
-        Take the corners of each vertex as linked lists that end with -1; the first must come full of -1.
+    Of n vertices and m faces:
+
+    - `double_area` (m,): twice the area of each face;
+    - `bulge` (3 m,): the length of each half-edge times the cotangent of the angle opposite: the circle around the face
+      has the power ``x (x - length) + y (y + bulge)`` at the point (x, -y) of the frame of the half-edge;
+    - `corner_of_vertex` (n,), `next_corner` (3 m,): the corners of each vertex as linked lists that end with -1; the
+      first must come full of -1;
+    - `n_corners` (n,): the number of corners of each vertex; must come full of 0;
+    - `kind` (n,): JOINS at the ends of edges of more than two faces; must come as UNKNOWN.
     """
+    vertex: cython.int[::1] = tables.edges.vertex
+    length: cython.double[::1] = tables.edges.length
+    twin: cython.int[::1] = tables.edges.twin
+    kind: cython.uchar[::1] = tables.kind
+    n_corners: cython.int[::1] = tables.n_corners
+    double_area: cython.double[::1] = tables.double_area
+    bulge: cython.double[::1] = tables.bulge
+    corner_of_vertex: cython.int[::1] = tables.corner_of_vertex
+    next_corner: cython.int[::1] = tables.next_corner
     m: cython.int = double_area.shape[0]
     f: cython.int
     h: cython.int

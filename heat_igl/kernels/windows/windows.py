@@ -23,7 +23,7 @@ class Front:
     Parameters
     ----------
     tables : Tables
-        m triangles on n vertices, see `heat_igl.windows.half_edges.Tables`. The kinds of vertices are filled further,
+        m triangles on n vertices, see `heat_igl.windows.tables.Tables`. The kinds of vertices are filled further,
         the same by every search.
     found : Found
         Takes distances, and where the shortest paths come from, see `heat_igl.windows.window_search.Found`: nothing
@@ -47,9 +47,8 @@ class Front:
         position: cython.const[cython.double][::1] = None,
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
-        n = len(tables.corner_of_vertex)
-        emitted, touched = np.full(n, np.inf), np.empty(n, np.int32)
-        slot = np.full(len(tables.vertex), -1, np.int32)
+        emitted, touched = np.full(tables.n, np.inf), np.empty(tables.n, np.int32)
+        slot = np.full(len(tables.edges.vertex), -1, np.int32)
         # The pointers hold as long as the arrays do.
         self.arrays = (tables, found, leaving, position, emitted, touched, slot)
         _take_surface(s, tables)
@@ -71,13 +70,14 @@ class Front:
 
 @cython.cfunc
 def _take_surface(s: cython.pointer(Search), tables) -> cython.void:
-    s.vertex, s.twin, s.ring = _ints(tables.vertex), _ints(tables.twin), _ints(tables.ring)
-    s.aligned, s.kind = _bytes(tables.aligned), _bytes(tables.kind)
-    s.length, s.double_area, s.bulge = _doubles(tables.length), _doubles(tables.double_area), _doubles(tables.bulge)
+    edges = tables.edges
+    s.vertex, s.twin, s.ring = _ints(edges.vertex), _ints(edges.twin), _ints(edges.ring)
+    s.aligned, s.length = _bytes(edges.aligned), _doubles(edges.length)
+    s.kind, s.double_area, s.bulge = _bytes(tables.kind), _doubles(tables.double_area), _doubles(tables.bulge)
     s.corner_of_vertex, s.next_corner = _ints(tables.corner_of_vertex), _ints(tables.next_corner)
     s.n_corners = _ints(tables.n_corners)
     s.is_delaunay = tables.is_delaunay
-    s.n, s.n_half_edges = len(tables.corner_of_vertex), len(tables.vertex)
+    s.n, s.n_half_edges = tables.n, len(edges.vertex)
 
 
 @cython.cfunc

@@ -1,4 +1,4 @@
-# The structures that a sweep reads; what their fields mean stands in heat_igl/windows/spokes.py.
+# The structures that a sweep reads; what their fields mean stands in heat_igl/sweep/spokes.py.
 
 # One line of the processor's cache.
 cdef struct Spoke:
@@ -10,15 +10,7 @@ cdef struct Corner:
     double x, y, angle
 
 
-cdef class HalfEdges:
+cdef class SpokeTable:
     cdef const int[::1] first
     cdef const Spoke[::1] spoke
 
-
-# The half-edges after and before `h` in its face.
-cdef inline int following(int h) noexcept nogil:
-    return h + 1 if h % 3 < 2 else h - 2
-
-
-cdef inline int preceding(int h) noexcept nogil:
-    return h - 1 if h % 3 else h + 2

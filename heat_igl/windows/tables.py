@@ -1,4 +1,4 @@
-"""A triangulated surface as the windows of exact distance read it: half-edge by half-edge, in the order of a front."""
+"""A triangulated surface as the windows read it: half-edges in the order of a front, and points in them."""
 
 from __future__ import annotations
 
@@ -8,27 +8,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation, Merged, intrinsic_delaunay, intrinsic_triangulation, lay_out
+from heat_igl.intrinsic import (
+    HalfEdges,
+    IntrinsicTriangulation,
+    Merged,
+    intrinsic_delaunay,
+    intrinsic_triangulation,
+    lay_out,
+)
+from heat_igl.intrinsic.half_edges import mean_exponent
+from heat_igl.intrinsic.triangulation import next_half_edge
 from heat_igl.kernels.mesh import numbering
 from heat_igl.kernels.windows.surface import shapes
 from heat_igl.mesh import Mesh, SurfacePoints, connectivity
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
-from heat_igl.windows.glued import TOO_MANY, glued, mean_exponent
 
-__all__ = [
-    "MARGIN",
-    "NO_POINTS",
-    "NO_SEGMENTS",
-    "HalfEdges",
-    "Located",
-    "Numbered",
-    "Tables",
-    "from_mesh",
-    "from_triangulation",
-    "rings",
-]
+__all__ = ["MARGIN", "NO_POINTS", "NO_SEGMENTS", "Located", "Tables", "from_mesh", "from_triangulation"]
 
 #: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
 #: `mollify`, paths across needles were up to 3e-4 of themselves too long.
@@ -40,23 +36,6 @@ _FEW_FACES = 30_000
 _NEAR = 768
 # Powers of two up to here, and their inverses, are normal numbers.
 _LARGEST_EXPONENT = 1000
-
-
-class Tables(NamedTuple):
-    """What the kernel reads, in its order; see `heat_igl.kernels.windows.surface.shapes`."""
-
-    vertex: AnyArray
-    length: FloatArray
-    twin: AnyArray
-    aligned: AnyArray
-    ring: AnyArray
-    double_area: FloatArray
-    bulge: FloatArray
-    corner_of_vertex: AnyArray
-    next_corner: AnyArray
-    n_corners: AnyArray
-    kind: AnyArray
-    is_delaunay: bool
 
 
 class Located(NamedTuple):
@@ -86,64 +65,47 @@ NO_POINTS = Located(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, np.int6
 NO_SEGMENTS = NO_POINTS._replace(barycentric=np.empty((0, 2, 3)))
 
 
-class Numbered(NamedTuple):
-    """Triangles by their sides, numbered in the order of a front: what `numbering.breadth_first` returns.
+class Tables:
+    """What a search by windows reads of a surface, with vertices and faces numbered anew.
 
-    Attributes
+    Parameters
     ----------
-    vertex, twin, ring : (3 m,) int32
-        Vertex of each corner; the half-edge glued to each, -1 on the boundary and -2 where more than two faces meet;
-        there the next half-edge of the same edge, elsewhere the half-edge itself.
-    aligned : (3 m,) uint8
-        Whether glued faces run along their half-edge in opposite directions.
-    length : (3 m,) float64
-        Of each half-edge.
+    edges : HalfEdges
+        The triangles, by the new numbers. Their lengths are scaled in place.
     number : (n,) int32
         Number of each vertex of the caller.
     face : (m,) int32
         The caller's number of each face.
-    """
-
-    vertex: AnyArray
-    twin: AnyArray
-    ring: AnyArray
-    aligned: AnyArray
-    length: FloatArray
-    number: AnyArray
-    face: AnyArray
-
-
-class HalfEdges:
-    """The tables of one surface, with vertices and faces numbered anew.
-
-    Parameters
-    ----------
-    numbered : Numbered
-        The triangles. Their lengths are scaled in place.
     exponent : int
         Lengths are in units of ``2 ** exponent``.
     triangulation : IntrinsicTriangulation, optional
         What the tables were made from, to locate points.
+
+    Attributes
+    ----------
+    double_area, bulge, corner_of_vertex, next_corner, n_corners, kind, is_delaunay
+        See `heat_igl.kernels.windows.surface.shapes`.
     """
 
-    def __init__(self, numbered: Numbered, exponent: int, triangulation: IntrinsicTriangulation | None = None) -> None:
-        vertex, twin, ring, aligned, length, self.number, self.face = numbered
-        m, n = len(self.face), len(self.number)
+    def __init__(
+        self,
+        edges: HalfEdges,
+        number: AnyArray,
+        face: AnyArray,
+        exponent: int = 0,
+        triangulation: IntrinsicTriangulation | None = None,
+    ) -> None:
+        self.edges, self.number, self.face = edges, number, face
+        m, n = len(face), len(number)
         # By a power of two: no digit changes, and no square leaves the range of doubles.
-        shift = mean_exponent(length)
-        _times_power(length, -shift, out=length)
+        shift = mean_exponent(edges.length)
+        _times_power(edges.length, -shift, out=edges.length)
         self.n, self.exponent = n, exponent + shift
         self._triangulation = triangulation
-        derived: dict[str, AnyArray] = {
-            "double_area": np.empty(m),
-            "bulge": np.empty(3 * m),
-            "corner_of_vertex": np.full(n, -1, np.int32),
-            "next_corner": np.empty(3 * m, np.int32),
-            "n_corners": np.zeros(n, np.int32),
-            "kind": np.zeros(n, np.uint8),
-        }
-        is_delaunay = shapes(vertex, length, twin, **derived)
-        self.tables = Tables(vertex, length, twin, aligned, ring, **derived, is_delaunay=is_delaunay)
+        self.double_area, self.bulge = np.empty(m), np.empty(3 * m)
+        self.corner_of_vertex, self.next_corner = np.full(n, -1, np.int32), np.empty(3 * m, np.int32)
+        self.n_corners, self.kind = np.zeros(n, np.int32), np.zeros(n, np.uint8)
+        self.is_delaunay = shapes(self)
 
     @cached_property
     def old_vertex(self) -> IntArray:
@@ -198,7 +160,7 @@ class HalfEdges:
 
     def _on_all_faces(self, faces: IntArray, barycentric: FloatArray) -> Located:
         """Sets of places (k, e, 3), by new numbers; those on a side, once more for every other face there."""
-        t = self.tables
+        t = self.edges
         new_face = np.empty(self.face.max() + 1, np.int64)
         new_face[self.face] = np.arange(len(self.face))
         faces = new_face[faces]
@@ -214,7 +176,7 @@ class HalfEdges:
             there = np.where(t.twin[here] >= 0, t.twin[here], t.ring[here]).astype(np.int64)
             go_on = there != start
             i, c, start, here = i[go_on], c[go_on], start[go_on], there[go_on]
-            same_vertex = t.vertex[_following(start)] == t.vertex[_following(here)]
+            same_vertex = t.vertex[next_half_edge(start)] == t.vertex[next_half_edge(here)]
             same_way = np.where(t.twin[start] >= 0, t.aligned[start] == 0, same_vertex)[:, None]
             tail, head = barycentric[i, :, (c + 1) % 3], barycentric[i, :, (c + 2) % 3]
             other, k = np.zeros((len(i), *barycentric.shape[1:])), np.arange(len(i))
@@ -227,7 +189,7 @@ class HalfEdges:
 
     def _along(self, half_edge: IntArray) -> AnyArray:
         """Half-edges (k,) as complex numbers in their triangles, of which the side of corners 0 and 1 is real."""
-        corners = lay_out(self.tables.length.reshape(-1, 3)[half_edge // 3]) @ np.array([1, 1j])
+        corners = lay_out(self.edges.length.reshape(-1, 3)[half_edge // 3]) @ np.array([1, 1j])
         k = np.arange(len(half_edge))
         return np.asarray(corners[k, (half_edge + 2) % 3] - corners[k, (half_edge + 1) % 3])
 
@@ -248,11 +210,11 @@ class HalfEdges:
         """Diameter of the largest circle around a triangle that holds a point; 0 without points."""
         if not len(located.faces):
             return 0.0
-        sides = self.tables.length.reshape(-1, 3)[located.faces]
-        return float((sides.prod(axis=1) / self.tables.double_area[located.faces]).max())
+        sides = self.edges.length.reshape(-1, 3)[located.faces]
+        return float((sides.prod(axis=1) / self.double_area[located.faces]).max())
 
 
-def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
+def from_triangulation(triangulation: IntrinsicTriangulation) -> Tables:
     """The tables of a triangulation.
 
     Raises
@@ -260,23 +222,10 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> HalfEdges:
     MeshError
         If there are too many triangles for 32-bit indices.
     """
-    m = len(triangulation.F)
-    if 3 * m + triangulation.n >= TOO_MANY:
-        raise MeshError(f"{m} faces are too many for exact distances: split the mesh")
     once, kept, merged = _without_copies(triangulation)
-    exponent = mean_exponent(once.l)
-    found = numbering.breadth_first(
-        once.F.ravel().astype(np.int32),
-        once.twin.astype(np.int32),
-        rings(once),
-        once.aligned.astype(np.uint8),
-        np.ldexp(once.l.ravel(), -exponent),
-        once.n,
-        0,
-    )
-    numbered = Numbered(*found)
+    edges, number, face = HalfEdges.of(once).numbered(once.n)
     located_in = replace(triangulation, history=(*triangulation.history, *merged))
-    return HalfEdges(numbered._replace(face=kept[numbered.face]), exponent, located_in)
+    return Tables(edges, number, kept[face], triangulation=located_in)
 
 
 def _without_copies(
@@ -315,35 +264,26 @@ def _without_copies(
     return once, kept, (Merged(stands, corner),)
 
 
-def from_mesh(mesh: Mesh, start: int) -> HalfEdges:
+def from_mesh(mesh: Mesh, start: int) -> Tables:
     """The tables of the intrinsic Delaunay triangulation of a mesh that is asked once, for distances from vertices.
 
     Without a history of the flips. What is near vertex `start` comes first in memory, unless the mesh is small and most
     neighbours are near each other as they are: then numbers stay.
     """
-    found = glued(mesh)
-    if (found.twin == -2).any():
+    edges, exponent = HalfEdges.of_mesh(mesh)
+    if (edges.twin == -2).any():
         # Windows would go on in every copy of a face, and multiply.
         reduced, _ = mesh.without_duplicate_faces()
         if reduced is not mesh:
             return from_mesh(reduced, start)
-    if found.n_across:
+    if not edges.aligned.all():
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
-    found.flip(mesh.F, MARGIN)
+    edges.flip(mesh.F, MARGIN)
     m, n = mesh.n_faces, mesh.n_vertices
-    if m <= _FEW_FACES and numbering.n_near(found.twin, _NEAR) > len(found.twin) // 2:
-        numbers, faces = np.arange(n, dtype=np.int32), np.arange(m, dtype=np.int32)
-        return HalfEdges(Numbered(*found[:5], numbers, faces), found.exponent)
-    first_face = int(np.argmax(found.vertex == start)) // 3
-    numbered = Numbered(*numbering.breadth_first(*found[:5], n, first_face))
-    exponent = found.exponent
-    del found  # before there are more tables
-    return HalfEdges(numbered, exponent)
-
-
-def _following(half_edge: IntArray) -> IntArray:
-    """The next half-edge of the same face."""
-    return np.asarray(half_edge + 1 - 3 * (half_edge % 3 == 2))
+    if m <= _FEW_FACES and numbering.n_near(edges.twin, _NEAR) > 3 * m // 2:
+        return Tables(edges, np.arange(n, dtype=np.int32), np.arange(m, dtype=np.int32), exponent)
+    edges, number, face = edges.numbered(n, int(np.argmax(edges.vertex == start)) // 3)
+    return Tables(edges, number, face, exponent)
 
 
 def _times_power(lengths: FloatArray | float, exponent: int, out: FloatArray | None = None) -> FloatArray:
@@ -351,21 +291,3 @@ def _times_power(lengths: FloatArray | float, exponent: int, out: FloatArray | N
     if abs(exponent) > _LARGEST_EXPONENT:
         return np.asarray(np.ldexp(lengths, exponent, out=out))
     return np.asarray(np.multiply(lengths, 2.0**exponent, out=out))  # the same bits, ten times as fast
-
-
-def rings(triangulation: IntrinsicTriangulation) -> AnyArray:
-    """For a half-edge where more than two faces meet, the next of those there; elsewhere itself."""
-    ring = np.arange(len(triangulation.twin), dtype=np.int32)
-    many = np.flatnonzero(triangulation.twin == -2)
-    if len(many):
-        # Such edges were never flipped: the two vertices tell them apart.
-        ends = np.sort(np.stack([triangulation.tail(many), triangulation.head(many)]), axis=0)
-        order = np.lexsort((many, *ends))
-        many, ends = many[order], ends[:, order]
-        is_first: BoolArray = np.ones(len(many), bool)
-        is_first[1:] = (ends[:, 1:] != ends[:, :-1]).any(axis=0)
-        first = np.flatnonzero(is_first)
-        following = np.roll(many, -1)
-        following[np.append(first[1:], len(many)) - 1] = many[first]
-        ring[many] = following
-    return ring

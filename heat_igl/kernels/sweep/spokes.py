@@ -2,17 +2,18 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.sweep.half_edges import Corner, Spoke, following, preceding
+from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.sweep.spokes import Corner, Spoke
 from cython.cimports.libc.math import M_PI, NAN, atan2, fabs, sqrt
 
-__all__ = ["HalfEdges", "fill", "first_spokes"]
+__all__ = ["SpokeTable", "fill", "first_spokes"]
 
 _CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("angle", "f8")])
 
 
 @cython.final
 @cython.cclass
-class HalfEdges:
+class SpokeTable:
     """Views of the arrays of `heat_igl.sweep.spokes.Spokes`."""
 
     def __init__(self, spokes):
@@ -20,35 +21,30 @@ class HalfEdges:
         self.spoke = spokes.spoke
 
 
-def first_spokes(F: cython.const[cython.int][:, ::1], twin: cython.const[cython.int][::1], n: cython.int):
+def first_spokes(edges, n: cython.int):
     """First spoke (n + 1,) int32 of each vertex: one per corner, and one more at the end of an open fan."""
-    f: cython.Py_ssize_t
-    c: cython.int
+    vertex: cython.const[cython.int][::1] = edges.vertex
+    twin: cython.const[cython.int][::1] = edges.twin
     h: cython.int
     v: cython.int
     array = np.zeros(n + 1, np.int32)
     first: cython.int[::1] = array
     with cython.nogil:
-        for f in range(F.shape[0]):
-            for c in range(3):
-                h = 3 * f + c
-                first[F[f, c] + 1] += 2 if twin[following(h)] < 0 else 1
+        for h in range(twin.shape[0]):
+            first[vertex[h] + 1] += 2 if twin[next_half_edge(h)] < 0 else 1
         for v in range(n):
             first[v + 1] += first[v]
     return array
 
 
-def fill(
-    F: cython.const[cython.int][:, ::1],
-    l: cython.const[cython.double][:, ::1],
-    twin: cython.const[cython.int][::1],
-    first: cython.const[cython.int][::1],
-    spoke: Spoke[::1],
-):
+def fill(edges, first: cython.const[cython.int][::1], spoke: Spoke[::1]):
     """Fill the spokes; returns the total angle (k,) of each fan, and whether each vertex (n,) is flat.
 
     A vertex is flat if the first fan of it has no curvature, or is open; or if it has none.
     """
+    vertex: cython.const[cython.int][::1] = edges.vertex
+    twin: cython.const[cython.int][::1] = edges.twin
+    length: cython.const[cython.double][::1] = edges.length
     total_array, flat_array = np.empty(twin.shape[0]), np.ones(first.shape[0] - 1, np.uint8)
     is_flat: cython.uchar[::1] = flat_array
     total: cython.double[::1] = total_array
@@ -59,40 +55,36 @@ def fill(
     is_done: cython.uchar[::1] = np.zeros(twin.shape[0], np.uint8)
     n_fans: cython.int
     with cython.nogil:
-        _shapes(l, corner)
-        n_fans = _fans(F, twin, corner, first, total, is_flat, spoke, left, end, is_done)
-        _fill_spokes(F, l, twin, corner, spoke, left)
+        _shapes(length, corner)
+        n_fans = _fans(vertex, twin, corner, first, total, is_flat, spoke, left, end, is_done)
+        _fill_spokes(vertex, length, twin, corner, spoke, left)
     return total_array[:n_fans].copy(), flat_array.view(bool)
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _shapes(l: cython.const[cython.double][:, ::1], corner: Corner[::1]) -> cython.void:
+def _shapes(length: cython.const[cython.double][::1], corner: Corner[::1]) -> cython.void:
     """Place and angle of each corner."""
-    f: cython.Py_ssize_t
-    c: cython.int
-    for f in range(l.shape[0]):
-        for c in range(3):
-            base: cython.double = l[f, c]
-            right: cython.double = l[f, (c + 2) % 3]
-            left: cython.double = l[f, (c + 1) % 3]
-            # Heron's formula as a product of differences: a height from right^2 - x^2 loses the digits of slivers.
-            half: cython.double = 0.5 * (base + right + left)
-            product: cython.double = max(half * (half - base) * (half - right) * (half - left), 0.0)
-            here = cython.address(corner[3 * f + c])
-            here.x = 0.5 * ((right - left) * (right + left) / (base * base) + 1.0)
-            here.y = 2.0 * sqrt(product) / (base * base)
-            here.angle = 2.0 * atan2(
-                sqrt(max((half - right) * (half - left), 0.0)), sqrt(max(half * (half - base), 0.0))
-            )
+    h: cython.int
+    for h in range(length.shape[0]):
+        base: cython.double = length[h]
+        right: cython.double = length[previous_half_edge(h)]
+        left: cython.double = length[next_half_edge(h)]
+        # Heron's formula as a product of differences: a height from right^2 - x^2 loses the digits of slivers.
+        half: cython.double = 0.5 * (base + right + left)
+        product: cython.double = max(half * (half - base) * (half - right) * (half - left), 0.0)
+        here = cython.address(corner[h])
+        here.x = 0.5 * ((right - left) * (right + left) / (base * base) + 1.0)
+        here.y = 2.0 * sqrt(product) / (base * base)
+        here.angle = 2.0 * atan2(sqrt(max((half - right) * (half - left), 0.0)), sqrt(max(half * (half - base), 0.0)))
 
 
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _fans(
-    F: cython.const[cython.int][:, ::1],
+    vertex: cython.const[cython.int][::1],
     twin: cython.const[cython.int][::1],
     corner: Corner[::1],
     first: cython.const[cython.int][::1],
@@ -114,14 +106,14 @@ def _fans(
         start: cython.int = h
         is_open: cython.bint = False
         while True:  # clockwise, to the boundary or once around
-            t = twin[preceding(start)]
+            t = twin[previous_half_edge(start)]
             if t < 0:
                 is_open = True
                 break
-            start = preceding(t)
+            start = previous_half_edge(t)
             if start == h:
                 break
-        v: cython.int = F[h // 3, h % 3]
+        v: cython.int = vertex[h]
         row: cython.int = end[v]
         begin: cython.int = row
         angle: cython.double = 0.0
@@ -132,10 +124,10 @@ def _fans(
             spoke[row].next = row + 1
             row += 1
             angle += corner[k].angle
-            t = twin[following(k)]
+            t = twin[next_half_edge(k)]
             if t < 0:
                 break
-            k = following(t)
+            k = next_half_edge(t)
             if k == start:
                 break
         if t < 0:  # the last side, which has no triangle to its left
@@ -156,8 +148,8 @@ def _fans(
 @cython.nogil
 @cython.exceptval(check=False)
 def _fill_spokes(
-    F: cython.const[cython.int][:, ::1],
-    l: cython.const[cython.double][:, ::1],
+    vertex: cython.const[cython.int][::1],
+    length: cython.const[cython.double][::1],
     twin: cython.const[cython.int][::1],
     corner: Corner[::1],
     spoke: Spoke[::1],
@@ -171,18 +163,18 @@ def _fill_spokes(
         s = cython.address(spoke[k])
         s.beyond = -1
         if left[k] < 0:  # past the end of the fan of the spoke before
-            s.length = l[following(h) // 3, following(h) % 3]
+            s.length = length[next_half_edge(h)]
             s.height = NAN
-            s.neighbour = s.next_neighbour = F[h // 3, preceding(h) % 3]
+            s.neighbour = s.next_neighbour = vertex[previous_half_edge(h)]
             continue
         h = left[k]
         # The spoke is the side opposite the corner at the left neighbour.
-        base: cython.double = l[h // 3, h % 3]
-        s.length, s.base = l[h // 3, preceding(h) % 3], base
+        base: cython.double = length[h]
+        s.length, s.base = length[previous_half_edge(h)], base
         s.along, s.height = corner[h].x * base, corner[h].y * base
-        s.neighbour, s.next_neighbour = F[h // 3, following(h) % 3], F[h // 3, preceding(h) % 3]
+        s.neighbour, s.next_neighbour = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
         t = twin[h]
         if t >= 0:
             # Seen from beyond, the side runs the other way.
             s.beyond_along, s.beyond_depth = (1.0 - corner[t].x) * base, corner[t].y * base
-            s.beyond = F[t // 3, t % 3]
+            s.beyond = vertex[t]

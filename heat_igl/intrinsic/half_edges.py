@@ -1,0 +1,176 @@
+"""Triangles by half-edges, the record that rooms and kernels read; mollification, and flips without a history."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from heat_igl.errors import MeshError
+from heat_igl.kernels.mesh import flipping, gluing, numbering
+from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, connectivity
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
+
+__all__ = ["HalfEdges", "mean_exponent", "mollify"]
+
+# The triangle inequality holds with this margin, in mean edge lengths.
+_MARGIN = 1e-8
+# Half-edges and vertices that indices of 32 bits tell apart, with room for two bits of the kernels' own.
+_TOO_MANY = 2**29
+# A last bound on the work; meshes measured so far take less than one flip per face.
+_MOST_FLIPS_PER_FACE = 100
+# Areas are made of fourth powers of lengths, which are normal numbers up to here, far below 1 too.
+_LARGEST_LENGTH = 1e30
+
+
+class HalfEdges(NamedTuple):
+    """m triangles by their half-edges. Half-edge ``3 f + c`` is the side of face f opposite its corner c.
+
+    Attributes
+    ----------
+    vertex : (3 m,) int32
+        Vertex of each corner.
+    twin : (3 m,) int32
+        The half-edge glued to each: -1 on the boundary, -2 where more than two faces meet.
+    ring : (3 m,) int32
+        Where more than two faces meet, the next half-edge of the same edge; elsewhere the half-edge itself.
+    aligned : (3 m,) uint8
+        Whether the faces at a glued half-edge run along it in opposite directions.
+    length : (3 m,) float64
+        Of each half-edge, of glued ones the same.
+    """
+
+    vertex: AnyArray
+    twin: AnyArray
+    ring: AnyArray
+    aligned: AnyArray
+    length: FloatArray
+
+    @classmethod
+    def of_mesh(cls, mesh: Mesh) -> tuple[HalfEdges, int]:
+        """The triangles of a mesh, with lengths in units of ``2 ** exponent``, and the exponent.
+
+        It is 0, but for very large or small meshes the power of two just above the mean extent.
+
+        Raises
+        ------
+        MeshError
+            If there are too many triangles for 32-bit indices.
+        """
+        _require_room(mesh.n_faces, mesh.n_vertices)
+        exponent = 0
+        found = cls(*gluing.glue(mesh.F, mesh.V, 1.0))
+        if not 1 / _LARGEST_LENGTH < found.length.max() < _LARGEST_LENGTH:
+            # Once more in a unit in which no square leaves the range of doubles.
+            exponent = mean_exponent(np.array([np.ptp(x[mesh.F[:, :2]]) for x in mesh.V.T]))
+            found = cls(*gluing.glue(mesh.F, mesh.V, np.ldexp(1.0, -exponent)))
+        return found, exponent
+
+    @classmethod
+    def of(cls, triangulation: IntrinsicTriangulation) -> HalfEdges:
+        """Those of a triangulation.
+
+        Raises
+        ------
+        MeshError
+            If there are too many triangles for 32-bit indices.
+        """
+        _require_room(len(triangulation.F), triangulation.n)
+        ring = np.arange(len(triangulation.twin), dtype=np.int32)
+        many = np.flatnonzero(triangulation.twin == -2)
+        if len(many):
+            # Such edges were never flipped: the two vertices tell them apart.
+            ends = np.sort(np.stack([triangulation.tail(many), triangulation.head(many)]), axis=0)
+            order = np.lexsort((many, *ends))
+            many, ends = many[order], ends[:, order]
+            first = np.flatnonzero(np.append(True, (ends[:, 1:] != ends[:, :-1]).any(axis=0)))
+            following = np.roll(many, -1)
+            following[np.append(first[1:], len(many)) - 1] = many[first]
+            ring[many] = following
+        return cls(
+            triangulation.F.ravel().astype(np.int32),
+            triangulation.twin.astype(np.int32),
+            ring,
+            triangulation.aligned.astype(np.uint8),
+            triangulation.l.ravel(),
+        )
+
+    def flip(self, F: IntArray, margin: float) -> None:
+        """Mollify and flip in place to the intrinsic Delaunay triangulation; F (m, 3) are the faces before."""
+        sides = self.length.reshape(-1, 3)
+        added = mollify(sides, F, margin)
+        if added.any():
+            sides += added
+        flipping.flip(self, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * len(F))
+
+    def numbered(self, n: int, start: int = 0) -> tuple[HalfEdges, AnyArray, AnyArray]:
+        """The triangles numbered breadth-first from face `start` on, so that neighbours lie near each other in memory.
+
+        Returns
+        -------
+        edges : HalfEdges
+            By the new numbers; corners stay in place.
+        number : (n,) int32
+            New number of each of the n vertices.
+        face : (m,) int32
+            Old number of each face.
+        """
+        *edges, number, face = numbering.breadth_first(self, n, start)
+        return HalfEdges(*edges), number, face
+
+
+def mean_exponent(lengths: FloatArray) -> int:
+    """The power of two just above the mean."""
+    return int(np.frexp(lengths.mean())[1])
+
+
+def _require_room(m: int, n: int) -> None:
+    if 3 * m + n >= _TOO_MANY:
+        raise MeshError(f"{m} faces are too many for 32-bit indices: split the mesh")
+
+
+def mollify(l: FloatArray, F: IntArray, margin: float | None = None) -> FloatArray:
+    """The length to add to the edges so that no triangle is degenerate (Sharp and Crane 2020, section 4.5).
+
+    Parameters
+    ----------
+    l : (m, 3) float64
+        Edge lengths, opposite each corner.
+    F : (m, 3) int64
+        Faces: each component has a mean edge length and an added length of its own.
+    margin : float, optional
+        1e-8 if not given.
+
+    Returns
+    -------
+    (m, 3) float64
+        The smallest ``e >= 0``, one for each component, for which the triangle inequalities of ``l + e`` hold there by
+        `margin` times the mean edge length; exactly 0 if they already do, so that the lengths of a good mesh keep
+        every bit. In components with faces whose corners all coincide, by that margin, ``max(l, 1e-8 mean)`` takes the
+        place of l, which keeps every triangle inequality.
+
+    Notes
+    -----
+    A triangle with a base b between sides of length 1 knows its angles at the base to 1e-16 / b, and the base lengthens
+    paths by b at most: both are small with b = 1e-8. With b = 1e-12 around three corners in one place, exact windows
+    left out vertices.
+    """
+    least_slack = _MARGIN if margin is None else margin
+    if not gluing.has_needles(np.ascontiguousarray(l).ravel(), least_slack):
+        return np.zeros_like(l)
+    # By columns: sums and maxima over rows of three take ten times as long.
+    total = sum(l.T)
+    component = connectivity.connected_components(F, int(F.max()) + 1)[F[:, 0]]
+    n_faces = np.maximum(np.bincount(component), 1)
+    mean = np.bincount(component, total) / (3 * n_faces)
+    floor = np.zeros(len(mean))
+    point = component[np.max([*l.T], axis=0) <= least_slack * mean[component]]
+    floor[point] = _MARGIN * mean[point]
+    raised = np.maximum(l, floor[component, None])
+    total = sum(raised.T)
+    least = np.full(len(n_faces), np.inf)
+    np.minimum.at(least, component, np.min([total - 2 * side for side in raised.T], axis=0))
+    return np.asarray(raised - l + np.maximum(0.0, least_slack * mean - least)[component, None])
