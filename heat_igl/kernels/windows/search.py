@@ -80,6 +80,29 @@ def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
         emit_vertex(s, v)
 
 
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _first(s: cython.pointer(Search)) -> Entry:
+    """Take the first entry of the queue, and prefetch what the next one reads."""
+    first: Entry = pop(s)
+    h: cython.int = s.heap[0].what
+    place: cython.int
+    if s.n_heap > 0 and h < s.n_half_edges:
+        prefetch(s.length + h)
+        prefetch(s.vertex + h)
+        prefetch(s.twin + h)
+        prefetch(s.double_area + h // 3)
+        place = s.slot[h]
+        if place >= 0:
+            prefetch(s.lists[place].windows)
+            prefetch(s.lists[place].windows + 1)
+            prefetch(s.lists[place].windows + 2)
+            prefetch(s.lists[place].windows + 3)
+    return first
+
+
 def run(s: cython.pointer(Search)) -> cython.void:
     """Carry lists, and let windows leave vertices, points and segments, in ascending order of their keys."""
     entry: Entry
@@ -89,9 +112,7 @@ def run(s: cython.pointer(Search)) -> cython.void:
         if s.n_nearest > 0 and s.n_touched >= s.n_next:
             narrow(s)
             s.last_key = s.cutoff * (1.0 + MARGIN)
-        entry = pop(s)
-        if s.n_heap > 0:
-            prefetch(s.slot + s.heap[0].what)
+        entry = _first(s)
         if entry.key > s.last_key:
             break
         if s.stops_early:
@@ -169,9 +190,7 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
         if until == INFINITY and _load(s) > s.plenty and not s.meets_flat:
             return
-        entry = pop(s)
-        if s.n_heap > 0:
-            prefetch(s.slot + s.heap[0].what)
+        entry = _first(s)
         carry(s, entry)
 
 
