@@ -513,13 +513,11 @@ def _reach_apex(
             m = 1.0
             a = w.start - x
             b = w.stop - x
-            distance = w.offset + w.x * apex.x + w.depth * apex.y
         else:
             x = apex.x - w.x
             m = apex.y + w.depth
             a = (w.start - w.x) * m - w.depth * x
             b = (w.stop - w.x) * m - w.depth * x
-            distance = w.offset + sqrt(x * x + m * m)
         if b < 0.0:
             w.side = LEFT_OF_APEX
             if b < -NEAR * apex.length * m:
@@ -532,6 +530,10 @@ def _reach_apex(
             b = w.start
         else:
             w.side = AROUND_APEX
+            if w.is_plane:
+                distance = w.offset + w.x * apex.x + w.depth * apex.y
+            else:
+                distance = w.offset + sqrt(x * x + m * m)
             if distance < apex.nearest:
                 apex.nearest = distance
                 apex.best = i

@@ -276,42 +276,34 @@ def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> c
 @cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def _key(
-    s: cython.pointer(Search), w: cython.pointer(Window), length: cython.double, bulge: cython.double
+def _lowest_key(
+    s: cython.pointer(Search), run: cython.pointer(Window), n: cython.int, length: cython.double, bulge: cython.double
 ) -> cython.double:
-    """The key of a window. Of parallel lines, the power of the root becomes the distance of the circle's centre."""
-    key: cython.double
-    x: cython.double = 0.0
-    if w.is_plane:
-        if s.is_delaunay:
-            return w.offset + 0.5 * (w.x * length + w.depth * bulge)
-        return w.offset + w.x * (w.start if w.x > 0.0 else w.stop)
-    if s.is_delaunay:
-        key = w.x * (w.x - length) + w.depth * (w.depth + bulge)
-        return w.offset + (sqrt(key) if key > 0.0 else 0.0)
-    if w.x < w.start:
-        x = w.start - w.x
-    elif w.x > w.stop:
-        x = w.x - w.stop
-    return w.offset + sqrt(x * x + w.depth * w.depth)
+    """The lowest key of n windows, the same in both frames of their half-edge.
 
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _is_late(
-    s: cython.pointer(Search),
-    run: cython.pointer(Window),
-    n: cython.int,
-    length: cython.double,
-    bulge: cython.double,
-) -> cython.bint:
-    """Whether the keys of all windows of a run, the same in both frames, lie beyond the end of the search."""
+    Of parallel lines, the power of the root becomes the distance of the circle's centre.
+    """
+    lowest: cython.double = INFINITY
+    square: cython.double
+    x: cython.double
     i: cython.int
+    w: cython.pointer(Window)
     for i in range(n):
-        if _key(s, run + i, length, bulge) <= s.last_key:
-            return False
-    return True
+        w = run + i
+        if w.is_plane:
+            if s.is_delaunay:
+                x = 0.5 * (w.x * length + w.depth * bulge)
+            else:
+                x = w.x * (w.start if w.x > 0.0 else w.stop)
+            lowest = min(lowest, w.offset + x)
+            continue
+        if s.is_delaunay:
+            square = w.x * (w.x - length) + w.depth * (w.depth + bulge)
+        else:
+            x = max(w.start - w.x, w.x - w.stop, 0.0)
+            square = x * x + w.depth * w.depth
+        lowest = min(lowest, w.offset + sqrt(max(square, 0.0)))
+    return lowest
 
 
 @cython.cfunc
@@ -363,11 +355,9 @@ def append(
     one: cython.pointer(List)
     to: cython.pointer(Window)
     length: cython.double = s.length[t]
-    bulge: cython.double = s.bulge[t]
-    key: cython.double
-    lowest: cython.double = INFINITY
+    lowest: cython.double = _lowest_key(s, run, n, length, s.bulge[t])
     if place < 0:
-        if s.last_key < INFINITY and _is_late(s, run, n, length, bulge):
+        if lowest > s.last_key:
             return
         place = _free_list(s)
         if place < 0:
@@ -394,10 +384,6 @@ def append(
             to[i] = _mirrored(run[n - 1 - i], length)
     else:
         memcpy(to, run, n * cython.sizeof(Window))
-    for i in range(n):
-        key = _key(s, to + i, length, bulge)
-        if key < lowest:
-            lowest = key
     if lowest < one.key:
         one.key = lowest
         push(s, lowest, t)
