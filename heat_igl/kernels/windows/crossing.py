@@ -50,19 +50,16 @@ def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double)
 
 
 @cython.cfunc
+@cython.inline
 @cython.nogil
 @cython.exceptval(check=False)
-def _excess(
-    u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, slope: cython.p_double
+def _change(
+    u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, a: cython.double, b: cython.double
 ) -> cython.double:
-    """Distance by u less that by w; `slope` takes a number with the sign of the derivative of this difference."""
-    a: cython.double = reach(u, at)
-    b: cython.double = reach(w, at)
+    """The sign of the derivative of distance by u less that by w, which add a and b to their offsets."""
     if u.is_plane or w.is_plane:
-        slope[0] = _slope(u, at, a) - _slope(w, at, b)
-    else:
-        slope[0] = (at - u.x) * b - (at - w.x) * a
-    return (u.offset - w.offset) + a - b
+        return _slope(u, at, a) - _slope(w, at, b)
+    return (at - u.x) * b - (at - w.x) * a
 
 
 @cython.cfunc
@@ -76,16 +73,23 @@ def _meeting(
     at_low: cython.double,
     at_high: cython.double,
     shift: cython.double,
-    slope: cython.p_double,
+    room: cython.p_double,
 ) -> cython.double:
-    """The point at which distance by u less that by w, plus `shift`, is 0: Newton's method inside a bracket.
+    """The point at which distance by u less that by w, plus `shift`, is 0, to within `room`.
 
-    The bracket is [low, high], with the values `at_low` and `at_high` of opposite signs. `slope` takes the derivative.
+    Newton's method inside the bracket [low, high], with the values `at_low` and `at_high` of opposite signs. It ends
+    as soon as the step proves where the point is: the derivative of a distance changes by at most 1 / distance.
+    `room` comes as a length, and takes how far windows that meet have to overlap: that the difference grows to this
+    length, as it grows further before its extremum, and the uncertainty of the point.
     """
     x: cython.double = low + (high - low) * at_low / (at_low - at_high)
+    margin: cython.double = room[0]
     y: cython.double
     a: cython.double
     b: cython.double
+    slope: cython.double = 0.0
+    step: cython.double
+    bend: cython.double
     _: cython.int
     shift += u.offset - w.offset
     for _ in range(8):
@@ -96,13 +100,18 @@ def _meeting(
             low = x
         else:
             high = x
-        slope[0] = _slope(u, x, a) - _slope(w, x, b)
-        if fabs(y) <= 1e-15 * (fabs(a) + fabs(u.offset)):
-            break
-        if slope[0] != 0.0:
-            x -= y / slope[0]
+        slope = _slope(u, x, a) - _slope(w, x, b)
+        # At most twice the second derivative while the step is below a quarter of both distances.
+        bend = (0.0 if u.is_plane else 2.0 / a) + (0.0 if w.is_plane else 2.0 / b)
+        step = -y / slope if slope != 0.0 else INFINITY
+        x += step
+        if 4.0 * bend * fabs(step) <= fabs(slope) and low <= x <= high:
+            # The derivative keeps at least half of its size.
+            room[0] = (bend * step * step + 2.0 * margin) / fabs(slope)
+            return x
         if not (low < x < high):
             x = 0.5 * (low + high)
+    room[0] = high - low
     return x
 
 
@@ -168,20 +177,22 @@ def _ordered(
         is_farther: cython.bint = u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2
         return U_NEARER if is_farther and not (u.is_plane or w.is_plane) else UNDECIDED
     if at_low < -margin and at_high > margin:
-        a = _meeting(u, w, low, high, at_low, at_high, 0.0, cython.address(slope_low))
-        # The difference grows to the margin within this, as it grows further before its extremum.
-        b = 2.0 * margin / fabs(slope_low) if slope_low != 0.0 else high - low
+        b = margin
+        a = _meeting(u, w, low, high, at_low, at_high, 0.0, cython.address(b))
         until[0], until[1] = min(a + b, high), max(a - b, low)
         return U_THEN_W
     # Equally near at one end, or at both.
     until[0], until[1] = high, low
+    b = 0.0
     if at_low < -margin:
         if slope_high >= 0.0:
-            until[1] = _meeting(u, w, low, high, at_low + margin, at_high + margin, margin, cython.address(slope_low))
+            a = _meeting(u, w, low, high, at_low + margin, at_high + margin, margin, cython.address(b))
+            until[1] = max(a - b, low)
         return U_THEN_W
     if at_high > margin:
         if slope_low >= 0.0:
-            until[0] = _meeting(u, w, low, high, at_low - margin, at_high - margin, -margin, cython.address(slope_low))
+            a = _meeting(u, w, low, high, at_low - margin, at_high - margin, -margin, cython.address(b))
+            until[0] = min(a + b, high)
         return U_THEN_W
     return UNDECIDED
 
@@ -200,6 +211,10 @@ def _compare(
 
     If one is nearer at one end and the other at the other, `until` takes the points up to which u and w are needed.
     """
+    a: cython.double
+    b: cython.double
+    c: cython.double
+    d: cython.double
     at_low: cython.double
     at_high: cython.double
     slope_low: cython.double
@@ -208,9 +223,10 @@ def _compare(
     order: cython.int
     if u.offset == w.offset and not (u.is_plane or w.is_plane):
         return _compare_squares(u, w, low, high, until)
-    at_low = _excess(u, w, low, cython.address(slope_low))
-    at_high = _excess(u, w, high, cython.address(slope_high))
-    margin = ROUNDING * (fabs(u.offset) + reach(u, low))
+    a, b, c, d = reach(u, low), reach(w, low), reach(u, high), reach(w, high)
+    at_low, at_high = (u.offset - w.offset) + a - b, (u.offset - w.offset) + c - d
+    slope_low, slope_high = _change(u, w, low, a, b), _change(u, w, high, c, d)
+    margin = ROUNDING * (fabs(u.offset) + a)
     # Where w comes first, u and w change places.
     if at_low > margin or (at_low >= -margin and at_high < -margin):
         order = _ordered(w, u, low, high, -at_low, -at_high, -slope_low, -slope_high, margin, until)
