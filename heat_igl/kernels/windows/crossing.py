@@ -318,6 +318,14 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
     square = w.depth * w.depth
     p = (w.start - w.x) * (w.start - w.x) + square
     q = (w.stop - w.x) * (w.stop - w.x) + square
+    # The usual case, with one branch: the whole window is nearer.
+    if (
+        (w.start >= -a)
+        & (w.stop <= b)
+        & (p <= (a + w.start) * (a + w.start))
+        & (q <= (b - w.stop) * (b - w.stop))
+    ):
+        return True
     r = a + w.stop
     if r < 0.0 or q > r * r:
         return False
@@ -410,6 +418,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
     i: cython.int
     k: cython.int = 0
+    u: cython.pointer(Window)
     w: cython.pointer(Window)
     length: cython.double = s.length[h]
     from_tail: cython.double = s.upper[s.vertex[next_half_edge(h)]]
@@ -420,9 +429,15 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     from_head += length
     for i in range(n):
         w = windows + i
-        if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
+        if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset) or w.stop - w.start <= NARROW * length:
             continue
-        if w.stop - w.start > NARROW * length:
+        u = windows + (k - 1)
+        # The usual case: behind the last, and not a half of it.
+        if k > 0 and (w.start >= u.start) & (w.start > u.stop - SLIVER * length) and fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
+            if k < i:
+                windows[k] = w[0]
+            k += 1
+        else:
             k = _insert(windows, k, w, length)
     return k
 
