@@ -319,12 +319,7 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
     p = (w.start - w.x) * (w.start - w.x) + square
     q = (w.stop - w.x) * (w.stop - w.x) + square
     # The usual case, with one branch: the whole window is nearer.
-    if (
-        (w.start >= -a)
-        & (w.stop <= b)
-        & (p <= (a + w.start) * (a + w.start))
-        & (q <= (b - w.stop) * (b - w.stop))
-    ):
+    if (w.start >= -a) & (w.stop <= b) & (p <= (a + w.start) * (a + w.start)) & (q <= (b - w.stop) * (b - w.stop)):
         return True
     r = a + w.stop
     if r < 0.0 or q > r * r:
@@ -418,6 +413,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
     i: cython.int
     k: cython.int = 0
+    is_behind: cython.bint
     u: cython.pointer(Window)
     w: cython.pointer(Window)
     length: cython.double = s.length[h]
@@ -433,7 +429,8 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
             continue
         u = windows + (k - 1)
         # The usual case: behind the last, and not a half of it.
-        if k > 0 and (w.start >= u.start) & (w.start > u.stop - SLIVER * length) and fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
+        is_behind = k > 0 and (w.start >= u.start) & (w.start > u.stop - SLIVER * length)
+        if is_behind and fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
             if k < i:
                 windows[k] = w[0]
             k += 1
@@ -561,10 +558,8 @@ def _reach_apex(
             b = w.start
         else:
             w.side = AROUND_APEX
-            if w.is_plane:
-                distance = w.offset + w.x * apex.x + w.depth * apex.y
-            else:
-                distance = w.offset + sqrt(x * x + m * m)
+            distance = w.offset
+            distance += w.x * apex.x + w.depth * apex.y if w.is_plane else sqrt(x * x + m * m)
             if distance < apex.nearest:
                 apex.nearest = distance
                 apex.best = i

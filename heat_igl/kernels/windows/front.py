@@ -291,10 +291,8 @@ def _lowest_key(
     for i in range(n):
         w = run + i
         if w.is_plane:
-            if s.is_delaunay:
-                x = 0.5 * (w.x * length + w.depth * bulge)
-            else:
-                x = w.x * (w.start if w.x > 0.0 else w.stop)
+            x = w.x * length + w.depth * bulge
+            x = 0.5 * x if s.is_delaunay else w.x * (w.start if w.x > 0.0 else w.stop)
             lowest = min(lowest, w.offset + x)
             continue
         if s.is_delaunay:
