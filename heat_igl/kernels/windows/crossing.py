@@ -329,16 +329,17 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
         return False
     r = a + w.start
     if r < 0.0 or p > r * r:
-        r = 2.0 * (a + w.x)
+        r = a + w.x
         if r > 0.0:
-            r = (w.x * w.x + square - a * a) / r
+            # Not as one difference of squares, which is rounding where the root is near the line from the tail.
+            r = 0.5 * (w.x - a + square / r)
             if r > w.start:
                 w.start = r
     r = b - w.stop
     if r < 0.0 or q > r * r:
-        r = 2.0 * (b - w.x)
+        r = b - w.x
         if r > 0.0:
-            r = (b * b - w.x * w.x - square) / r
+            r = 0.5 * (b + w.x - square / r)
             if r < w.stop:
                 w.stop = r
     return True
@@ -652,6 +653,15 @@ def _place(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _longest(apex: cython.pointer(Apex)) -> cython.double:
+    """The longest side of the face, which places on its sides are rounded to."""
+    return max(apex.length, apex.left_length, apex.right_length)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _continues(
@@ -675,7 +685,7 @@ def _continues(
         if w.side == AROUND_APEX and i == to_left:
             at = min(max(backward(w, apex.x, apex.y), w.start), w.stop)
         # Lengths agree, not places: a line along the side meets it anywhere.
-        if not is_within(bent(w, at, x, y), out.offset + reach(out, place), apex.length):
+        if not is_within(bent(w, at, x, y), out.offset + reach(out, place), _longest(apex)):
             return False
     return True
 
@@ -703,7 +713,9 @@ def _is_behind(
     for i in range(2):
         place = out.stop if i else out.start
         _place(apex, to_left, place, cython.address(x), cython.address(y))
-        if not is_within(bent(best, apex.best_at, x, y), out.offset + reach(cython.address(out), place), apex.length):
+        if not is_within(
+            bent(best, apex.best_at, x, y), out.offset + reach(cython.address(out), place), _longest(apex)
+        ):
             return False
     return True
 
