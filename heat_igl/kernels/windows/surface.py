@@ -63,7 +63,7 @@ def shapes(tables) -> bool:
             h = 3 * f
             a, b, d = length[h], length[h + 1], length[h + 2]
             # A needle without height would have no circle.
-            twice = 2.0 * area(a, b, d) + 1e-20 * a * a
+            twice = max(2.0 * area(a, b, d), 1e-20 * a * a)
             double_area[f] = twice
             bulge[h] = a * twice_product(b, d, a) / (2.0 * twice)
             bulge[h + 1] = b * twice_product(a, d, b) / (2.0 * twice)
