@@ -7,7 +7,7 @@ and the direction in which it leaves the source. Vectors are off by their mean e
 all vertices and away from the cut locus, and by angles in degrees; "exp(log)" is the largest |exp(log x) - x| at the
 ends of straight paths, in largest distances. The vector heat method is measured from three sources against the nearest
 one along the path. Times are seconds of the processor of ``--pairs`` calls that take turns. Manifold meshes, oriented
-alike; needs the extra ``bench``. docs/directions.md shows the tables.
+alike; needs the extra ``bench``. docs/directions_theory.md shows the tables.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Length of paths and loops against flips of edges and exact distance, and the time that they take.
 
-    python scripts/paths_table.py bunny.obj cow.obj --pairs 500 --docs docs/paths.md
+    python scripts/paths_table.py bunny.obj cow.obj --pairs 500 --docs docs/paths_theory.md
 
 `GeodesicPathSolver` and potpourri3d's `EdgeFlipGeodesicSolver` (extra ``bench``) join so many pairs of vertices by
 paths and straighten a tenth as many loops through four vertices along edges. Counted are results of ours that are

@@ -225,7 +225,7 @@ def test_a_large_sphere_is_finite_and_right():
     assert np.isfinite(found).all()
     near = mesh.V @ p > -0.9
     error = angle_between(found, frames.from_world(sphere_transport(p, mesh.V, w)))[near]
-    # For time steps of h^2 the error grows slowly with the number of vertices (docs/directions.md).
+    # For time steps of h^2 the error grows slowly with the number of vertices (docs/directions_theory.md).
     assert error.mean() < np.radians(0.13)
     assert error.max() < np.radians(1.3)
 
