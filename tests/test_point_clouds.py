@@ -755,7 +755,7 @@ def test_principal_axes() -> None:
     P = np.random.default_rng(0).uniform(-1, 1, (41, 3)) * [1, 0.8, 0.2]
     index = np.argsort(np.linalg.norm(P - P[0], axis=1)).astype(np.int32)[None]
     square = np.square(P[index[0]] - P[0]).sum(axis=1)[None]
-    axes, _, bend = tangent_planes(P, index, False)
+    axes, _, bend = tangent_planes(P, index)
     weights = np.maximum(1 - square[0] / square[0, -1], 1e-3)
     expected, vectors = np.linalg.eigh(
         np.cov((P[index[0]] - P[0]).T / np.sqrt(square[0, -1]), aweights=weights, ddof=0)
@@ -846,7 +846,7 @@ def test_neighbours_on_another_sheet_are_left_out() -> None:
     P, _ = two_sheets(1500, 1.5 / np.sqrt(1500))
     tree = point_tree(P)
     index, _ = tree.nearest(np.arange(len(P)), 31)
-    kept, _, axes = one_sheet(tree.P, index, False)
+    kept, _, axes = one_sheet(tree.P, index)
     inner = (np.abs(tree.P[:, :2] - 0.5) < 0.35).all(axis=1)
     is_other = (tree.P[kept, 2] > 0) != (tree.P[:, None, 2] > 0)
     assert ((tree.P[index, 2] > 0) != (tree.P[:, None, 2] > 0))[inner].sum(axis=1).mean() > 10
@@ -859,7 +859,7 @@ def test_neighbours_across_a_right_angle_stay() -> None:
     P = plane(2000)
     folded = np.where(P[:, :1] < 0.5, P, np.stack([0 * P[:, 0] + 0.5, P[:, 1], P[:, 0] - 0.5], axis=1))
     index, _ = point_tree(folded).nearest(np.arange(2000), 31)
-    kept, _, _ = one_sheet(point_tree(folded).P, index, False)
+    kept, _, _ = one_sheet(point_tree(folded).P, index)
     assert (kept[:, :8] >= 0).mean() > 0.99
 
 

@@ -17,7 +17,7 @@ def test_a_quadric_is_that_of_weighted_least_squares(k: int) -> None:
     tree = point_tree(P)
     index, _ = tree.nearest(np.arange(400), k)
     square = np.square(tree.P[index] - tree.P[:, None]).sum(axis=2)
-    axes, _, bend = tangent_planes(tree.P, index, False)
+    axes, _, bend = tangent_planes(tree.P, index)
     # The order of the neighbours does not matter.
     moved, deviation, thickness = onto_quadrics(tree.P, np.append(index[:, :1], index[:, :0:-1], axis=1))
     np.testing.assert_allclose(thickness, bend, rtol=1e-9)

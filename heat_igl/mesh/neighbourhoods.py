@@ -95,8 +95,7 @@ class Neighbourhoods:
     radius : (n,) float64
         Distance of the farthest of them.
     reach : (n,) float64
-        Distance of the farthest of all neighbours, also of those that are left out where a neighbourhood is made
-        smaller.
+        Distance of the farthest of all neighbours, also of those on other sheets.
     axes : (n, 3, 3) float64
         Two tangents and the normal of each point, in rows, orthonormal.
     """
@@ -105,11 +104,6 @@ class Neighbourhoods:
     radius: FloatArray
     reach: FloatArray
     axes: FloatArray
-
-    @property
-    def has_shrunk(self) -> bool:
-        """Whether some neighbourhoods were made smaller."""
-        return bool((self.index[:, -1] < 0).any())
 
 
 def point_tree(P: FloatArray) -> PointTree:
@@ -124,38 +118,34 @@ def _tree(P: FloatArray) -> KDTree:
     return KDTree(P, _LEAF)
 
 
-def neighbourhoods(tree: PointTree, normals: FloatArray | None = None, shrinks: bool = True) -> Neighbourhoods:
+def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighbourhoods:
     """Neighbours and tangent planes of the points of `tree`.
 
     Planes are found by principal components unless the normals (n, 3) of ``tree.P`` are given. Points weigh
     1 - (d / r)^2, for d the distance and r the radius of the neighbourhood. Where neighbourhoods are far from flat, at
-    edges and thin parts, neighbours on other sheets are left out, and neighbourhoods are made smaller if that makes
-    them flatter, unless `shrinks` is False.
+    edges and thin parts, neighbours on other sheets are left out.
     """
-    P = tree.P
-    k = min(_K, len(P) - 1)
-    n = len(P)
+    P, n = tree.P, len(tree.P)
+    k = min(_K, n - 1)
     found = Neighbourhoods(np.empty((n, k + 1), np.int32), np.empty(n), np.empty(n), np.empty((n, 3, 3)))
-    bend = np.zeros(len(P))
+    bend = np.zeros(n)
 
     def fill(rows: slice) -> None:
         index, found.reach[rows] = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
         if normals is not None:
             found.radius[rows], found.axes[rows] = found.reach[rows], _axes_along(normals[rows])
         else:
-            shrunk = index.copy()
-            found.axes[rows], found.radius[rows], bend[rows] = tangent_planes(P, shrunk, shrinks)
-            index = np.where((bend[rows] > _SEVERAL_SHEETS)[:, None], index, shrunk)
+            found.axes[rows], found.radius[rows], bend[rows] = tangent_planes(P, index)
         found.index[rows] = index
 
-    over_rows(fill, len(P), _BLOCK)
+    over_rows(fill, n, _BLOCK)
     bent = np.flatnonzero(bend > _SEVERAL_SHEETS)
     if len(bent):
-        found.index[bent], found.radius[bent], found.axes[bent] = one_sheet(P, found.index[bent], shrinks)
+        found.index[bent], found.radius[bent], found.axes[bent] = one_sheet(P, found.index[bent])
     return found
 
 
-def one_sheet(P: FloatArray, index: IntArray, shrinks: bool) -> tuple[IntArray, FloatArray, FloatArray]:
+def one_sheet(P: FloatArray, index: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Neighbours on the same sheet of the surface as each of b points, and the tangent planes through them.
 
     The sheets of a thin part, or on the two sides of a narrow gap, nearly touch: the neighbours of a point are on
@@ -169,8 +159,6 @@ def one_sheet(P: FloatArray, index: IntArray, shrinks: bool) -> tuple[IntArray, 
     index : (b, k) int32
         Neighbours, by distance and each point first. Only neighbours that are among the b points themselves are left
         out.
-    shrinks : bool
-        Whether neighbourhoods are made smaller where that makes them flatter.
 
     Returns
     -------
@@ -193,7 +181,7 @@ def one_sheet(P: FloatArray, index: IntArray, shrinks: bool) -> tuple[IntArray, 
 
     def seen(rows: slice) -> tuple[IntArray, FloatArray, FloatArray]:
         kept = on_one_side(P, index[rows], number, normals, radii)
-        axes, radius, _ = tangent_planes(P, kept, shrinks)
+        axes, radius, _ = tangent_planes(P, kept)
         return kept, radius, axes
 
     found, radius, axes = map(np.concatenate, zip(*over_rows(seen, len(index), _BLOCK), strict=True))

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.mesh.cloud_copies import distinct_points
-from heat_igl.mesh.connectivity import connected_components
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.mesh.report import CloudReport
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from heat_igl.mesh.neighbourhoods import PointTree
 
 __all__ = ["PointCloud"]
 
@@ -158,7 +153,8 @@ class PointCloud:
         """
         from heat_igl.mesh.cloud_normals import oriented_normals
         from heat_igl.mesh.cloud_orientation import oriented
-        from heat_igl.mesh.neighbourhoods import point_tree, without_noise
+        from heat_igl.mesh.cloud_triangles import cloud_triangles
+        from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
 
         # Copies of a point would compete for the same triangles.
         distinct, original = self._distinct
@@ -169,7 +165,7 @@ class PointCloud:
         given, tree = tree, without_noise(tree)
         if normals is None:
             _warn_of_two_sheets(given.P, tree.P)
-        triangles = _triangles(tree, normals)
+        triangles = cloud_triangles(tree.P, neighbourhoods(tree, normals), oriented=normals is not None)
         if not len(triangles):
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
@@ -293,23 +289,3 @@ def _warn_of_two_sheets(given: FloatArray, moved: FloatArray) -> None:
             "measured as one sheet with noise: pass PointCloud(P, normals) to keep the sheets apart",
             AccuracyWarning,
         )
-
-
-def _triangles(tree: PointTree, normals: FloatArray | None) -> IntArray:
-    """The triangles (m, 3) int32 of points: of as few parts as those of neighbourhoods that are not made smaller."""
-    from heat_igl.mesh.cloud_triangles import cloud_triangles
-    from heat_igl.mesh.neighbourhoods import neighbourhoods
-
-    near = neighbourhoods(tree, normals)
-    F = cloud_triangles(tree.P, near, oriented=normals is not None)
-    parts = _n_parts(F, len(tree.P)) if near.has_shrunk else 1
-    if parts != 1:
-        joined = cloud_triangles(tree.P, neighbourhoods(tree, shrinks=False), oriented=False)
-        if _n_parts(joined, len(tree.P)) < parts or not parts:
-            return joined
-    return F
-
-
-def _n_parts(F: IntArray, n: int) -> int:
-    """How many parts the triangles F (m, 3) make, without points in no triangle."""
-    return len(np.unique(connected_components(F, n)[F])) if len(F) else 0

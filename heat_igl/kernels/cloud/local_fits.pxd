@@ -8,11 +8,7 @@ cdef extern from *:
     #define LEAST_WEIGHT 1e-3
     // Lengths are divided by no less.
     #define TINY 2.3e-308
-    // Ratio of the two smaller variances above which fewer neighbours are tried, and the share of it that these must
-    // stay below: neighbours on the other side of a thin part or beyond an edge bend the plane.
-    #define BENT 0.02
-    #define FLATTER 0.7
     // Points on a line leave a quadric undetermined; so much on the diagonal, per neighbour, makes the smallest one.
     #define DIAGONAL 1e-9
     """
-    double LEAST_WEIGHT, TINY, BENT, FLATTER, DIAGONAL
+    double LEAST_WEIGHT, TINY, DIAGONAL

@@ -2,69 +2,46 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.local_fits import BENT, DIAGONAL, FLATTER, LANES, LEAST_WEIGHT, TINY
+from cython.cimports.heat_igl.kernels.cloud.local_fits import DIAGONAL, LANES, LEAST_WEIGHT, TINY
 from cython.cimports.libc.math import fabs, sqrt
 
 __all__ = ["onto_quadrics", "tangent_planes"]
 
 
-def tangent_planes(
-    P: cython.const[cython.double][:, ::1],
-    index: cython.int[:, ::1],
-    shrinks: cython.bint,
-):
-    """Tangents and normals of points, by principal components of neighbourhoods, some of which are made smaller.
+def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][:, ::1]):
+    """Tangents and normals of points, by principal components of their neighbourhoods.
 
     Parameters
     ----------
     P : (n, 3) float64
         All points.
     index : (b, k) int32
-        Neighbours of some points, by distance and each point first, -1 after the last. Neighbours that are left out
-        become -1.
-    shrinks : bool
-        Whether two thirds, a half and a third of the neighbours are tried where the points vary much along the normal,
-        and those taken that are flatter.
+        Neighbours of some points, by distance and each point first, -1 after the last.
 
     Returns
     -------
     axes : (b, 3, 3) float64
         Directions of most, less and least variance in rows, orthonormal.
     radius : (b,) float64
-        Distance of the farthest neighbour that is left.
+        Distance of the farthest neighbour.
     bend : (b,) float64
-        Ratio of the two smaller variances of all neighbours.
+        Ratio of the two smaller variances.
     """
     found, radii, bends = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0]), np.empty(index.shape[0])
-    bent: cython.double[::1] = bends
+    bend: cython.double[::1] = bends
     axes: cython.double[:, :, ::1] = found
     radius: cython.double[::1] = radii
-    trial: cython.double[:, ::1] = np.empty((3, 3))
     variances: cython.double[::1] = np.empty(3)
     work: cython.double[:, ::1] = np.empty((6, 3))
     local: cython.double[:, ::1] = _room_for(index.shape[1])
     row: cython.Py_ssize_t
-    sixths: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     with cython.nogil:
         for row in range(index.shape[0]):
             k: cython.Py_ssize_t = index.shape[1]
             while index[row, k - 1] < 0:
                 k -= 1
-            size: cython.Py_ssize_t = k
             radius[row] = _principal_axes(P, index[row, :k], local, work, axes[row], variances)
-            bend: cython.double = variances[0] / max(variances[1], TINY)
-            bent[row] = bend
-            for sixths in range(4, 1, -1):
-                fewer: cython.Py_ssize_t = 1 + (k - 1) * sixths // 6
-                if not shrinks or bend <= BENT or fewer < 8:
-                    break
-                reach: cython.double = _principal_axes(P, index[row, :fewer], local, work, trial, variances)
-                if variances[0] < FLATTER * bend * variances[1]:
-                    bend, size, radius[row] = variances[0] / variances[1], fewer, reach
-                    axes[row, :, :] = trial
-            for j in range(size, k):
-                index[row, j] = -1
+            bend[row] = variances[0] / max(variances[1], TINY)
     return found, radii, bends
 
 
