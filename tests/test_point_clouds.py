@@ -205,6 +205,18 @@ def test_more_neighbours_are_not_taken_where_the_surface_bends() -> None:
 # What scans bring along.
 
 
+def test_noise_is_smoothed_over_no_more_neighbours_than_are_flat() -> None:
+    """Thirty of 500 points of a torus bend around its tube; with much noise nothing tells these apart."""
+    mesh = shapes.torus(120, 300)
+    rng = np.random.default_rng(1)
+    chosen = rng.choice(mesh.n_vertices, 500, replace=False)
+    expected, noise = GeodesicSolver(mesh).distance(int(chosen[0]))[chosen], rng.standard_normal((500, 3))
+    found = GeodesicSolver(PointCloud(mesh.V[chosen] + 0.014 * noise)).distance(0)
+    assert mean_error(found, expected) < 0.04
+    with pytest.warns(AccuracyWarning, match="too few to tell noise from detail"):
+        PointCloud(mesh.V[chosen] + 0.07 * noise).report()
+
+
 def test_an_outlier_is_unreachable_and_changes_nothing_else() -> None:
     P = sphere(2000)
     cloud = PointCloud(np.append(P, [[0, 0, 5.0]], axis=0))
@@ -340,6 +352,20 @@ def test_normals_that_point_to_the_other_side_are_turned(turned: str) -> None:
     np.testing.assert_allclose(cloud.normals[is_turned], -P[is_turned], atol=1e-14)
     volume = np.linalg.det(cloud.triangles.V[cloud.F]).sum() / 6  # most points keep their normals
     assert volume * (1 if is_turned.mean() < 0.5 else -1) == pytest.approx(4 / 3 * np.pi, rel=0.02)
+
+
+def test_normals_of_a_surface_with_one_side_do_not_cut_it() -> None:
+    """Along some line across a Moebius strip its normals change over, whatever they are."""
+    u, v = np.random.default_rng(0).random((2, 2000)) * [[2 * np.pi], [0.8]] - [[0], [0.4]]
+    along, across = np.array([-np.sin(u), np.cos(u), 0 * u]), np.array([np.cos(u), np.sin(u), 0 * u])
+    ruling = np.cos(u / 2) * across + np.sin(u / 2) * np.array([[0], [0], [1]])
+    turn = (np.cos(u / 2) * [[0], [0], [1]] - np.sin(u / 2) * across) / 2 + np.cos(u / 2) * along
+    P, normals = (across + v * ruling).T, np.cross((along + v * turn).T, ruling.T)
+    cloud = PointCloud(P, normals)
+    assert cloud.report().n_boundary_loops == 1
+    beside = int(np.argmin(u))
+    expected = GeodesicSolver(PointCloud(P)).distance(beside)
+    np.testing.assert_allclose(GeodesicSolver(cloud).distance(beside), expected, atol=0.01 * expected.max())
 
 
 @pytest.mark.parametrize("thickness", [1.0, 1e-3])
@@ -614,7 +640,7 @@ def test_a_star_is_the_delaunay_star() -> None:
     """In a plane no triangle of a star holds another point in its circle."""
     tree = point_tree(plane(400))
     P = tree.P
-    F = cloud_triangles(P, neighbourhoods(tree), oriented=False)
+    F = cloud_triangles(P, neighbourhoods(tree), np.zeros(len(P), bool))
     a, b, c = (P[F[:, i], :2] for i in range(3))
     # Circumcentre relative to a.
     u, v = b - a, c - a
@@ -881,7 +907,7 @@ def test_the_star_of_a_point_on_an_edge_is_that_of_the_unfolded_points() -> None
     largest = np.full(600, 0.1)
 
     def stars(P: np.ndarray, axes: np.ndarray) -> set[tuple[int, ...]]:
-        corners = delaunay_stars(P, axes, index, largest, -2.0, 0, 40)[0]
+        corners = delaunay_stars(P, axes, index, largest, np.full(600, -2.0), 0, 40)[0]
         return {tuple(row) for row in np.sort(corners, axis=1).tolist()}
 
     expected, projected = stars(flat, flat_axes), stars(folded * [1, 1, 0], flat_axes)

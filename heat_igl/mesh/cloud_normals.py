@@ -10,7 +10,7 @@ from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.cloud_orientation import turned_groups
 from heat_igl.runtime import over_rows, warn_caller
-from heat_igl.typing import AnyArray, FloatArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from heat_igl.mesh.neighbourhoods import PointTree
@@ -29,8 +29,11 @@ _ROUNDING = 1e-10
 _BLOCK = 1 << 12
 
 
-def oriented_normals(tree: PointTree, normals: FloatArray | None) -> FloatArray | None:
+def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[FloatArray | None, BoolArray]:
     """The normals (n, 3) of the points of `tree`, those turned over that contradict their neighbours.
+
+    Also returns at which points (n,) they tell sheets apart: not where neighbours of opposite normals are in front of
+    the point as well as behind it, as where the normals of a surface with one side change over.
 
     Neighbours of opposite normals lie on two sheets, or one of the normals points to the wrong side. Of two sheets one
     is in front of the other, so nearly all such neighbours are in front of each other, or nearly all behind. Points
@@ -40,11 +43,11 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> FloatArray 
     Warns
     -----
     AccuracyWarning
-        If neighbours contradict each other in any case: then None is returned.
+        If neighbours contradict each other in any case: then None is returned for them.
     """
     n = len(tree.P)
     if normals is None or n <= _K:
-        return normals
+        return normals, np.full(n, normals is not None)
     blocks = over_rows(lambda rows: tree.nearest(np.arange(rows.start, rows.stop), _K + 1)[0][:, 1:], n, _BLOCK)
     pairs = np.stack([np.repeat(np.arange(n), _K), np.concatenate(blocks).ravel()], axis=1)
     is_opposite = np.einsum("kx,kx->k", normals[pairs[:, 0]], normals[pairs[:, 1]]) < 0
@@ -64,15 +67,17 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> FloatArray 
     is_turned ^= (np.bincount(part, is_turned) > np.bincount(part) / 2)[part]
     # Those of a single point are on one side of it, too. In groups of which one was turned they are opposite no more.
     stays = ~contradicts[which] | (is_turned[a] == is_turned[b])
-    share = (stays.sum() - np.abs(np.bincount(a[stays], side[stays])).sum()) / len(pairs)
+    count, total = (np.bincount(a[stays], weight, n) for weight in (None, side[stays]))
+    total = np.abs(total)
+    share = (count - total).sum() / len(pairs)
     if share <= _MOST_CONTRADICTING:
-        return np.where(is_turned[:, None], -normals, normals) if is_turned.any() else normals
+        return np.where(is_turned[:, None], -normals, normals), total >= _NEARLY_ALL * count
     warn_caller(
         f"normals point to both sides of the surface at random ({100 * share:.0f} % of neighbours contradict each "
         "other), as if they were no normals of it: they are not used; orient them, or pass normals=None",
         AccuracyWarning,
     )
-    return None
+    return None, np.zeros(n, bool)
 
 
 def usable_normals(normals: AnyArray, where: str = "") -> AnyArray | None:

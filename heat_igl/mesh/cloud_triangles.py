@@ -59,7 +59,7 @@ class _Outer(NamedTuple):
     face: IntArray
 
 
-def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntArray:
+def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) -> IntArray:
     """Triangles (m, 3) int32 on points; an edge has at most two.
 
     Around each point they make one fan, unless one that goes all the way around is the only connection to another part.
@@ -70,10 +70,10 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntA
         The points.
     near : Neighbourhoods
         Their neighbours and tangent planes.
-    oriented : bool
-        Whether the normals tell the sides of a surface apart: neighbours with opposite normals are left out.
+    has_side : (n,) bool
+        Where the normals tell sheets apart: neighbours with opposite normals are left out.
     """
-    agreed, others, is_settled = _triangles_of_stars(P, near, _OTHER_SHEET if oriented else -2.0)
+    agreed, others, is_settled = _triangles_of_stars(P, near, np.where(has_side, _OTHER_SHEET, -2.0))
     # Around a settled point nothing is left to do.
     is_open = ~is_settled[agreed].all(axis=1)
     F, candidates = agreed[is_open], others[~is_settled[others].any(axis=1)]
@@ -88,7 +88,7 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, oriented: bool) -> IntA
 
 
 def _triangles_of_stars(
-    P: FloatArray, near: Neighbourhoods, least_cosine: float
+    P: FloatArray, near: Neighbourhoods, least_cosine: FloatArray
 ) -> tuple[IntArray, IntArray, BoolArray]:
     """The triangles (m, 3) int32 in three Delaunay stars, and those in two or one, in the order that they are taken.
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.cloud.empty_balls import on_one_side, roomiest_normals
 from heat_igl.kernels.cloud.local_fits import onto_quadrics, tangent_planes
-from heat_igl.runtime import over_rows
+from heat_igl.runtime import over_rows, warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -40,6 +41,10 @@ _NOISE = 0.05
 # Above this ratio of the two smaller variances, a neighbourhood is no disc: more points are needed to see the surface.
 _THICKNESS = 0.05
 _LARGEST_K = 120
+# Above this ratio in all neighbourhoods, the flattest of which is not the largest, nothing tells noise from detail:
+# on tori of 500 and 1000 points with noise and on a head of 507, distance is 4 to 9 % wrong above it, 2 %
+# below.
+_NO_DISC = 0.15
 # Above this one the neighbourhood is a ball within the noise.
 _NO_SURFACE = 0.5
 _MOST_PASSES = 8
@@ -231,14 +236,14 @@ def without_noise(tree: PointTree) -> PointTree:
         _, noise, thickness = _onto_quadrics(tree.P, _nearest(tree, sample, k, stride))
         return float(np.median(noise)), float(np.median(thickness))
 
-    few, _ = of_sample(_K // 2)
+    few, of_few = of_sample(_K // 2)
     if few < _NOISE:
         return tree
     noise, thickness = of_sample(_K)
     if few < _NOISE_NOT_DETAIL * noise:
         return tree
     moved = tree
-    for k, stride in _spreads(of_sample, thickness, n):
+    for k, stride in _spreads(of_sample, {_K // 2: of_few, _K: thickness}, n):
         index = _nearest(moved, np.arange(n), k, stride)
         moved = moved.moved(_smoothed(moved.P, index, sample))
     return moved
@@ -256,20 +261,31 @@ def _smoothed(P: FloatArray, index: IntArray, sample: IntArray) -> FloatArray:
     return P
 
 
-def _spreads(of_sample: Callable[[int, int], tuple[float, float]], thickness: float, n: int) -> list[tuple[int, int]]:
+def _spreads(
+    of_sample: Callable[[int, int], tuple[float, float]], found: dict[int, float], n: int
+) -> list[tuple[int, int]]:
     """How many neighbours, and among every how many-th of n points, in the order in which they are taken.
 
-    More than `_K` if noise thickens these, and not if the surface bends. Where as many as are taken show no surface at
-    all, they are taken among fewer points first.
+    As many as are flattest: more than `_K` where noise thickens these, and fewer where the surface bends. Where as many
+    as are taken show no surface at all, they are taken among fewer points first. `found` has the thickness of
+    neighbourhoods of so many points.
     """
     k, stride, most = _K, 1, min(_LARGEST_K, n // 4)
-    found = {k: thickness}
+    thickness = found[k]
     while thickness > _THICKNESS and k < most:
         k = min(2 * k, most)
         _, thickness = of_sample(k, 1)
         found[k] = thickness
-    if thickness <= _NO_SURFACE:
-        return [(min(found, key=found.__getitem__), 1)]
+    flattest = min(found, key=found.__getitem__)
+    if found[flattest] <= _NO_SURFACE:
+        if found[flattest] > _NO_DISC and flattest != k:
+            warn_caller(
+                f"the points are too few to tell noise from detail: none of {', '.join(map(str, found))} neighbours "
+                "are flat, and they are smoothed as if they were noisy. Distance may be far off: give the mesh, more "
+                "points, or points without noise",
+                AccuracyWarning,
+            )
+        return [(flattest, 1)]
     while thickness > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
         stride *= 4
         _, thickness = of_sample(k, stride)

@@ -161,11 +161,11 @@ class PointCloud:
         # From here to the triangles, points are numbered by the tree, in which neighbours are near in memory.
         tree = point_tree(self.P[distinct])
         number = distinct[tree.order]
-        normals = oriented_normals(tree, None if self.normals is None else self.normals[number])
+        normals, has_side = oriented_normals(tree, None if self.normals is None else self.normals[number])
         given, tree = tree, without_noise(tree)
         if normals is None:
             _warn_of_two_sheets(given.P, tree.P)
-        triangles = cloud_triangles(tree.P, neighbourhoods(tree, normals), oriented=normals is not None)
+        triangles = cloud_triangles(tree.P, neighbourhoods(tree, normals), has_side)
         if not len(triangles):
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"

@@ -13,7 +13,7 @@ def delaunay_stars(
     axes: cython.const[cython.double][:, :, ::1],
     neighbours: cython.const[cython.int][:, ::1],
     largest: cython.const[cython.double][::1],
-    least_cosine: cython.double,
+    least_cosine: cython.const[cython.double][::1],
     begin: cython.Py_ssize_t,
     end: cython.Py_ssize_t,
 ):
@@ -21,7 +21,7 @@ def delaunay_stars(
 
     `axes` (n, 3, 3) are the tangents and the normal of each of the points P (n, 3); rows of `neighbours` (n, k) ascend
     by distance. Triangles with a circumscribed circle of a radius above `largest` (n,) are left out, and neighbours
-    whose normals have a product below `least_cosine`.
+    whose normals have a product below `least_cosine` (n,).
 
     Returns
     -------
@@ -67,7 +67,7 @@ def _neighbours_around(
     P: cython.const[cython.double][:, ::1],
     axes: cython.const[cython.double][:, :, ::1],
     neighbours: cython.const[cython.int][:, ::1],
-    least_cosine: cython.double,
+    least_cosine: cython.const[cython.double][::1],
     star: cython.double[:, ::1],
     members: cython.int[::1],
     stack: cython.int[::1],
@@ -87,8 +87,9 @@ def _neighbours_around(
         j: cython.Py_ssize_t = neighbours[i, a]
         if j < 0 or j == i:
             continue
-        if least_cosine > -1.0 and (
-            axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2] < least_cosine
+        if least_cosine[i] > -1.0 and (
+            axes[i, 2, 0] * axes[j, 2, 0] + axes[i, 2, 1] * axes[j, 2, 1] + axes[i, 2, 2] * axes[j, 2, 2]
+            < least_cosine[i]
         ):
             continue
         if size == FEW and n_sides == 0:
