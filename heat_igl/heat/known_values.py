@@ -13,7 +13,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.operators import Surface
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.windows import PathLengths, SideChange, from_windows
+from heat_igl.windows import PathLengths, SideChange
 
 __all__ = ["GivenSlopes", "KnownValues", "Spokes", "spokes"]
 
@@ -158,4 +158,4 @@ class KnownValues:
         """The exact paths over the faces before any flip; None if no value needs one."""
         if not self._is_line.any():
             return None
-        return from_windows(self._assembler.windows, self._triangulations[1], self._term.sources)
+        return PathLengths(self._assembler.windows, self._triangulations[1], self._term.sources)

@@ -98,8 +98,8 @@ class ExactSurface:
     def __init__(self, triangulation: IntrinsicTriangulation | Tables) -> None:
         if isinstance(triangulation, IntrinsicTriangulation):
             triangulation = from_triangulation(triangulation)
-        self._tables = triangulation
-        self.n = self._tables.n
+        self.tables = triangulation
+        self.n = self.tables.n
 
     def solve(
         self,
@@ -155,9 +155,9 @@ class ExactSurface:
         ValueError
             If there are segments or points, and the surface does not know the faces that they refer to.
         """
-        starts = starts_at(self._tables, sources, offsets, points, point_offsets, segments)
+        starts = starts_at(self.tables, sources, offsets, points, point_offsets, segments)
         done = search(
-            self._tables,
+            self.tables,
             starts,
             cutoff=cutoff,
             targets=targets,
@@ -167,7 +167,7 @@ class ExactSurface:
         )
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
-            *self._result(done.found, done, self._tables.number, cutoff),
+            *self._result(done.found, done, self.tables.number, cutoff),
             *self._result(done.targets.found, done, which, cutoff),
             done.n_windows,
             done.n_crossings,
@@ -182,7 +182,7 @@ class ExactSurface:
         threads: int = 1,
     ) -> FloatArray:
         """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths."""
-        tables = self._tables
+        tables = self.tables
         starts = starts_at(tables, sources, offsets, None, None, None)
         done = search(tables, starts, cutoff=cutoff, threads=threads)
         distance = tables.unscaled(done.found.distance[tables.number])
@@ -195,8 +195,8 @@ class ExactSurface:
 
         A point on a side is there once for each triangle.
         """
-        place = self._tables.located(points)
-        return self._tables.face[place.faces].astype(np.int64), place.barycentric, place.point
+        place = self.tables.located(points)
+        return self.tables.face[place.faces].astype(np.int64), place.barycentric, place.point
 
     def located_segments(self, segments: SourceSegments) -> tuple[IntArray, FloatArray]:
         """Triangles (q,) that hold segments, and coordinates (q, 2, 3) of both ends; one on a side is there twice.
@@ -206,14 +206,14 @@ class ExactSurface:
         ValueError
             If the triangles are not those that the segments were given in.
         """
-        place = self._tables.located_segments(segments)
-        return self._tables.face[place.faces].astype(np.int64), place.barycentric
+        place = self.tables.located_segments(segments)
+        return self.tables.face[place.faces].astype(np.int64), place.barycentric
 
     def _leaving(self, done: Searched) -> Leaving | None:
         """How paths leave the roots, in the caller's numbers."""
         if done.leaving is None:
             return None
-        tables = self._tables
+        tables = self.tables
         leaving = (with_places if len(done.starts.segments.faces) else with_turns)(tables, done, done.leaving)
         corner, direction = leaving.corner[tables.number], leaving.direction[tables.number]
         place, turn = (None if of is None else of[tables.number] for of in (leaving.place, leaving.turn))
@@ -221,7 +221,7 @@ class ExactSurface:
 
     def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
         """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""
-        tables, starts, label = self._tables, done.starts, done.found.label
+        tables, starts, label = self.tables, done.starts, done.found.label
         distance = tables.unscaled(found.distance[which])
         within: BoolArray = (distance <= cutoff) & (found.root[which] >= 0)
         root = np.where(within, found.root[which], -1)

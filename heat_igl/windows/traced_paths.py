@@ -17,9 +17,6 @@ from heat_igl.windows.window_search import Searched, search, starts_at
 
 __all__ = ["ExactPaths", "PathStarts", "exact_paths"]
 
-# Initial room for segments.
-_ROOM = 2**14
-
 
 class PathStarts(NamedTuple):
     """The ends of k paths to trace back, by the numbers of the tables: vertices, or targets of the search.
@@ -108,7 +105,8 @@ def exact_paths(
     inside = SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None
     done = search(tables, sources_there, targets=inside, goals=np.unique(vertex[is_corner]))
     starts = _starts(tables, done, vertex)
-    where, places, ends = _traced(tables, done, starts)
+    ends = np.zeros(len(vertex), np.int64)
+    where, places = paths.trace_back(tables, done.found, done.starts, starts, ends)
     return ExactPaths(
         tables.face[where].astype(np.int64), places, np.append(0, ends), tables.unscaled(starts.distance) + begin
     )
@@ -134,15 +132,3 @@ def _starts(tables: Tables, done: Searched, vertex: IntArray) -> PathStarts:
     for column, values in zip(starts[1:], found, strict=True):
         column[of_target] = values[which]
     return starts
-
-
-def _traced(tables: Tables, done: Searched, starts: PathStarts) -> tuple[AnyArray, FloatArray, IntArray]:
-    """Faces and ends of all segments, and the end of each path's segments; the arrays are doubled until they fit."""
-    room = _ROOM
-    while True:
-        face, place, ends = np.empty(room, np.int32), np.empty((room, 2, 3)), np.zeros(len(starts.vertex), np.int64)
-        n_done = paths.trace_back(tables, done.found, done.starts, starts, face, place, ends)
-        if n_done == len(starts.vertex):
-            n = ends[-1] if n_done else 0
-            return face[:n], place[:n], ends
-        room *= 2

@@ -124,6 +124,6 @@ class WindowEngine(TriangleEngine):
 
     def paths(self, sources: SourceSet) -> PathLengths:
         """The paths whose lengths are the exact distances from vertices and points."""
-        from heat_igl.windows.path_lengths import from_windows
+        from heat_igl.windows.path_lengths import PathLengths
 
-        return from_windows(self._on_delaunay, self._triangles.surface.unfolding, sources)
+        return PathLengths(self._on_delaunay, self._triangles.surface.unfolding, sources)

@@ -13,6 +13,6 @@ out in the plane before the half-edge gives the distance of every point of the w
   that cross no shorter path to the corner ahead; the corner gets its distance, and windows go on over two sides.
 - `search`: takes one entry after the other from the queue, on one thread or on two.
 - `windows`: what Python calls, one search for all vertices or many local ones.
-- `paths`: shortest paths back from where windows arrived. `lines` and `derivatives`: the same lines as functions of the
-  edge lengths.
+- `paths`: shortest paths back from where windows arrived.
+- `derivatives`: their lengths as functions of the edge lengths.
 """

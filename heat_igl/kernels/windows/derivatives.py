@@ -1,8 +1,8 @@
 """Derivatives of the lengths of straight lines over triangles by the lengths of the edges.
 
-A shortest path consists of straight lines from a vertex to the next vertex that it passes, or to a source point. In a
-triangle with sides l, the piece of a line between two places with barycentric coordinates that differ by delta has
-length s, and
+A shortest path consists of straight lines from a vertex to the next vertex that it passes, or to a source point;
+`paths` follows them. In a triangle with sides l, the piece of a line between two places whose barycentric coordinates
+differ by delta has length s, and
 
     s^2 = - sum over pairs i < k of delta_i delta_k l_ik^2.
 
@@ -12,9 +12,8 @@ the order of distance.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
-from cython.cimports.heat_igl.kernels.windows.lines import AT_SOURCE, Gate, Lines, Place
-from cython.cimports.libc.math import sqrt
+from cython.cimports.heat_igl.kernels.windows.paths import AT_SOURCE, LOST, PathSegments, PathTracer
+from cython.cimports.heat_igl.kernels.windows.structures import apart
 
 __all__ = ["pull_back", "push_forward"]
 
@@ -22,18 +21,10 @@ __all__ = ["pull_back", "push_forward"]
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _squared(side: cython.pointer[cython.const[cython.double]], d: cython.pointer[Place]) -> cython.double:
-    """Squared length of a line in a face with these sides; d is the difference of the coordinates of the ends."""
-    return -(d.c[1] * d.c[2] * side[0] ** 2 + d.c[2] * d.c[0] * side[1] ** 2 + d.c[0] * d.c[1] * side[2] ** 2)
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
 def _piece(
     side: cython.pointer[cython.const[cython.double]],
-    one: cython.pointer[Place],
-    other: cython.pointer[Place],
+    one: cython.p_double,
+    other: cython.p_double,
     weight: cython.double,
     slope: cython.pointer[cython.double],
     tangent: cython.pointer[cython.const[cython.double]],
@@ -46,169 +37,127 @@ def _piece(
     they are given; returned for changes of the sides, `tangent` (3,), and of these coordinates, `end_moves` (3,), if
     they are given.
     """
-    d: Place
+    d: cython.double[3]
     c: cython.int
     i: cython.int
     k: cython.int
     total: cython.double = 0.0
     for c in range(3):
-        d.c[c] = other.c[c] - one.c[c]
-    squared: cython.double = _squared(side, cython.address(d))
-    if not squared > 0.0:
+        d[c] = other[c] - one[c]
+    length: cython.double = apart(side, one, other)
+    if not length > 0.0:
         return 0.0
-    per_length: cython.double = 1.0 / sqrt(squared)
+    per_length: cython.double = 1.0 / length
     for c in range(3):
         i, k = (c + 1) % 3, (c + 2) % 3
-        by_side: cython.double = -d.c[i] * d.c[k] * side[c] * per_length
+        by_side: cython.double = -d[i] * d[k] * side[c] * per_length
         if slope != cython.NULL:
             slope[c] += weight * by_side
         if tangent != cython.NULL:
             total += by_side * tangent[c]
         if at_end != cython.NULL:
-            at_end[c] -= 0.5 * weight * per_length * (d.c[i] * side[k] ** 2 + d.c[k] * side[i] ** 2)
+            at_end[c] -= 0.5 * weight * per_length * (d[i] * side[k] ** 2 + d[k] * side[i] ** 2)
         if end_moves != cython.NULL:
-            total -= 0.5 * per_length * (d.c[i] * side[k] ** 2 + d.c[k] * side[i] ** 2) * end_moves[c]
+            total -= 0.5 * per_length * (d[i] * side[k] ** 2 + d[k] * side[i] ** 2) * end_moves[c]
     return total
 
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
-def _along(
-    lines: Lines,
-    weight: cython.double,
-    slope: cython.pointer[cython.double],
-    at_end: cython.pointer[cython.double],
-    tangent: cython.pointer[cython.const[cython.double]],
-    end_moves: cython.pointer[cython.const[cython.double]],
-) -> cython.double:
-    """All pieces of the line that was followed; as `_piece`, with the arrays of all sides and source points."""
-    one: Place
-    other: Place
-    total: cython.double = 0.0
-    none: cython.pointer[cython.double] = cython.NULL
-    nowhere: cython.pointer[cython.const[cython.double]] = cython.NULL
-    of_face: cython.pointer[cython.double] = cython.NULL
-    tangent_of_face: cython.pointer[cython.const[cython.double]] = cython.NULL
-    j: cython.int
-    f: cython.int
-    one.c[0] = one.c[1] = one.c[2] = 0.0
-    one.c[lines.corner] = 1.0
-    for j in range(lines.n_gates):
-        gate = cython.address(lines.gate[j])
-        share: cython.double = lines.place_at(j)
-        other.c[0] = other.c[1] = other.c[2] = 0.0
-        other.c[gate.right], other.c[gate.left] = 1.0 - share, share
-        f = gate.leave - gate.leave % 3
-        if slope != cython.NULL:
-            of_face = slope + f
-        if tangent != cython.NULL:
-            tangent_of_face = tangent + f
-        sides = cython.address(lines.length[f])
-        total += _piece(
-            sides, cython.address(one), cython.address(other), weight, of_face, tangent_of_face, none, nowhere
-        )
-        # The same point by coordinates in the next face.
-        f = gate.enter - gate.enter % 3
-        one.c[0] = one.c[1] = one.c[2] = 0.0
-        tail_is_left: cython.bint = _tail_is_left(lines, gate)
-        one.c[next_half_edge(gate.enter) - f] = share if tail_is_left else 1.0 - share
-        one.c[previous_half_edge(gate.enter) - f] = 1.0 - share if tail_is_left else share
-    f = lines.end.face
-    if slope != cython.NULL:
-        of_face = slope + f
-    if tangent != cython.NULL:
-        tangent_of_face = tangent + f
-    place = at_end
-    if at_end != cython.NULL:
-        place = at_end + 3 * lines.end.entry
-        if lines.end.entry < 0:
-            place = none
-    moves = end_moves
-    if end_moves != cython.NULL:
-        moves = end_moves + 3 * lines.end.entry
-        if lines.end.entry < 0:
-            moves = nowhere
-    sides = cython.address(lines.length[f])
-    return total + _piece(
-        sides, cython.address(one), cython.address(lines.end.at), weight, of_face, tangent_of_face, place, moves
-    )
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _tail_is_left(lines: Lines, gate: cython.pointer[Gate]) -> cython.bint:
-    """Whether the left end of a gate is the tail of the half-edge by which the face behind it is entered."""
-    opposite: cython.bint = lines.aligned[gate.leave]
-    if lines.twin[gate.leave] == -2:
-        opposite = lines.vertex[next_half_edge(gate.leave)] != lines.vertex[next_half_edge(gate.enter)]
-    return gate.turns_left == opposite
+@cython.exceptval(-4)
+def _follow(tracer: PathTracer, v: cython.int) -> cython.int:
+    """Follow the straight last part of the path to vertex v: the row of its root, -1 at a source or if it is lost."""
+    if tracer.root[v] == v:
+        return -1
+    tracer.n_steps = tracer.segments.n = 0
+    end: cython.int = tracer.from_vertex(v)
+    return tracer.root[v] if end == AT_SOURCE else -1 if end == LOST else end
 
 
 def pull_back(
-    triangles,
-    points,
-    ways,
-    order: cython.const[cython.int][::1],
+    tables,
+    found,
+    starts,
+    order: cython.const[cython.longlong][::1],
     weight: cython.double[::1],
     by_side: cython.double[::1],
     by_place: cython.double[:, ::1],
-    is_lost: cython.uchar[::1],
-):
-    """Add up the derivative of the weighted sum of path lengths by the sides (3 m,), and by the source points' places.
+) -> None:
+    """Add up the derivative of the weighted sum of distances by the sides (3 m,), and by the places of source points.
 
-    `weight` (n + e,) is handed on along the paths, in descending `order` of distance; at the sources it ends as the sum
-    of the weights of all paths to them. Vertices whose line does not meet its end are marked in `is_lost` (n,). Other
-    arguments as `heat_igl.windows.path_derivatives.Paths` makes them.
+    Parameters
+    ----------
+    tables, found, starts
+        As for `paths.trace_back`; e source points.
+    order : (n,)
+        Vertices by ascending distance.
+    weight : (n + e,)
+        Of each vertex; it is handed on along the paths, in descending order of distance, and behind those of the
+        vertices it becomes the sum of the weights of all paths to each source point.
+    by_side, by_place : (3 m,), (e, 3)
+        Take the derivatives.
     """
-    lines = Lines(triangles, points, ways)
-    at_end: cython.pointer[cython.double] = cython.NULL
+    segments: PathSegments = PathSegments()
+    tracer: PathTracer = PathTracer(tables, found, starts, segments)
+    n: cython.int = order.shape[0]
     i: cython.Py_ssize_t
+    j: cython.longlong
     v: cython.int
+    row: cython.int
     with cython.nogil:
-        if by_place.shape[0] > 0:
-            at_end = cython.address(by_place[0, 0])
-        for i in range(order.shape[0] - 1, -1, -1):
-            v = order[i]
-            if lines.kind[v] == AT_SOURCE or weight[v] == 0.0:
+        for i in range(n - 1, -1, -1):
+            v = cython.cast(cython.int, order[i])
+            row = _follow(tracer, v) if weight[v] != 0.0 else -1
+            if row < 0:
                 continue
-            if not lines.follow(v):
-                is_lost[v] = True
-                continue
-            _along(lines, weight[v], cython.address(by_side[0]), at_end, cython.NULL, cython.NULL)
-            weight[lines.end.row] += weight[v]
+            for j in range(segments.n):
+                at_end: cython.p_double = cython.NULL
+                if row >= n and j == segments.n - 1:
+                    at_end = cython.address(by_place[row - n, 0])
+                f: cython.int = 3 * segments.face[j]
+                place: cython.p_double = cython.address(segments.place[j, 0, 0])
+                _piece(
+                    cython.address(tracer.length[f]), place, place + 3, weight[v],
+                    cython.address(by_side[f]), cython.NULL, at_end, cython.NULL,
+                )  # fmt: skip
+            weight[row] += weight[v]
 
 
 def push_forward(
-    triangles,
-    points,
-    ways,
-    order: cython.const[cython.int][::1],
+    tables,
+    found,
+    starts,
+    order: cython.const[cython.longlong][::1],
     tangent: cython.const[cython.double][::1],
     moves: cython.const[cython.double][:, ::1],
     change: cython.double[::1],
-    is_lost: cython.uchar[::1],
-):
-    """The derivative of all path lengths, `change` (n + e,), for sides that change by `tangent` (3 m,).
+) -> None:
+    """The derivative of all distances, `change` (n + e,), for sides that change by `tangent` (3 m,).
 
-    The source points' coordinates change by `moves` (e, 3). On entry, `change` holds the changes of the sources'
-    offsets. Other arguments as for `pull_back`.
+    The coordinates of source points change by `moves` (e, 3). On entry, `change` holds the changes of the offsets of
+    sources. Other arguments as for `pull_back`.
     """
-    lines = Lines(triangles, points, ways)
-    end_moves: cython.pointer[cython.const[cython.double]] = cython.NULL
+    segments: PathSegments = PathSegments()
+    tracer: PathTracer = PathTracer(tables, found, starts, segments)
+    n: cython.int = order.shape[0]
     i: cython.Py_ssize_t
+    j: cython.longlong
     v: cython.int
+    row: cython.int
     with cython.nogil:
-        if moves.shape[0] > 0:
-            end_moves = cython.address(moves[0, 0])
-        for i in range(order.shape[0]):
-            v = order[i]
-            if lines.kind[v] == AT_SOURCE:
+        for i in range(n):
+            v = cython.cast(cython.int, order[i])
+            row = _follow(tracer, v)
+            if row < 0:
                 continue
-            if not lines.follow(v):
-                is_lost[v] = True
-                continue
-            change[v] = _along(lines, 1.0, cython.NULL, cython.NULL, cython.address(tangent[0]), end_moves)
-            change[v] += change[lines.end.row]
+            change[v] = change[row]
+            for j in range(segments.n):
+                end_moves: cython.pointer[cython.const[cython.double]] = cython.NULL
+                if row >= n and j == segments.n - 1:
+                    end_moves = cython.address(moves[row - n, 0])
+                f: cython.int = 3 * segments.face[j]
+                place: cython.p_double = cython.address(segments.place[j, 0, 0])
+                change[v] += _piece(
+                    cython.address(tracer.length[f]), place, place + 3, 1.0,
+                    cython.NULL, cython.address(tangent[f]), cython.NULL, end_moves,
+                )  # fmt: skip

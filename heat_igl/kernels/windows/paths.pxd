@@ -9,14 +9,16 @@ cdef class InnerSources:
 
     cdef int face(self, int root) noexcept nogil
     cdef double nearest(self, const double* side, int root, double* here, double* found) noexcept nogil
+
 cdef class PathSegments:
     cdef int[::1] face
     cdef double[:, :, ::1] place
     cdef long long n
 
-    cdef bint append(self, int f, double* start, double* end) noexcept nogil
-cdef struct Bend:
-    # Where the straight part of a path ends: barycentric coordinates in a face, and what the search found there.
+    cdef int append(self, int f, double* start, double* end) except -1 nogil
+
+cdef struct LineEnd:
+    # Where a straight part of a path ends: barycentric coordinates in a face, and what the search found there.
     int face
     double x, y, z
     double distance
@@ -35,8 +37,7 @@ cdef struct Line:
 cdef enum Outcome:
     AT_SOURCE = -1
     LOST = -2
-    NO_ROOM = -3
-    GO_ON = -4
+    GO_ON = -3
 
 cdef extern from *:
     """
@@ -57,3 +58,28 @@ cdef extern from *:
     double ASTRAY
     enum: MOST_LINES
     enum: MOST_STEPS
+
+
+# A surface, what a search found on it, and the segments so far.
+cdef class PathTracer:
+    cdef const int[::1] vertex, twin, ring, root, entered
+    cdef const unsigned char[::1] aligned
+    cdef const double[::1] length, double_area, distance, crossing
+    cdef InnerSources sources
+    cdef PathSegments segments
+    cdef long long n_steps
+    # Lines to be tried, the next one last.
+    cdef Line[MOST_LINES] line
+    cdef int n_lines
+
+    cdef int along_bends(self, int v) except -4 nogil
+    cdef int from_vertex(self, int v) except -4 nogil
+    cdef int straight(self, const LineEnd* begin) except -4 nogil
+    cdef bint leads(self, const LineEnd* begin, int v, double left) noexcept nogil
+    cdef int go_through(self, const LineEnd* begin, const Line* line) except -4 nogil
+    cdef bint is_too_far(self, const LineEnd* begin, int h, const Line* line) noexcept nogil
+    cdef void go_over(self, int h, const Line* line) noexcept nogil
+    cdef void note(self, int t, const Line* line, bint mirrored) noexcept nogil
+    cdef bint is_at_source(self, const LineEnd* begin, int f, double* here, double walked) noexcept nogil
+    cdef int add(self, int f, double* here, int h, double x) except -1 nogil
+    cdef int add_to_source(self, int f, double* here, int root) except -4 nogil

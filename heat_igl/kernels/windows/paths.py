@@ -1,11 +1,15 @@
-"""Sources inside faces, points and segments, by their roots: n + i for source i of a surface with n vertices."""
+"""Shortest paths, followed back from where windows arrived to the sources: straight lines over triangles.
+
+Sources inside faces, points and segments, have the roots n + i for source i of a surface with n vertices.
+"""
 
 import cython
+import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-__all__ = ["InnerSources", "PathSegments", "trace_back"]
+__all__ = ["InnerSources", "PathSegments", "PathTracer", "trace_back"]
 
 
 @cython.final
@@ -54,35 +58,29 @@ class InnerSources:
 class PathSegments:
     """Segments, path after path: `face` (r,) int32, and barycentric coordinates `place` (r, 2, 3) of both ends.
 
-    `n` is how many there are so far.
+    `n` is how many there are so far; there may be room for more.
     """
 
-    def __init__(self, face, place):
-        self.face, self.place = face, place
+    def __init__(self):
+        self.face, self.place = np.empty(1024, np.int32), np.empty((1024, 2, 3))
 
-    def append(self, f: cython.int, start: cython.p_double, end: cython.p_double) -> cython.bint:
-        """Add a segment in face f; whether there was room."""
+    def append(self, f: cython.int, start: cython.p_double, end: cython.p_double) -> cython.int:
+        """Add a segment in face f."""
         k: cython.int
         if self.n == self.face.shape[0]:
-            return False
+            with cython.gil:  # twice the room
+                self.face = np.concatenate([self.face, self.face])
+                self.place = np.concatenate([self.place, self.place])
         self.face[self.n] = f
         for k in range(3):
             self.place[self.n, 0, k] = start[k]
             self.place[self.n, 1, k] = end[k]
         self.n += 1
-        return True
+        return 0
 
 
-def trace_back(
-    tables,
-    found,
-    sources,
-    begin,
-    face: cython.int[::1],
-    place: cython.double[:, :, ::1],
-    end: cython.longlong[::1],
-) -> int:
-    """Paths from vertices and points to the sources of a search; how many were traced before room ran out.
+def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
+    """Paths from vertices and points to the sources of a search.
 
     Parameters
     ----------
@@ -94,13 +92,16 @@ def trace_back(
         Its sources.
     begin : PathStarts
         Where the k paths begin; see `heat_igl.windows.traced_paths.PathStarts`.
-    face, place : (r,), (r, 2, 3)
-        Take the segments, path after path: face, and barycentric coordinates of both ends.
     end : (k,)
         Takes where the segments of each path end; nothing is added for a path that was lost.
+
+    Returns
+    -------
+    face, place : (r,) int32, (r, 2, 3) float64
+        The segments, path after path: face, and barycentric coordinates of both ends.
     """
-    segments: PathSegments = PathSegments(face, place)
-    tracer: _PathTracer = _PathTracer(tables, found, InnerSources(len(found.distance), sources), segments)
+    segments: PathSegments = PathSegments()
+    tracer: PathTracer = PathTracer(tables, found, sources, segments)
     vertex: cython.const[cython.int][::1] = begin.vertex
     from_face: cython.const[cython.int][::1] = begin.face
     from_place: cython.const[cython.double][:, ::1] = begin.barycentric
@@ -110,102 +111,76 @@ def trace_back(
     from_crossing: cython.const[cython.double][::1] = begin.crossing
     i: cython.Py_ssize_t
     v: cython.int
-    bend: Bend
-    n_done: cython.int = 0
+    line_end: LineEnd
+    here: cython.double[3]
     with cython.nogil:
         for i in range(end.shape[0]):
             tracer.n_steps = 0
             first: cython.longlong = segments.n
             v = vertex[i]
-            bend.x, bend.y, bend.z = from_place[i, 0], from_place[i, 1], from_place[i, 2]
-            bend.face, bend.distance, bend.root = from_face[i], from_distance[i], from_root[i]
-            bend.entered, bend.crossing = from_entered[i], from_crossing[i]
+            line_end.x, line_end.y, line_end.z = from_place[i, 0], from_place[i, 1], from_place[i, 2]
+            line_end.face, line_end.distance, line_end.root = from_face[i], from_distance[i], from_root[i]
+            line_end.entered, line_end.crossing = from_entered[i], from_crossing[i]
             if v < 0:
-                v = tracer.along_bends(tracer.straight(cython.address(bend)))
+                v = tracer.along_bends(tracer.straight(cython.address(line_end)))
             elif tracer.root[v] == v:
-                v = tracer.stay(cython.address(bend))
+                # A segment without length, at a source.
+                at_corner(2 if line_end.z == 1.0 else 1 if line_end.y == 1.0 else 0, here)
+                segments.append(line_end.face, here, here)
             else:
                 v = tracer.along_bends(v)
-            if v == NO_ROOM:
-                break
             if v == LOST:
                 segments.n = first
             end[i] = segments.n
-            n_done += 1
-    return n_done
+    return np.asarray(segments.face)[: segments.n], np.asarray(segments.place)[: segments.n]
 
 
 @cython.final
 @cython.cclass
-class _PathTracer:
-    """A surface, what a search found on it, and the segments so far."""
+class PathTracer:
+    """Follows paths back to the sources of a search; `segments` takes what they cross."""
 
-    vertex: cython.const[cython.int][::1]
-    length: cython.const[cython.double][::1]
-    twin: cython.const[cython.int][::1]
-    aligned: cython.const[cython.uchar][::1]
-    ring: cython.const[cython.int][::1]
-    double_area: cython.const[cython.double][::1]
-    distance: cython.const[cython.double][::1]
-    root: cython.const[cython.int][::1]
-    entered: cython.const[cython.int][::1]
-    crossing: cython.const[cython.double][::1]
-    sources: InnerSources
-    segments: PathSegments
-    n_steps: cython.longlong
-    # Lines to be tried, the next one last.
-    line: Line[MOST_LINES]
-    n_lines: cython.int
-
-    def __init__(self, tables, found, sources: InnerSources, segments: PathSegments):
+    def __init__(self, tables, found, sources, segments: PathSegments):
         self.vertex, self.twin, self.ring, self.aligned, self.length = tables.edges
         self.double_area = tables.double_area
         self.distance, self.root = found.distance, found.root
         self.entered, self.crossing = found.entered, found.crossing
-        self.sources, self.segments = sources, segments
+        self.sources, self.segments = InnerSources(tables.n, sources), segments
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def along_bends(self, v: cython.int) -> cython.int:
-        """From vertex v to a source; AT_SOURCE, LOST or NO_ROOM."""
-        begin: Bend
-        h: cython.int
+        """From vertex v to a source; AT_SOURCE or LOST."""
         while v >= 0:
             if self.root[v] == v:
                 return AT_SOURCE
-            if self.root[v] < 0:
-                return LOST
-            h = self.entered[v]
-            begin.distance, begin.root, begin.entered, begin.crossing = (
-                self.distance[v],
-                self.root[v],
-                h,
-                self.crossing[v],
-            )
-            if h < 0:
-                # A source inside a face with this vertex.
-                h = 3 * self.sources.face(begin.root)
-                while self.vertex[h] != v:
-                    h += 1
-            begin.face = h // 3
-            begin.x, begin.y, begin.z = h % 3 == 0, h % 3 == 1, h % 3 == 2
-            v = self.straight(cython.address(begin))
+            v = self.from_vertex(v)
         return v
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def stay(self, begin: cython.pointer[cython.const[Bend]]) -> cython.int:
-        """A segment without length, at a source; AT_SOURCE or NO_ROOM."""
-        here: cython.double[3]
-        here[0], here[1], here[2] = begin.x, begin.y, begin.z
-        return AT_SOURCE if self.segments.append(begin.face, here, here) else NO_ROOM
+    def from_vertex(self, v: cython.int) -> cython.int:
+        """The vertex at which the straight last part of the path to vertex v starts, AT_SOURCE in a face, or LOST."""
+        begin: LineEnd
+        h: cython.int = self.entered[v]
+        c: cython.int
+        corner: cython.double[3]
+        there: cython.double[3]
+        least: cython.double = INFINITY
+        if self.root[v] < 0:
+            return LOST
+        begin.distance, begin.root, begin.entered, begin.crossing = self.distance[v], self.root[v], h, self.crossing[v]
+        if h < 0:
+            # A source inside a face with this vertex, of which it may be two corners.
+            begin.face = self.sources.face(begin.root)
+            sides = cython.address(self.length[3 * begin.face])
+            for c in range(3):
+                at_corner(c, corner)
+                self.sources.nearest(sides, begin.root, corner, there)
+                if self.vertex[3 * begin.face + c] == v and apart(sides, corner, there) < least:
+                    least = apart(sides, corner, there)
+                    h = 3 * begin.face + c
+        begin.face = h // 3
+        begin.x, begin.y, begin.z = h % 3 == 0, h % 3 == 1, h % 3 == 2
+        return self.straight(cython.address(begin))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def straight(self, begin: cython.pointer[cython.const[Bend]]) -> cython.int:
+    def straight(self, begin: cython.pointer[cython.const[LineEnd]]) -> cython.int:
         """The vertex at which the straight part of a path that ends at `begin` starts, or as `along_bends`."""
         h: cython.int = begin.entered
         f: cython.int = begin.face
@@ -220,7 +195,8 @@ class _PathTracer:
             at_corner(c, corner)
             left: cython.double = apart(cython.address(self.length[3 * f]), here, corner)
             if here[c] != 1.0 and ((h < 0 and v == begin.root) or self.leads(begin, v, left)):
-                return v if self.segments.append(f, here, corner) else NO_ROOM
+                self.segments.append(f, here, corner)
+                return v
         if h < 0:
             return self.add_to_source(f, here, begin.root)
         length: cython.double = self.length[h]
@@ -233,31 +209,26 @@ class _PathTracer:
         if line.walked <= 0.0:
             return LOST
         line.dx, line.dy = (line.x - x) / line.walked, y / line.walked
-        if not self.add(f, here, h, line.x):
-            return NO_ROOM
+        self.add(f, here, h, line.x)
         self.n_lines = 0
-        self.go_over(h, line)
+        self.go_over(h, cython.address(line))
         while self.n_lines > 0:
             self.n_lines -= 1
-            v = self.go_through(begin, self.line[self.n_lines])
+            v = self.go_through(begin, cython.address(self.line[self.n_lines]))
             if v != GO_ON:
                 return v
         return LOST
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def leads(self, begin: cython.pointer[cython.const[Bend]], v: cython.int, left: cython.double) -> cython.bint:
+    def leads(self, begin: cython.pointer[cython.const[LineEnd]], v: cython.int, left: cython.double) -> cython.bint:
         """Whether a path of length `left` from vertex v makes up the distance at `begin`."""
         tolerance: cython.double = AT_ROOT if v == begin.root else ON_LINE
         d: cython.double = self.distance[v]
         return d < begin.distance and d + left - begin.distance <= tolerance * begin.distance
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def go_through(self, begin: cython.pointer[cython.const[Bend]], line: Line) -> cython.int:
-        """Carry a line through the face that it enters: a vertex it leads to, GO_ON, AT_SOURCE, LOST or NO_ROOM."""
+    def go_through(
+        self, begin: cython.pointer[cython.const[LineEnd]], line: cython.pointer[cython.const[Line]]
+    ) -> cython.int:
+        """Carry a line through the face that it enters: a vertex it leads to, GO_ON, AT_SOURCE or LOST."""
         t: cython.int = line.half_edge
         g: cython.int = t // 3
         left: cython.int = previous_half_edge(t)
@@ -282,7 +253,8 @@ class _PathTracer:
             return self.add_to_source(g, here, begin.root)
         if self.leads(begin, self.vertex[t], line.walked + sqrt(x * x + apex_y * apex_y)):
             at_corner(t % 3, corner)
-            return self.vertex[t] if self.segments.append(g, here, corner) else NO_ROOM
+            self.segments.append(g, here, corner)
+            return self.vertex[t]
         # Out over the side between the tail of t and the apex, or over the one between the apex and the head.
         if x * line.dy - apex_y * line.dx > 0.0:
             side = left
@@ -300,27 +272,22 @@ class _PathTracer:
         out.x = min(max(out.x, 0.0), self.length[side])
         out.dx, out.dy = ux * line.dx + uy * line.dy, across
         out.walked = line.walked + max(x * uy / across, 0.0)
-        if self.is_too_far(begin, side, out):
+        if self.is_too_far(begin, side, cython.address(out)):
             return GO_ON
-        if not self.add(g, here, side, out.x):
-            return NO_ROOM
-        self.go_over(side, out)
+        self.add(g, here, side, out.x)
+        self.go_over(side, cython.address(out))
         return GO_ON
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def is_too_far(self, begin: cython.pointer[cython.const[Bend]], h: cython.int, line: Line) -> cython.bint:
+    def is_too_far(
+        self, begin: cython.pointer[cython.const[LineEnd]], h: cython.int, line: cython.pointer[cython.const[Line]]
+    ) -> cython.bint:
         """Whether the ends of a half-edge are farther from the source than the rest of the path allows."""
         left: cython.double = begin.distance - line.walked + ASTRAY * begin.distance
         at_head: cython.double = self.distance[self.vertex[previous_half_edge(h)]]
         at_tail: cython.double = self.distance[self.vertex[next_half_edge(h)]]
         return at_head > left + line.x or at_tail > left + self.length[h] - line.x
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def go_over(self, h: cython.int, line: Line) -> cython.void:
+    def go_over(self, h: cython.int, line: cython.pointer[cython.const[Line]]) -> cython.void:
         """Note a line, in the outward frame of h, for each face beyond h."""
         t: cython.int = self.twin[h]
         if t >= 0:
@@ -331,23 +298,18 @@ class _PathTracer:
                 self.note(t, line, self.vertex[next_half_edge(t)] == self.vertex[next_half_edge(h)])
                 t = self.ring[t]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def note(self, t: cython.int, line: Line, mirrored: cython.bint) -> cython.void:
+    def note(self, t: cython.int, line: cython.pointer[cython.const[Line]], mirrored: cython.bint) -> cython.void:
+        """Note a line that enters a face over half-edge t, with its frame mirrored if the faces are not aligned."""
         if self.n_lines == MOST_LINES:
             return
-        line.half_edge, line.n_segments = t, self.segments.n
-        if mirrored:
-            line.x, line.dx = self.length[t] - line.x, -line.dx
-        self.line[self.n_lines] = line
+        to = cython.address(self.line[self.n_lines])
+        to.half_edge, to.n_segments, to.walked, to.dy = t, self.segments.n, line.walked, line.dy
+        to.x = self.length[t] - line.x if mirrored else line.x
+        to.dx = -line.dx if mirrored else line.dx
         self.n_lines += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def is_at_source(
-        self, begin: cython.pointer[cython.const[Bend]], f: cython.int, here: cython.p_double, walked: cython.double
+        self, begin: cython.pointer[cython.const[LineEnd]], f: cython.int, here: cython.p_double, walked: cython.double
     ) -> cython.bint:
         """Whether the source inside a face that the path comes from lies ahead in face f."""
         there: cython.double[3]
@@ -357,23 +319,18 @@ class _PathTracer:
         walked += self.sources.nearest(side, begin.root, here, there)
         return fabs(walked + apart(side, here, there) - begin.distance) <= AT_ROOT * begin.distance
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def add(self, f: cython.int, here: cython.p_double, h: cython.int, x: cython.double) -> cython.bint:
-        """A segment to the point of half-edge h that lies at x in its outward frame; whether there was room."""
+    def add(self, f: cython.int, here: cython.p_double, h: cython.int, x: cython.double) -> cython.int:
+        """Add a segment to the point of half-edge h that lies at x in its outward frame."""
         there: cython.double[3]
         share: cython.double = x / self.length[h]
         there[h % 3], there[previous_half_edge(h) % 3], there[next_half_edge(h) % 3] = 0.0, 1.0 - share, share
         return self.segments.append(f, here, there)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
     def add_to_source(self, f: cython.int, here: cython.p_double, root: cython.int) -> cython.int:
         """A segment to a source inside face f."""
         there: cython.double[3]
         if self.sources.face(root) != f:
             return LOST
         self.sources.nearest(cython.address(self.length[3 * f]), root, here, there)
-        return AT_SOURCE if self.segments.append(f, here, there) else NO_ROOM
+        self.segments.append(f, here, there)
+        return AT_SOURCE
