@@ -24,19 +24,9 @@ _Rows = list[tuple[str, str]]
 
 
 def demonstrate(out: Path) -> _Rows:
-    """Compute distance on the bunny, compare it with exact distance, and write a PLY and a PNG file.
+    """Compute distance on the bunny, compare it with exact distance, and write a PLY and a PNG file to a directory.
 
-    Without pymeshlab, which ships the bunny, the mesh is a sphere.
-
-    Parameters
-    ----------
-    out : Path
-        An existing directory for the files.
-
-    Returns
-    -------
-    list of (name, value)
-        Rows for printing: timings, errors and paths.
+    Without pymeshlab, which ships the bunny, the mesh is a sphere. Returns rows for printing: timings, errors, paths.
     """
     path = sample_mesh()
     name = "bunny" if path else "sphere"
@@ -88,8 +78,6 @@ def _compared(mesh: Mesh, phi: FloatArray, by_heat: FloatArray) -> _Rows:
         rows.append(("error of MeshLab", _error(reference.meshlab(mesh, _SOURCE), exact)))
     except (MissingExtraError, ReferenceSolverError) as error:
         rows.append(("MeshLab", f"left out: {error}"))
-    finally:
-        reference.close()
     return rows
 
 

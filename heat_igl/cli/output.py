@@ -116,13 +116,7 @@ def check_json(json_file: Path | None) -> Path | None:
 
 
 def check_writable(path: Path) -> None:
-    """Check that a file can be written to `path`, before it is computed.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Check that a file can be written to `path`, before it is computed; an OSError if not."""
     if path.is_dir():
         raise IsADirectoryError(f"{path} is a directory: name a file in it")
     if not path.parent.is_dir():

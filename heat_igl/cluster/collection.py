@@ -60,10 +60,7 @@ def folder(path: str | os.PathLike[str], points: bool = False) -> dict[str, Path
 def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike], points: bool = False) -> Iterator[Item]:
     """The meshes with their names: keys of a mapping; file names, or positions, in a sequence.
 
-    Raises
-    ------
-    ValueError
-        If two files of a sequence have one name, or a name is that of no group.
+    A ValueError if two files of a sequence have one name, or a name is that of no group.
     """
     if isinstance(meshes, Mapping):
         pairs = list(meshes.items())
@@ -105,13 +102,7 @@ class SourcePlan:
 
     @classmethod
     def of(cls, sources: str | Sequence[Sources]) -> SourcePlan:
-        """The plan that `sources` of `distances` describes.
-
-        Raises
-        ------
-        SourceError
-            If it describes none.
-        """
+        """The plan that `sources` of `distances` describes; a SourceError if it describes none."""
         if isinstance(sources, str):
             kind, _, count = sources.partition(":")
             if sources == "all":

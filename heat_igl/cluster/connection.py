@@ -100,13 +100,7 @@ def _restored_environment() -> Iterator[None]:
 
 
 def dask_modules() -> tuple[Any, Any]:
-    """The modules `dask` and `distributed`.
-
-    Raises
-    ------
-    MissingExtraError
-        If they are not installed.
-    """
+    """The modules `dask` and `distributed`; a MissingExtraError if they are not installed."""
     try:
         return importlib.import_module("dask"), importlib.import_module("distributed")
     except ImportError:

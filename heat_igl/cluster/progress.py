@@ -17,15 +17,7 @@ _LOG = logging.getLogger("heat_igl.cluster")
 
 
 class Watch:
-    """Counts meshes and blocks as the workers report them.
-
-    Parameters
-    ----------
-    n_meshes : int
-        Meshes of the batch.
-    bar : rich.progress.Progress or None
-        The bars that show the counts.
-    """
+    """Counts meshes and blocks as the workers report them; `bar` (rich.progress.Progress, or None) shows the counts."""
 
     def __init__(self, n_meshes: int, bar: Any) -> None:
         self._n_meshes = n_meshes
@@ -65,13 +57,7 @@ class Watch:
 
 @contextmanager
 def watched(client: Any, n_meshes: int, progress: bool) -> Iterator[Watch]:
-    """A watch that receives the reports of all workers of `client`.
-
-    Raises
-    ------
-    MissingExtraError
-        If `progress` is to be shown and rich is not installed.
-    """
+    """A watch that receives the reports of all workers of `client`; bars need rich."""
     with rich_progress() if progress else nullcontext() as bar:
         watch = Watch(n_meshes, bar)
         client.subscribe_topic(TOPIC, watch.event)

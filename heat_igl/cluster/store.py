@@ -52,23 +52,11 @@ def rows_per_block(n: int) -> int:
 
 
 class Store:
-    """The zarr group of a batch.
+    """The zarr group of a batch at a directory, which is made if it is missing.
 
-    Parameters
-    ----------
-    path : path-like
-        A directory; created if missing.
-    options : mapping, optional
-        Everything that all distances in the store depend on, as JSON values. Without it the store must exist.
-
-    Raises
-    ------
-    ValueError
-        If `path` holds something else, distances of other options, or a format that this version cannot read.
-    BatchError
-        If the store cannot be written.
-    MissingExtraError
-        If zarr is not installed.
+    `options` is everything that all distances in the store depend on, as JSON values; without it the store must exist.
+    A ValueError if `path` holds something else, distances of other options, or a format that this version cannot read;
+    a BatchError if the store cannot be written.
     """
 
     def __init__(self, path: str | os.PathLike[str], options: Mapping[str, Any] | None = None) -> None:
@@ -133,10 +121,7 @@ class Store:
     def attributes(self, name: str) -> dict[str, Any]:
         """The attributes of a mesh: status, t, versions, checksum, report; empty if the mesh was not begun.
 
-        Raises
-        ------
-        ValueError
-            If the group is damaged; the message names the place.
+        A ValueError names the place if the group is damaged.
         """
         folder = self.path / name
         if not any((folder / part).exists() for part in ("zarr.json", *_ARRAYS)):
@@ -228,15 +213,10 @@ class Store:
 
 
 class MeshGroup:
-    """The distances of one mesh in a store, in blocks of rows.
+    """The distances of one mesh in a store, `n_rows` source sets by `n_columns` vertices, in blocks of rows.
 
     A block is one row of zarr's chunks. zarr appends a checksum to each chunk and replaces files only by complete ones,
     so a block is finished when all chunks of it can be read.
-
-    Attributes
-    ----------
-    n_rows, n_columns : int
-        Number of source sets and of vertices.
     """
 
     def __init__(self, store: Store, name: str, group: Any, distance: Any) -> None:
@@ -252,13 +232,7 @@ class MeshGroup:
         self._n_blocks = -(-self.n_rows // self._height)
 
     def source_sets(self) -> list[IntArray]:
-        """The source vertices of each row.
-
-        Raises
-        ------
-        ValueError
-            If they cannot be read back as they were written.
-        """
+        """The source vertices of each row; a ValueError if they cannot be read back as they were written."""
         vertices, row = self._group["source_vertex"][:], self._group["source_row"][:]
         if (vertices < 0).any() or (row < 0).any():  # the fill value of a missing chunk
             raise ValueError(f"the sources of {self._name} are missing in store {self._store.path}")
@@ -284,13 +258,7 @@ class MeshGroup:
         return all((row[vertices] == 0).all() for row, vertices in zip(distances, sources[rows], strict=True))
 
     def read(self, rows: slice) -> AnyArray:
-        """Rows of the distances of a mesh that is done.
-
-        Raises
-        ------
-        ValueError
-            If a chunk is missing or damaged, or is that of another place; the message names the file.
-        """
+        """Rows of the distances of a mesh that is done; errors are those of `heat_igl.io.chunks.read_rows`."""
         return read_rows(self._folder, self._distance, self._checksums, rows)
 
     def damaged_chunk(self) -> str:
@@ -315,15 +283,10 @@ class MeshGroup:
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """A context that only one process at a time can be in, for a store at `path`.
+    """A context that only one process at a time can be in, for a store at `path`; a BatchError if another one is.
 
-    The lock is one of the operating system, on the file ``NAME.lock`` beside the store: it ends with the process,
-    and the empty file stays.
-
-    Raises
-    ------
-    BatchError
-        If another process is in it, or the file cannot be written.
+    The lock is one of the operating system, on the file ``NAME.lock`` beside the store: it ends with the process, and
+    the empty file stays.
     """
     lock = Path(os.path.realpath(path.with_name(f"{path.name}.lock")))
     with contextlib.ExitStack() as stack:

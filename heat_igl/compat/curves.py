@@ -1,22 +1,39 @@
-"""potpourri3d's paths, straightest geodesics and isolines, computed by this package."""
+"""potpourri3d's paths, straightest geodesics, isolines, and distances from curves, computed by this package."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import pairwise
+from typing import Literal, NamedTuple
 
 import igl
 import numpy as np
 
-from heat_igl.compat.triangles import proper
 from heat_igl.curves import geodesic_path, isolines, shortest_path, straighten, trace_geodesic
+from heat_igl.geodesic import geodesic_distance
+from heat_igl.heat import HeatMethodSolver, SignedHeatSolver
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
-from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.sources import OffsetSources
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["EdgeFlipGeodesicSolver", "GeodesicTracer", "MeshMarchingTrianglesSolver", "marching_triangles"]
+__all__ = [
+    "CurveReader", "EdgeFlipGeodesicSolver", "GeodesicTracer", "MeshFastMarchingDistanceSolver",
+    "MeshMarchingTrianglesSolver", "MeshSignedHeatSolver", "marching_triangles", "proper", "signed_distance",
+    "t_coef_here",
+]  # fmt: skip
 
 # Curves, each a list of points: a face, and the barycentric coordinates in it.
 Curves = list[list[tuple[int, list[float]]]]
+
+
+def proper(V: ArrayLike, F: ArrayLike) -> Mesh:
+    """The mesh without the faces that repeat a vertex, which potpourri3d accepts: they have no area."""
+    faces: AnyArray = np.asarray(F)
+    if faces.ndim == 2 and faces.shape[1] == 3:
+        repeats = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+        faces = faces[~repeats] if repeats.any() and not repeats.all() else faces
+    return Mesh(V, faces)
 
 
 class EdgeFlipGeodesicSolver:
@@ -130,3 +147,227 @@ class MeshMarchingTrianglesSolver:
 def marching_triangles(V: ArrayLike, F: ArrayLike, u: ArrayLike, isoval: float = 0.0) -> Curves:
     """The curves on which the values u (n,) are `isoval`, in one call."""
     return MeshMarchingTrianglesSolver(V, F).marching_triangles(u, isoval)
+
+
+Node = tuple[int, Sequence[float]]
+"""A vertex and (), an edge and its share of the way to the second end, or a face and two or three coordinates."""
+
+LevelSetConstraint = Literal["ZeroSet", "None", "Multiple"]
+
+_LEVELS: dict[str, Literal["zero", "none", "constant"]] = {"zeroset": "zero", "none": "none", "multiple": "constant"}
+# This package's own factor for potpourri3d's default of 1.
+_SIGNED_TIME_STEP = 0.25
+
+
+class _Place(NamedTuple):
+    """Vertices (k,) of a face, up to three, and their weights (k,), none of them 0."""
+
+    vertices: IntArray
+    weights: FloatArray
+
+
+class CurveReader:
+    """Reads the curves of potpourri3d, lists of nodes, as curves and points of this package."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+        self._faces, self._first = igl.vertex_triangle_adjacency(mesh.F, mesh.n_vertices)
+
+    def points(self, name: str, nodes: Sequence[Node]) -> SurfacePoints:
+        """The nodes as points in faces."""
+        found = [self._in_face(place, self._common_face(place.vertices)) for place in self._places(name, nodes)]
+        faces, barycentric = zip(*found, strict=True)
+        return SurfacePoints(np.array(faces), np.array(barycentric))
+
+    def curve(self, name: str, nodes: Sequence[Node]) -> SurfaceCurve:
+        """The curve from node to node: straight in a face that has both, and along the shortest path otherwise."""
+        places = self._places(name, nodes)
+        if len(places) < 2:
+            raise ValueError(f"{name} has {len(places)} points: a curve needs two or more")
+        pieces = [self._piece(p, q) for p, q in pairwise(places)]
+        faces, start, end = (
+            np.concatenate([getattr(piece, part) for piece in pieces]) for part in ("faces", "start", "end")
+        )
+        return SurfaceCurve(faces, start, end)
+
+    def through(self, name: str, vertices: Sequence[int]) -> SurfaceCurve:
+        """The curve from vertex to vertex."""
+        return self.curve(name, [(vertex, ()) for vertex in vertices])
+
+    def _piece(self, p: _Place, q: _Place) -> SurfaceCurve:
+        face = self._common_face(np.concatenate([p.vertices, q.vertices]))
+        if face >= 0:
+            (_, start), (_, end) = self._in_face(p, face), self._in_face(q, face)
+            return SurfaceCurve(np.array([face]), start, end)
+        ends = [self._in_face(place, self._common_face(place.vertices)) for place in (p, q)]
+        return geodesic_path(self._mesh, [SurfacePoints(np.array([face]), at) for face, at in ends])
+
+    def _places(self, name: str, nodes: Sequence[Node]) -> list[_Place]:
+        return [self._place(f"{name}[{i}]", *node) for i, node in enumerate(nodes)]
+
+    def _place(self, name: str, index: int, coordinates: Sequence[float]) -> _Place:
+        given = np.asarray(coordinates, np.float64).ravel()
+        if len(given) > 3:
+            raise ValueError(
+                f"{name} has {len(given)} coordinates: a face has two or three, an edge one, a vertex none"
+            )
+        kind = ("vertex", "edge", "face", "face")[len(given)]
+        table = {"vertex": np.arange(self._mesh.n_vertices)[:, None], "edge": self._mesh.edges, "face": self._mesh.F}
+        elements = table[kind]
+        if not 0 <= index < len(elements):
+            raise ValueError(f"{name} = {index} is no {kind}: indices run from 0 to {len(elements) - 1}")
+        if kind == "edge":
+            given = np.array([1 - given[0], given[0]])
+        elif len(given) != 3:
+            given = np.append(given, 1 - given.sum())
+        held = given != 0
+        return _Place(elements[index][held], given[held])
+
+    def _common_face(self, vertices: IntArray) -> int:
+        """The first face that has all these vertices, or -1."""
+        found: set[int] | None = None
+        for v in np.unique(vertices):
+            around = set(self._faces[self._first[v] : self._first[v + 1]].tolist())
+            found = around if found is None else found & around
+        return min(found, default=-1) if found is not None else -1
+
+    def _in_face(self, place: _Place, face: int) -> tuple[int, FloatArray]:
+        """The face, and the barycentric coordinates (3,) of a place in it."""
+        if face < 0:
+            raise ValueError(f"vertex {place.vertices[0]} is in no face, so no curve goes through it")
+        here = self._mesh.F[face][:, None] == place.vertices
+        return face, (here * place.weights).sum(axis=1)
+
+
+def signed_distance(
+    solver: SignedHeatSolver,
+    curves: Sequence[SurfaceCurve],
+    constraint: str,
+    unsigned: Sequence[SurfaceCurve | SurfacePoints] = (),
+) -> FloatArray:
+    """Signed distance (n,) with potpourri3d's word for the level."""
+    level = _LEVELS.get(str(constraint).lower())
+    if level is None:
+        raise ValueError(f"level_set_constraint must be 'ZeroSet', 'None' or 'Multiple', not {constraint!r}")
+    return solver.distance(list(curves), unsigned=list(unsigned) or None, level=level)
+
+
+class MeshSignedHeatSolver:
+    """Distance with a sign from curves: that of `SignedHeatSolver`, with the opposite sign as in potpourri3d.
+
+    Parameters
+    ----------
+    V, F : array_like
+        Positions (n, 3) and triangles (m, 3), manifold and oriented alike.
+    t_coef : float
+        Time step relative to the default.
+    """
+
+    def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0) -> None:
+        self._mesh = Mesh(V, F)
+        self._signed = SignedHeatSolver(self._mesh, t_coef=t_coef_here(t_coef))
+
+    @cached_property
+    def _unsigned(self) -> HeatMethodSolver:
+        return HeatMethodSolver(self._mesh)
+
+    @cached_property
+    def _reader(self) -> CurveReader:
+        return CurveReader(self._mesh)
+
+    def compute_distance(
+        self,
+        curves: Sequence[Sequence[Node]],
+        curve_signs: Sequence[bool] = (),
+        points: Sequence[Node] = (),
+        preserve_source_normals: bool = False,
+        level_set_constraint: str = "ZeroSet",
+        soft_level_set_weight: float = -1,
+    ) -> FloatArray:
+        """Distance (n,) from the nearest curve or point, positive on the left of the curves.
+
+        The other solvers of potpourri3d, and this package's, are negative there.
+
+        Parameters
+        ----------
+        curves : list of lists of nodes
+            A node is ``(vertex, [])``, ``(edge, [t])`` with an edge of `edges`, or ``(face, [a, b, c])``.
+        curve_signs : list of bool
+            Whether each curve gives a sign; those that are not named do.
+        points : list of nodes
+            More sources, without a sign.
+        preserve_source_normals, soft_level_set_weight
+            Not read.
+        level_set_constraint : {"ZeroSet", "None", "Multiple"}
+            The `level` "zero", "none" or "constant" of `SignedHeatSolver.distance`.
+        """
+        signed: list[SurfaceCurve] = []
+        rest: list[SurfaceCurve] = []
+        for i, nodes in enumerate(curves):
+            has_sign = i >= len(curve_signs) or curve_signs[i]
+            (signed if has_sign else rest).append(self._reader.curve(f"curves[{i}]", nodes))
+        others: list[SurfaceCurve | SurfacePoints] = [*rest]
+        if len(points):
+            others.append(self._reader.points("points", points))
+        if signed:
+            # 0 is subtracted from, so that no -0 comes out.
+            return 0.0 - signed_distance(self._signed, signed, level_set_constraint, others)
+        return self._unsigned.distance(others)
+
+
+def t_coef_here(t_coef: float, own: float = _SIGNED_TIME_STEP) -> float | None:
+    """The time step for that of potpourri3d: the default for its default, otherwise in proportion to `own`."""
+    return None if t_coef == 1 else own * t_coef
+
+
+class MeshFastMarchingDistanceSolver:
+    """Distance from points and curves without a linear system: `geodesic_distance`, or `SignedHeatSolver` with a sign.
+
+    Parameters
+    ----------
+    V, F : array_like
+        Positions (n, 3) and triangles (m, 3).
+    """
+
+    def __init__(self, V: ArrayLike, F: ArrayLike) -> None:
+        self._mesh = Mesh(V, F)
+
+    @cached_property
+    def _reader(self) -> CurveReader:
+        return CurveReader(self._mesh)
+
+    @cached_property
+    def _signed(self) -> SignedHeatSolver:
+        return SignedHeatSolver(self._mesh)
+
+    def compute_distance(
+        self,
+        curves: Sequence[Sequence[Node]],
+        distances: Sequence[Sequence[float]] = (),
+        sign: bool = False,
+    ) -> FloatArray:
+        """Distance (n,) from the nodes of all curves; with `sign` from the curves, negative on their left.
+
+        Parameters
+        ----------
+        curves : list of lists of nodes
+            As for `MeshSignedHeatSolver.compute_distance`.
+        distances : list of lists of float
+            The value at which distance begins at each node; 0 at those that are not named.
+        sign : bool
+            Whether curves have a left and a right. Then all `distances` must be 0.
+        """
+        begin = np.zeros(sum(map(len, curves)))
+        first = 0
+        for nodes, given in zip(curves, distances, strict=False):
+            begin[first : first + min(len(given), len(nodes))] = given[: len(nodes)]
+            first += len(nodes)
+        if sign:
+            if begin.any():
+                raise ValueError("with sign=True, distances must be 0: a curve with a sign is where distance is 0")
+            parts = [self._reader.curve(f"curves[{i}]", nodes) for i, nodes in enumerate(curves)]
+            return self._signed.distance(parts)
+        nodes = [node for curve in curves for node in curve]
+        points = self._reader.points("curves", nodes)
+        lowest = float(begin.min())
+        return geodesic_distance(self._mesh, OffsetSources(points, begin - lowest)) + lowest

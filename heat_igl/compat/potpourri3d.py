@@ -6,29 +6,35 @@ meanings are those of potpourri3d 1.4; docs/compat.md lists what differs and wha
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal, get_args
 
+import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.compat.curve_sources import (
-    CurveReader,
-    MeshFastMarchingDistanceSolver,
-    MeshSignedHeatSolver,
-    signed_distance,
-    signed_t_coef,
-)
 from heat_igl.compat.curves import (
+    CurveReader,
     EdgeFlipGeodesicSolver,
     GeodesicTracer,
+    MeshFastMarchingDistanceSolver,
     MeshMarchingTrianglesSolver,
+    MeshSignedHeatSolver,
     marching_triangles,
+    proper,
+    signed_distance,
+    t_coef_here,
 )
-from heat_igl.compat.files import read_mesh, read_point_cloud, read_polygon_mesh, write_mesh, write_point_cloud
-from heat_igl.compat.triangles import cotan_laplacian, edges, face_areas, proper, vertex_areas
 from heat_igl.heat import HeatMethodSolver, SignedHeatSolver, VectorHeatSolver
+from heat_igl.io import complete_file
+from heat_igl.io import read_mesh as _read_mesh
+from heat_igl.io import read_point_cloud as _read_point_cloud
+from heat_igl.io import read_polygon_mesh as _read_polygon_mesh
+from heat_igl.io import write_mesh as _write_mesh
+from heat_igl.io import write_point_cloud as _write_point_cloud
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import connection_laplacian
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -63,11 +69,6 @@ _LogMapStrategy = Literal["VectorHeat", "AffineLocal", "AffineAdaptive"]
 _TIME_STEP = 0.5
 
 
-def _t_coef(t_coef: float) -> float | None:
-    """The time step for that of potpourri3d: the default for its default, otherwise in proportion."""
-    return None if t_coef == 1 else _TIME_STEP * t_coef
-
-
 class MeshHeatMethodDistanceSolver:
     """Distance by the heat method on triangles: `HeatMethodSolver`.
 
@@ -83,7 +84,7 @@ class MeshHeatMethodDistanceSolver:
 
     def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0, use_robust: bool = True) -> None:
         laplacian: Literal["auto", "cotan"] = "auto" if use_robust else "cotan"
-        self._solver = HeatMethodSolver(proper(V, F), t_coef=_t_coef(t_coef), laplacian=laplacian)
+        self._solver = HeatMethodSolver(proper(V, F), t_coef=t_coef_here(t_coef, _TIME_STEP), laplacian=laplacian)
 
     def compute_distance(self, v_ind: int) -> FloatArray:
         """Distance (n,) from a vertex."""
@@ -143,7 +144,7 @@ class MeshVectorHeatSolver(_OnVertices):
     def __init__(self, V: ArrayLike, F: ArrayLike, t_coef: float = 1.0, use_intrinsic_delaunay: bool = True) -> None:
         self._mesh = Mesh(V, F)
         self._intrinsic = use_intrinsic_delaunay
-        self._vectors = VectorHeatSolver(self._mesh, t_coef=_t_coef(t_coef))
+        self._vectors = VectorHeatSolver(self._mesh, t_coef=t_coef_here(t_coef, _TIME_STEP))
 
     def transport_tangent_vector(self, v_ind: int, vector: ArrayLike) -> FloatArray:
         """A tangent vector (2,), transported to all vertices, (n, 2)."""
@@ -182,7 +183,7 @@ class PointCloudHeatSolver(_Framed):
 
     def __init__(self, P: ArrayLike, t_coef: float = 1.0) -> None:
         self._cloud = PointCloud(P)
-        self._given, self._t_coef = t_coef, _t_coef(t_coef)
+        self._given, self._t_coef = t_coef, t_coef_here(t_coef, _TIME_STEP)
 
     @cached_property
     def _solver(self) -> HeatMethodSolver:
@@ -238,7 +239,7 @@ class PointCloudHeatSolver(_Framed):
             As for `MeshSignedHeatSolver.compute_distance`.
         """
         return _from_vertices(
-            PointCloud(self._cloud.P, cloud_normals).triangles, curves, level_set_constraint, signed_t_coef(self._given)
+            PointCloud(self._cloud.P, cloud_normals).triangles, curves, level_set_constraint, t_coef_here(self._given)
         )
 
 
@@ -289,7 +290,7 @@ class PolygonMeshHeatSolver(_OnVertices):
 
     @cached_property
     def _vectors(self) -> VectorHeatSolver:  # type: ignore[override]
-        return VectorHeatSolver(self._mesh, t_coef=_t_coef(self._t_coef))
+        return VectorHeatSolver(self._mesh, t_coef=t_coef_here(self._t_coef, _TIME_STEP))
 
     def compute_distance(self, v_inds: ArrayLike) -> FloatArray:
         """Distance (n,) from the nearest of several vertices."""
@@ -307,4 +308,109 @@ class PolygonMeshHeatSolver(_OnVertices):
         level_set_constraint : {"ZeroSet", "None", "Multiple"}
             As for `MeshSignedHeatSolver.compute_distance`.
         """
-        return _from_vertices(self._mesh.triangles, curves, level_set_constraint, signed_t_coef(self._t_coef))
+        return _from_vertices(self._mesh.triangles, curves, level_set_constraint, t_coef_here(self._t_coef))
+
+
+def cotan_laplacian(V: ArrayLike, F: ArrayLike, denom_eps: float = 0.0) -> sp.csr_matrix:
+    """The cotangent Laplacian (n, n), positive semidefinite as potpourri3d has it; `denom_eps` is added to twice the
+    areas, by which cotangents are divided.
+    """
+    mesh = proper(V, F)
+    half_cotangents = igl.cotmatrix_entries(mesh.V, mesh.F)  # opposite corners 0, 1, 2
+    if denom_eps:
+        double_area = 2 * mesh.measures
+        half_cotangents *= (double_area / (double_area + denom_eps))[:, None]
+    tail, head = np.roll(mesh.F, -1, axis=1).ravel(), np.roll(mesh.F, -2, axis=1).ravel()
+    weights = sp.coo_array((half_cotangents.ravel(), (tail, head)), shape=(mesh.n_vertices, mesh.n_vertices))
+    weights = weights + weights.T
+    return sp.csr_matrix(sp.diags_array(weights.sum(axis=1)) - weights)
+
+
+def face_areas(V: ArrayLike, F: ArrayLike) -> FloatArray:
+    """The area (m,) of each triangle."""
+    return np.asarray(igl.doublearea(np.asarray(V, np.float64), np.asarray(F, np.int64)) / 2)
+
+
+def vertex_areas(V: ArrayLike, F: ArrayLike) -> FloatArray:
+    """A third of the area of the triangles around each vertex, (n,)."""
+    corners: IntArray = np.ravel(np.asarray(F, np.int64))
+    return np.asarray(np.bincount(corners, np.repeat(face_areas(V, F) / 3, 3), minlength=len(np.asarray(V))))
+
+
+def edges(V: ArrayLike, F: ArrayLike) -> IntArray:
+    """The distinct edges (k, 2), each ascending, in lexicographic order."""
+    return np.array(proper(V, F).edges)
+
+
+def read_mesh(filename: str | os.PathLike[str]) -> tuple[FloatArray, IntArray]:
+    """Positions (n, 3) and triangles (m, 3) of a file, see `heat_igl.read_mesh`."""
+    mesh = _read_mesh(filename)
+    return np.array(mesh.V), np.array(mesh.F)
+
+
+def read_polygon_mesh(filename: str | os.PathLike[str]) -> tuple[FloatArray, list[list[int]]]:
+    """Positions (n, 3) and polygons of a file, see `heat_igl.read_polygon_mesh`."""
+    mesh = _read_polygon_mesh(filename)
+    return np.array(mesh.V), [polygon.tolist() for polygon in mesh.polygons]
+
+
+def write_mesh(
+    V: ArrayLike,
+    F: ArrayLike,
+    filename: str | os.PathLike[str],
+    UV_coords: ArrayLike | None = None,
+    UV_type: str | None = None,
+) -> None:
+    """Write triangles to a file, see `heat_igl.write_mesh`; texture coordinates go to OBJ alone.
+
+    Parameters
+    ----------
+    V, F : array_like
+        Positions (n, 3) and triangles (m, 3).
+    filename : path-like
+        The extension selects the format.
+    UV_coords : array_like, optional
+        Texture coordinates: (n, 2), (m, 2) or (3 m, 2).
+    UV_type : {"per-vertex", "per-face", "per-corner"}, optional
+        Which of these they are.
+
+    Raises
+    ------
+    ValueError
+        If there are `UV_coords` and the file is no OBJ, or their shape does not fit `UV_type`.
+    """
+    mesh = Mesh(V, F)
+    if UV_coords is None:
+        _write_mesh(filename, mesh)
+        return
+    path = Path(filename)
+    if path.suffix.lower() != ".obj":
+        raise ValueError(f"UV_coords are written to .obj files, not to {path}")
+    m = mesh.n_faces
+    rows_of_corners: dict[str | None, tuple[int, IntArray]] = {
+        "per-vertex": (mesh.n_vertices, mesh.F),
+        "per-face": (m, np.repeat(np.arange(m)[:, None], 3, axis=1)),
+        "per-corner": (3 * m, np.arange(3 * m).reshape(-1, 3)),
+    }
+    if UV_type not in rows_of_corners:
+        raise ValueError(f"UV_type must be one of {', '.join(map(repr, rows_of_corners))}, not {UV_type!r}")
+    k, rows = rows_of_corners[UV_type]
+    coordinates = np.asarray(UV_coords, np.float64)
+    if coordinates.shape != (k, 2):
+        raise ValueError(f"UV_coords must have shape ({k}, 2), {UV_type}, not {coordinates.shape}")
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.V.tolist()]
+    lines += [f"vt {u!r} {v!r}" for u, v in coordinates.tolist()]
+    for corners in (np.stack([mesh.F, rows], axis=2) + 1).tolist():
+        lines.append("f " + " ".join(f"{vertex}/{row}" for vertex, row in corners))
+    with complete_file(path) as temporary:
+        temporary.write_text("\n".join([*lines, ""]), encoding="utf8")
+
+
+def read_point_cloud(filename: str | os.PathLike[str]) -> FloatArray:
+    """The points (n, 3) of a file, see `heat_igl.read_point_cloud`."""
+    return np.array(_read_point_cloud(filename).P)
+
+
+def write_point_cloud(V: ArrayLike, filename: str | os.PathLike[str]) -> None:
+    """Write points (n, 3) to a file, see `heat_igl.write_point_cloud`."""
+    _write_point_cloud(filename, PointCloud(V))

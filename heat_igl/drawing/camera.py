@@ -13,12 +13,8 @@ __all__ = ["default_rotation", "rotation", "to_pixels"]
 def rotation(azimuth: float, elevation: float) -> FloatArray:
     """Rotation to viewer coordinates, (3, 3): the rows point right, up and towards the viewer.
 
-    The viewer looks at the origin, and the y axis points upwards.
-
-    Parameters
-    ----------
-    azimuth, elevation : float
-        Direction of the viewer in degrees. Azimuth 0 is the z axis, azimuth 90 the x axis; elevation 90 is above.
+    The viewer looks at the origin, and the y axis points upwards. In degrees, azimuth 0 is the z axis, azimuth 90 the x
+    axis; elevation 90 is above.
     """
     a, e = np.radians([azimuth, elevation])
     right = np.array([np.cos(a), 0.0, -np.sin(a)])

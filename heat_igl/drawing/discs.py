@@ -18,22 +18,10 @@ _MANY = 20_000
 
 
 def discs(cloud: PointCloud, values: FloatArray, is_flat: bool = False) -> tuple[Mesh, FloatArray]:
-    """A polygon around each point, split into triangles, and values at its vertices.
+    """A polygon around each of n points, split into triangles, and values at its vertices; the first n are the points.
 
-    Parameters
-    ----------
-    cloud : PointCloud
-        n points.
-    values : (n,) float64
-        Value of each point; ``inf`` for none.
-    is_flat : bool
-        Whether a disc has the value of the point everywhere; else values change linearly, with the gradient at the
-        point.
-
-    Returns
-    -------
-    (Mesh, (N,) float64)
-        The first n vertices are the points, and have the given values.
+    A disc has the value of the point (``inf`` for none) everywhere if `is_flat`; else values change linearly, with the
+    gradient at the point.
     """
     triangles = cloud.triangles
     n, V = cloud.n_vertices, triangles.V

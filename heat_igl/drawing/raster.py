@@ -26,16 +26,8 @@ _SLACK = 1e-9
 class Pixels(NamedTuple):
     """The covered pixels, in arbitrary order.
 
-    Attributes
-    ----------
-    place : (p,) int64
-        Position of the pixel, ``row * width + column``.
-    face : (p,) int64
-        The triangle that is visible at the pixel.
-    weights : (p, 3) float64
-        Barycentric coordinates of the pixel centre in that triangle.
-    depth : (height, width) float64
-        Depth at each pixel, ``-inf`` at uncovered pixels.
+    `place` (p,) is ``row * width + column``, `face` (p,) the triangle that is visible there, and `weights` (p, 3) the
+    barycentric coordinates of the pixel's centre in it. `depth` (height, width) is ``-inf`` at uncovered pixels.
     """
 
     place: IntArray
@@ -47,15 +39,8 @@ class Pixels(NamedTuple):
 def rasterize(points: FloatArray, F: IntArray, width: int, height: int) -> Pixels:
     """Rasterize triangles with hidden surface removal.
 
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Column, row and depth of each vertex. The centre of pixel (r, c) is at row r and column c; a larger depth is
-        nearer to the viewer.
-    F : (m, 3) int64
-        Triangles, in either orientation.
-    width, height : int
-        Size of the image in pixels; triangles are clipped to it.
+    `points` (n, 3) are column, row and depth of each vertex. The centre of pixel (r, c) is at row r and column c; a
+    larger depth is nearer to the viewer. Triangles may have either orientation, and are clipped to the image.
     """
     corners = points[F]
     x, y, z = (corners[:, :, axis] for axis in range(3))
@@ -121,21 +106,10 @@ def visible(points: FloatArray, depth: FloatArray, vertices: IntArray, tolerance
 
 
 def visible_runs(points: FloatArray, depth: FloatArray, tolerance: float) -> list[tuple[bool, FloatArray]]:
-    """Split a polyline into visible and hidden pieces.
+    """Split a polyline, column, row and depth of its vertices (k, 3), into visible and hidden pieces.
 
-    Parameters
-    ----------
-    points : (k, 3) float64
-        Column, row and depth of the vertices of the polyline.
-    depth : (height, width) float64
-        Depth buffer from `rasterize`.
-    tolerance : float
-        A point is hidden if it is behind the surface by more than this number of pixels.
-
-    Returns
-    -------
-    list of (bool, (j, 3) float64)
-        For each piece, whether it is visible, and the vertices. The ends of pieces are accurate to about two pixels.
+    A point is hidden if it is behind the depth buffer by more than `tolerance` pixels. Of each piece: whether it is
+    visible, and the vertices (j, 3). The ends of pieces are accurate to about two pixels.
     """
     if len(points) < 2:
         return []

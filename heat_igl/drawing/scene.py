@@ -108,17 +108,10 @@ def scene(
     up: str = "y",
     is_categorical: bool = False,
 ) -> Scene:
-    """Validate the input of a picture and return the scene; the points of a cloud become discs.
+    """Validate the input of a picture, as `plot` and `plot_field` take it; the points of a cloud become discs.
 
-    The parameters are those of `heat_igl.drawing.plot` and `heat_igl.drawing.plot_field`, and `Scene.is_categorical`.
-
-    Raises
-    ------
-    ValueError
-        If `values` (called `name` in the message) does not have shape (n,), contains NaN or no finite value, or an
-        option is invalid.
-    SourceError
-        If `sources` are invalid.
+    A ValueError if `values` (called `name` in the message) do not have shape (n,), contain NaN or no finite value, or
+    an option is invalid; a SourceError if `sources` are.
     """
     checked = _checked(name, values, mesh.n_vertices)
     vertices, dots, lines = _places(as_simplices(mesh), sources)
@@ -175,12 +168,7 @@ def _places(mesh: Mesh, sources: Sources | None) -> tuple[IntArray, FloatArray, 
 def colours(colormap: str, is_trimmed: bool = True) -> Any:
     """The matplotlib colour map of that name; if trimmed, without dark colours, on which lines would be invisible.
 
-    Raises
-    ------
-    ValueError
-        If matplotlib has no colour map of that name.
-    MissingExtraError
-        If matplotlib is not installed.
+    A ValueError if there is none of that name, and a MissingExtraError without matplotlib.
     """
     with MissingExtraError.guard("a picture", "matplotlib", "view"):
         import matplotlib

@@ -51,21 +51,10 @@ def isoline_coverage(
 ) -> FloatArray:
     """Fraction (p,) of each pixel that is covered by a contour line at a multiple of `step`.
 
+    `values` (p,) are those at the pixel centres, and `per_pixel` (p,) their change per pixel, from `screen_gradient`.
     Lines are `width` pixels wide on the screen, but at most a quarter of the distance between lines; otherwise a
-    surface that is seen at a grazing angle would become black.
-
-    Parameters
-    ----------
-    values : (p,) float64
-        Values of the function at the pixel centres.
-    per_pixel : (p,) float64
-        Change of the function per pixel, from `screen_gradient`.
-    step : float
-        Difference between levels.
-    width : float
-        Width of a line in pixels.
-    at_zero : bool
-        Whether to draw a line at 0. Distances need none, since their sources are marked by dots.
+    surface that is seen at a grazing angle would become black. Distances need no line `at_zero`: their sources have
+    dots.
     """
     level = np.rint(values / step)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -77,16 +66,9 @@ def isoline_coverage(
 
 
 def stripe_coverage(values: FloatArray, per_pixel: FloatArray, step: float) -> FloatArray:
-    """Fraction (p,) of each pixel in the odd stripes [step, 2 step), [3 step, 4 step), ...
+    """Fraction (p,) of each pixel in the odd stripes [step, 2 step), [3 step, 4 step), ..., as for `isoline_coverage`.
 
     The fraction is the mean over the values inside the pixel. Stripes narrower than a pixel blend to an even tone.
-
-    Parameters
-    ----------
-    values, per_pixel : (p,) float64
-        As for `isoline_coverage`.
-    step : float
-        Width of a stripe.
     """
     known = np.isfinite(per_pixel)
     level = values / step

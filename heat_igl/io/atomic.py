@@ -18,12 +18,8 @@ __all__ = ["complete_file", "replacing"]
 def complete_file(path: Path) -> Iterator[Path]:
     """A temporary file in the folder of `path`; it replaces `path` if the block succeeds and is removed otherwise.
 
-    An existing file keeps the permissions. If `path` is a symbolic link, the file that it points to is replaced.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written; an existing file is then unchanged.
+    An existing file keeps the permissions, and is unchanged if the new one cannot be written, which is an OSError. If
+    `path` is a symbolic link, the file that it points to is replaced.
     """
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".{secrets.token_hex(4)}.{target.name[-100:]}")  # with all suffixes
@@ -41,13 +37,7 @@ def complete_file(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Like `complete_file`, for meshes and curves.
-
-    Raises
-    ------
-    MeshError
-        If the file cannot be written.
-    """
+    """Like `complete_file`, for meshes and curves: a file that cannot be written is a MeshError."""
     try:
         with complete_file(path) as temporary:
             yield temporary

@@ -36,13 +36,7 @@ _CHECKSUM_BYTES = 4
 
 
 def zarr_module() -> Any:
-    """The library zarr with its codecs.
-
-    Raises
-    ------
-    MissingExtraError
-        If it is not installed.
-    """
+    """The library zarr with its codecs; a MissingExtraError if it is not installed."""
     with MissingExtraError.guard("a store of distances", "zarr", "cluster"):
         import zarr
         import zarr.codecs
@@ -106,10 +100,7 @@ def damaged_chunk(folder: Path, array: Any, checksums: Sequence[str], rows: slic
 def read_rows(folder: Path, array: Any, checksums: Sequence[str], rows: slice) -> AnyArray:
     """Rows of an array in `folder`.
 
-    Raises
-    ------
-    ValueError
-        If a chunk is missing or damaged, or is that of another place; the message names the file.
+    A ValueError names a chunk that is missing or damaged, or is that of another place.
     """
     problem = damaged_chunk(folder, array, checksums, rows)
     if problem:

@@ -17,17 +17,7 @@ __all__ = ["Cells", "Contents", "check", "integers", "select", "warn_if_cut"]
 
 
 class Cells(NamedTuple):
-    """Polygons or tetrahedra of any number of corners.
-
-    Attributes
-    ----------
-    corners : (sum of degree,) int64
-        Vertex indices from 0, cell after cell.
-    degree : (m,) int64
-        Number of corners of each cell.
-    tetrahedra : bool
-        Whether all cells are tetrahedra; polygons otherwise.
-    """
+    """Polygons or tetrahedra: vertex indices from 0, cell after cell, and the number of corners of each cell (m,)."""
 
     corners: IntArray
     degree: IntArray
@@ -42,13 +32,7 @@ class Contents(NamedTuple):
     attributes: dict[str, AnyArray]
 
     def mesh(self, path: Path) -> Mesh:
-        """The mesh of the file; polygons are cut into triangles.
-
-        Raises
-        ------
-        MeshError
-            If the positions cannot be used.
-        """
+        """The mesh of the file; polygons are cut into triangles. A MeshError if the positions cannot be used."""
         corners, degree, tetrahedra = self.cells
         try:
             if tetrahedra:
@@ -70,24 +54,10 @@ def integers(values: FloatArray, where: Callable[[int], str], what: str = "index
 def check(
     V: FloatArray, cells: Cells, vertex_at: Callable[[int], str], cell_at: Callable[[int], str], base: int
 ) -> None:
-    """Check positions and indices.
+    """Check positions (n, 3) and indices from 0; `base` is the first index in the file format.
 
-    Parameters
-    ----------
-    V : (n, 3) float64
-        Positions.
-    cells : Cells
-        Indices from 0.
-    vertex_at, cell_at : callable
-        Position of a vertex or a cell in the file, for errors.
-    base : int
-        The first index in the file format, 0 or 1, for errors.
-
-    Raises
-    ------
-    MeshError
-        If a position is not finite, an index is out of range, or a cell repeats a vertex. The message names the
-        position of the first offender and the number of offenders.
+    `vertex_at` and `cell_at` say where a vertex or a cell stands in the file. A MeshError names the first place, and
+    how many there are, where a position is not finite, an index is out of range, or a cell repeats a vertex.
     """
     corners, degree = cells.corners, cells.degree
     n = len(V)
@@ -116,19 +86,8 @@ def check(
 def warn_if_cut(path: Path, data: bytes, last: int, n: int) -> None:
     """Warn if the last line of a text file has no end, and may be the beginning of a longer line with another face.
 
-    Parameters
-    ----------
-    path, data
-        The file.
-    last : int
-        The last index, as it stands in the file; 0 if the file has no counts, so that more may be lost than a digit.
-    n : int
-        Number of vertices: with one more digit, `last` may still be an index.
-
-    Warns
-    -----
-    AccuracyWarning
-        With the last line.
+    `last` is the last index in the file: with one more digit it may still be that of one of n vertices. It is 0 if the
+    file has no counts, so that more may be lost than a digit.
     """
     if 10 * last <= n and not data.endswith((b"\n", b"\r")):
         line = data.rsplit(b"\n", 1)[-1].strip()[:60].decode("utf-8", "backslashreplace")
@@ -143,23 +102,11 @@ _CORNERS = {"triangle": 3, "quad": 4, "tetra": 4}
 
 
 def select(path: Path, blocks: list[tuple[str, IntArray]]) -> Cells:
-    """Select the cells of the domain from a file with cells of several kinds.
+    """Select the cells of the domain from blocks of cells, named as in meshio ("triangle", "tetra10", ...).
 
     If there are tetrahedra, they are the domain, since the triangles in such files are the boundary. Otherwise the
-    domain consists of triangles, quadrilaterals and polygons. Points and lines are ignored. Cells of other kinds are
-    an error, since without them the domain would have holes.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the file, for errors.
-    blocks : list of (str, (k, d) int64)
-        Kind, named as in meshio ("triangle", "tetra10", ...), and vertex indices from 0.
-
-    Raises
-    ------
-    MeshError
-        If the file has unsupported cells, or neither polygons nor tetrahedra.
+    domain consists of triangles, quadrilaterals and polygons. Points and lines are ignored. Cells of other kinds are a
+    MeshError, since without them the domain would have holes.
     """
     blocks = [(kind, rows) for kind, rows in blocks if len(rows) and not kind.startswith(("vertex", "line"))]
     for kind, rows in blocks:

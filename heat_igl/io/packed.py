@@ -24,13 +24,7 @@ def form_suffix(path: Path) -> str:
 
 
 def unpacked(path: Path, data: bytes) -> bytes:
-    """The contents of a file, unpacked if its name ends in .gz.
-
-    Raises
-    ------
-    MeshError
-        If the file is damaged or cut short.
-    """
+    """The contents of a file, unpacked if its name ends in .gz; a MeshError if it is damaged or cut short."""
     if not is_packed(path):
         return data
     try:

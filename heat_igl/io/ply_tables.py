@@ -50,20 +50,10 @@ class Column(NamedTuple):
 
 
 class Header(NamedTuple):
-    """The header.
+    """The header of a PLY file.
 
-    Attributes
-    ----------
-    order : {"", "<", ">"}
-        Text, or binary of low or high byte first.
-    elements : list of Element
-        In the order of the file.
-    vectors : dict of str to int
-        Attributes (n, k) that `heat_igl.io.ply.write` spread over k properties: k by name.
-    end : int
-        First byte after the header.
-    n_lines : int
-        Lines of the header.
+    `order` is "" for text, and "<" or ">" for binary of low or high byte first; `vectors` the k of each attribute (n,
+    k) that `heat_igl.io.ply.write` spread over k properties; `end` the first byte after the header of `n_lines` lines.
     """
 
     order: str
@@ -239,10 +229,8 @@ def _check(text: Text, lines: IntArray, bad: AnyArray, message: str) -> None:
 def parse(path: Path, data: bytes, needed: tuple[str, ...]) -> tuple[Header, Tables]:
     """The header, and the columns of each element by the names of the properties.
 
-    Raises
-    ------
-    MeshError
-        If the file is not as the header says, or if an element that is `needed` is empty, missing or occurs twice.
+    A MeshError if the file is not as the header says, or if an element that is `needed` is empty, missing or there
+    twice.
     """
     header = _header(path, data)
     count = {element.name: element.n for element in header.elements}

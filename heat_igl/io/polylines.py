@@ -15,35 +15,17 @@ __all__ = ["Polyline", "read_polylines"]
 
 
 class Polyline(NamedTuple):
-    """A polyline in space.
-
-    Attributes
-    ----------
-    positions : (k, 3) float64
-        Its corners, each once.
-    is_closed : bool
-        Whether a line leads from the last corner back to the first.
-    """
+    """The corners (k, 3) of a polyline in space, each once, and whether a line leads from the last to the first."""
 
     positions: FloatArray
     is_closed: bool
 
 
 def read_polylines(path: str | os.PathLike[str]) -> list[Polyline]:
-    """Read the polylines (records ``l``) of an OBJ file; it is closed if its last index is the first again.
+    """Read the polylines (records ``l``) of an OBJ file; one is closed if its last index is the first again.
 
-    Parameters
-    ----------
-    path : path-like
-        An OBJ file with vertices and lines; all other records are ignored.
-
-    Raises
-    ------
-    MeshError
-        If a vertex is not three numbers, a line has fewer than two vertices or one that is not in the file, or there is
-        no line; the message names the first such record.
-    OSError
-        If the file cannot be read.
+    Other records are ignored. A MeshError names the first vertex that is not three numbers, or line that has fewer than
+    two vertices or one that is not in the file; or says that there is no line.
     """
     source = Path(os.fspath(path))
     positions: list[list[float]] = []

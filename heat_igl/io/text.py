@@ -1,4 +1,4 @@
-"""Tokens and numbers of a text file, for the readers of OFF, OBJ, PLY, STL, MESH and MSH.
+"""Tokens and numbers of a text file, for the readers of OFF, OBJ, PLY and XYZ.
 
 `Text` stores the positions of lines and tokens as arrays, without a Python object per token, and parses the numbers of
 many lines in one call. Files of a million lines take seconds. Errors name the line of the first bad token.
@@ -34,30 +34,9 @@ def format_rows(row: str, values: AnyArray) -> str:
 class Text:
     """The nonblank lines of a text file, split into tokens at white space.
 
-    Parameters
-    ----------
-    path : Path
-        Path of the file, for errors.
-    data : bytes
-        The content of the file.
-    comment : str, optional
-        Start of a comment, which extends to the end of the line.
-    continued : bool, optional
-        Whether a backslash at the end of a line continues the line.
-
-    Attributes
-    ----------
-    path : Path
-        As given.
-    first : (k,) int64
-        Index of the first token of each nonblank line.
-    count : (k,) int64
-        Number of tokens of each nonblank line.
-
-    Raises
-    ------
-    MeshError
-        If the file is empty or not text.
+    `comment` begins a comment, which extends to the end of the line; `continued` says whether a backslash at the end of
+    a line continues it. `first` (k,) is the index of the first token of each nonblank line, and `count` (k,) the number
+    of its tokens. A MeshError if the file is empty or not text.
     """
 
     def __init__(self, path: Path, data: bytes, comment: str = "", continued: bool = False) -> None:
@@ -109,39 +88,20 @@ class Text:
         """A `MeshError` with `message` that names the line."""
         return MeshError(f"{self.where(line)}: {message}")
 
-    def words(self, width: int, lines: IntArray | None = None) -> AnyArray:
-        """The first token of each line (or each of `lines`), cut to `width` bytes, as byte strings."""
-        first = self.first if lines is None else self.first[lines]
-        start, length = self._start[first], self._end[first] - self._start[first]
-        letters = np.zeros((len(first), width), np.uint8)
+    def words(self, width: int) -> AnyArray:
+        """The first token of each line, cut to `width` bytes, as byte strings."""
+        start, length = self._start[self.first], self._end[self.first] - self._start[self.first]
+        letters = np.zeros((len(start), width), np.uint8)
         for i in range(min(width, int(length.max(initial=0)))):
             long = length > i
             letters[long, i] = self._codes[start[long] + i]
         return letters.view(f"S{width}").ravel()
 
     def numbers(self, lines: IntArray, skip: int = 0, up_to_slash: bool = False) -> tuple[FloatArray, IntArray]:
-        """All numbers in the given lines.
+        """All numbers (t,) in ascending lines (r,), and the index (r,) of the first number of each line.
 
-        Parameters
-        ----------
-        lines : (r,) int64
-            Ascending line indices: positions in `first`.
-        skip : int, optional
-            Number of leading tokens to skip in each line.
-        up_to_slash : bool, optional
-            Whether to read ``12/3/4`` as 12.
-
-        Returns
-        -------
-        values : (t,) float64
-            One number for each token.
-        start : (r,) int64
-            Index in `values` of the first number of each line.
-
-        Raises
-        ------
-        MeshError
-            If a token is not a number; the message names the first such token.
+        `skip` leading tokens of each line are left out; `up_to_slash` reads ``12/3/4`` as 12. A MeshError names the
+        first token that is not a number.
         """
         count = np.maximum(self.count[lines] - skip, 0)
         start = np.cumsum(count) - count

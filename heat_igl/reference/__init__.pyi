@@ -3,7 +3,6 @@ from heat_igl.reference.bounds import edge_paths as edge_paths
 from heat_igl.reference.bounds import straight_lines as straight_lines
 from heat_igl.reference.guarded import MEMORY as MEMORY
 from heat_igl.reference.guarded import TIMEOUT as TIMEOUT
-from heat_igl.reference.guarded import close as close
 from heat_igl.reference.measurement import EXACT_SOLVERS as EXACT_SOLVERS
 from heat_igl.reference.measurement import Measured as Measured
 from heat_igl.reference.measurement import measured as measured

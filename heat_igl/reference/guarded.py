@@ -1,8 +1,7 @@
 """Calls in a child process: it may crash, hang or run out of memory without harm to the caller.
 
-One child serves all calls, one after the other, until it fails; the next call starts another. Requests and replies
-are single lines of JSON on the child's standard streams. Arrays cross as ``.npy`` files that the child maps into
-memory: written once by the caller, shared through the page cache, never pickled. `child` is the other side.
+Each call has a Python process of its own, which takes .1 s to start. The request and the reply are JSON in a temporary
+folder, and arrays ``.npy`` files beside them that the child maps into memory: written once, never pickled.
 
 A child started with `multiprocessing` would import the caller's main script again and, on some systems, inherit the
 threads and locks; a plain Python process does neither.
@@ -10,229 +9,114 @@ threads and locks; a plain Python process does neither.
 
 from __future__ import annotations
 
-import atexit
 import contextlib
+import importlib
 import json
-import os
 import signal
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from heat_igl.errors import ReferenceSolverError
-from heat_igl.reference.child import LONGEST_ALARM
+from heat_igl.runtime import PeakMemory
 from heat_igl.typing import AnyArray
 
-__all__ = ["MEMORY", "TIMEOUT", "GuardedProcess", "Reply", "call", "close"]
+__all__ = ["MEMORY", "TIMEOUT", "Reply", "answer", "call"]
 
 #: Seconds that a call may take, and bytes by which it may let the child's address space grow, unless told otherwise.
 TIMEOUT = 600.0
 MEMORY = 8 * 2**30
 
+# The longest time, in seconds, that both the system's alarm and a wait of Python take.
+_LONGEST = 2.0**20
 # More bytes than any address space has, in place of infinity, which JSON does not have.
 _NO_BOUND = 2.0**62
+# Seconds that a child outlives the timeout if the caller was killed.
+_GRACE = 5.0
 
-_START = "import sys; sys.path[:] = sys.argv[1:]; from heat_igl.reference.child import serve; serve()"
+_START = "import sys; sys.path[:] = sys.argv[2:]; from heat_igl.reference.guarded import answer; answer(sys.argv[1])"
 
 
 class Reply(NamedTuple):
-    """The reply of the child to one call.
-
-    Attributes
-    ----------
-    values : dict
-        The values that the function returned: arrays, and values that JSON can carry.
-    peak_memory : int or None
-        Bytes by which the child's resident memory grew at most during the call.
-    """
+    """What the function returned, and the bytes by which the child's resident memory grew at most during the call."""
 
     values: dict[str, Any]
     peak_memory: int | None
 
 
-class GuardedProcess:
-    """A child process that is started at the first `call` and serves until it fails or is closed.
-
-    Several threads may use it; they wait for each other. After a fork, each process has a child of its own.
+def call(
+    function: str,
+    arrays: Mapping[str, AnyArray],
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    timeout: float = TIMEOUT,
+    memory: float = MEMORY,
+) -> Reply:
+    """Call a function in a child process, and wait until it returns.
 
     Parameters
     ----------
-    growth : float
-        Bytes of resident memory beyond those after the first call with which a child is replaced: MeshLab's filters
-        leak some 30 to 600 bytes per vertex and call.
+    function : str
+        ``"module:name"``, imported in the child. It is called with all arrays (read-only) and parameters as keyword
+        arguments, and returns a mapping of names to arrays or values that JSON can carry.
+    arrays : mapping of str to array
+        Passed through files.
+    parameters : mapping of str, optional
+        Values that JSON can carry.
+    timeout : float
+        Seconds after which the child is killed.
+    memory : float
+        Bytes by which the child's address space may grow during the call. Held on Linux; other systems have no bound
+        that a process can set for itself.
+
+    Raises
+    ------
+    ReferenceSolverError
+        If the function raised, if the child died, or if the time is over.
     """
-
-    def __init__(self, growth: float = 2**28) -> None:
-        self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
-        self._messages: IO[bytes] | None = None
-        self._growth = growth
-        self._resident_at_first: int | None = None
-
-    @property
-    def pid(self) -> int | None:
-        """Process id of the child, None while there is none."""
-        return None if self._process is None else self._process.pid
-
-    def call(
-        self,
-        function: str,
-        arrays: Mapping[str, AnyArray],
-        parameters: Mapping[str, Any] | None = None,
-        *,
-        timeout: float = TIMEOUT,
-        memory: float = MEMORY,
-    ) -> Reply:
-        """Call a function in the child, and wait until it returns.
-
-        Parameters
-        ----------
-        function : str
-            ``"module:name"``, imported in the child. It is called with all arrays (read-only) and parameters as
-            keyword arguments, and returns a mapping of names to arrays or values that JSON can carry.
-        arrays : mapping of str to array
-            Passed through files; none is pickled.
-        parameters : mapping of str, optional
-            Values that JSON can carry.
-        timeout : float
-            Seconds after which the child is killed.
-        memory : float
-            Bytes by which the child's address space may grow during the call. Held on Linux; other systems have no
-            bound that a process can set for itself.
-
-        Returns
-        -------
-        Reply
-
-        Raises
-        ------
-        ReferenceSolverError
-            If the function raised, if the child died, or if the time is over. Later calls are not affected.
-        """
-        with self._lock, tempfile.TemporaryDirectory(prefix="heat_igl_") as folder:
-            for name, array in arrays.items():
-                np.save(Path(folder, f"{name}.npy"), array, allow_pickle=False)
-            request = {
-                "function": function,
-                "folder": folder,
-                "arrays": list(arrays),
-                "parameters": dict(parameters or {}),
-                "memory": int(min(memory, _NO_BOUND)),
-                "timeout": timeout,
-            }
-            try:
-                reply = self._exchange(request, timeout)
-            except BaseException:
-                # Interrupted or failed half-way: the next reply would belong to this request.
-                self._stop()
-                raise
-            self._replace_if_grown(reply.pop("resident"))
-            if "error" in reply:
-                raise ReferenceSolverError(_explained(function, reply["error"], memory))
-            values = reply["values"]
-            values.update((name, np.load(Path(folder, f"result_{name}.npy"))) for name in reply["arrays"])
-            return Reply(values, reply["peak_memory"])
-
-    def close(self) -> None:
-        """End the child, if there is one. It ends by itself when Python does; the next call starts a new one."""
-        with self._lock:
-            self._stop()
-
-    def _exchange(self, request: dict[str, Any], timeout: float) -> Any:
-        process = self._running()
-        stdin, stdout = process.stdin, process.stdout
-        late = threading.Event()
-
-        def stop() -> None:
-            late.set()
-            process.kill()
-
-        timer = threading.Timer(min(timeout, LONGEST_ALARM), stop)
-        timer.daemon = True
-        timer.start()
+    with tempfile.TemporaryDirectory(prefix="heat_igl_") as name:
+        folder = Path(name)
+        for key, array in arrays.items():
+            np.save(folder / f"{key}.npy", array, allow_pickle=False)
+        bounds = {"memory": int(min(memory, _NO_BOUND)), "timeout": min(timeout, _LONGEST)}
+        request = {"function": function, "arrays": list(arrays), "parameters": dict(parameters or {}), **bounds}
+        (folder / "request.json").write_text(json.dumps(request))
         try:
-            if stdin is None or stdout is None:
-                raise ReferenceSolverError("the child process has no standard streams: report this as a bug")
-            with contextlib.suppress(BrokenPipeError):
-                stdin.write(json.dumps(request).encode() + b"\n")
-                stdin.flush()
-            line = stdout.readline()
-        finally:
-            timer.cancel()
-        if line.endswith(b"\n"):
-            return json.loads(line)
-        status, said = process.wait(), self._said()
-        if late.is_set():
-            raise ReferenceSolverError(
-                f"{request['function']} was stopped after {timeout:g} s: raise timeout, or use a smaller mesh"
+            done = subprocess.run(
+                [sys.executable, "-c", _START, name, *sys.path],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                timeout=bounds["timeout"],
+                check=False,
             )
-        raise ReferenceSolverError(
-            f"{request['function']} died with {_status_name(status)}{said}: look for defects with mesh.report(), "
-            f"or raise memory (now {request['memory'] / 2**30:.3g} GiB)"
-        )
-
-    def _running(self) -> subprocess.Popen[bytes]:
-        if self._process is not None and self._process.poll() is not None:
-            self._stop()
-        if self._process is None:
-            self._messages = tempfile.TemporaryFile(prefix="heat_igl_")  # noqa: SIM115 (closed with the child)
-            try:
-                self._process = subprocess.Popen(
-                    [sys.executable, "-c", _START, *sys.path],
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=self._messages,
-                )
-            except OSError as error:
-                raise ReferenceSolverError(
-                    f"no child process could be started with sys.executable = {sys.executable!r} ({error}): set it to "
-                    "a Python interpreter"
-                ) from error
-        elif self._messages is not None:
-            self._messages.seek(0)
-            self._messages.truncate()
-        return self._process
-
-    def _replace_if_grown(self, resident: int | None) -> None:
-        if self._resident_at_first is None:
-            self._resident_at_first = resident
-        elif resident is not None and resident > self._resident_at_first + self._growth:
-            self._stop()
-
-    def _said(self) -> str:
-        """The last line that the child wrote before it died, for the error message."""
-        if self._messages is None:
-            return ""
-        self._messages.seek(0)
-        lines = self._messages.read().decode(errors="replace").strip().splitlines()
-        return f" ({lines[-1].strip()[:200]})" if lines else ""
-
-    def _stop(self) -> None:
-        process, self._process = self._process, None
-        messages, self._messages = self._messages, None
-        self._resident_at_first = None
-        if process is not None:
-            process.kill()
-            process.wait()
-            for stream in (process.stdin, process.stdout):
-                if stream is not None:
-                    with contextlib.suppress(OSError):
-                        stream.close()
-        if messages is not None:
-            messages.close()
-
-    def _after_fork(self) -> None:
-        """Replace the lock in a forked process: a thread of the parent, which does not exist here, may have held it.
-
-        The child belongs to the other process; `_running` finds that it cannot be waited for, and starts another.
-        """
-        self._lock = threading.Lock()
+        except subprocess.TimeoutExpired:
+            raise ReferenceSolverError(
+                f"{function} was stopped after {timeout:g} s: raise timeout, or use a smaller mesh"
+            ) from None
+        except OSError as error:
+            raise ReferenceSolverError(
+                f"no child process could be started with sys.executable = {sys.executable!r} ({error}): set it to "
+                "a Python interpreter"
+            ) from error
+        answered = folder / "reply.json"
+        if done.returncode or not answered.exists():
+            lines = done.stdout.decode(errors="replace").strip().splitlines()
+            said = f" ({lines[-1].strip()[:200]})" if lines else ""
+            raise ReferenceSolverError(
+                f"{function} died with {_status_name(done.returncode)}{said}: look for defects with mesh.report(), "
+                f"or raise memory (now {memory / 2**30:.3g} GiB)"
+            )
+        reply = json.loads(answered.read_text())
+        if "error" in reply:
+            raise ReferenceSolverError(_explained(function, reply["error"], memory))
+        found = {key: np.load(folder / f"result_{key}.npy") for key in reply["arrays"]}
+        return Reply({**reply["values"], **found}, reply["peak_memory"])
 
 
 def _status_name(status: int) -> str:
@@ -250,9 +134,39 @@ def _explained(function: str, error: Mapping[str, str], memory: float) -> str:
     return f"{function} failed with {error['kind']}: {error['text']}"
 
 
-_shared = GuardedProcess()
-call = _shared.call
-close = _shared.close
-atexit.register(close)
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_shared._after_fork)
+def answer(name: str) -> None:
+    """In the child: call the function of the request in a folder, and write the reply, or the error, beside it."""
+    folder = Path(name)
+    request = json.loads((folder / "request.json").read_text())
+    if hasattr(signal, "alarm"):
+        # If the caller was killed. A thread could not end the child, since a native function may hold the interpreter.
+        signal.alarm(int(min(request["timeout"] + _GRACE, _LONGEST)))
+    module, function = request["function"].split(":")
+    _bound_memory(request["memory"])
+    try:
+        arrays = {key: np.load(folder / f"{key}.npy", mmap_mode="r").view(np.ndarray) for key in request["arrays"]}
+        called = getattr(importlib.import_module(module), function)
+        with PeakMemory() as peak:
+            result = called(**arrays, **request["parameters"])
+        values = dict(result) if isinstance(result, Mapping) else {}
+        saved = [key for key, value in values.items() if isinstance(value, np.ndarray)]
+        for key in saved:
+            np.save(folder / f"result_{key}.npy", values.pop(key), allow_pickle=False)
+        reply: dict[str, Any] = {"values": values, "arrays": saved, "peak_memory": peak.bytes}
+    except Exception as error:  # whatever a native library raises belongs to the caller
+        reply = {"error": {"kind": type(error).__name__, "text": " ".join(str(error).split())[:500]}}
+    (folder / "reply.json").write_text(json.dumps(reply))
+
+
+def _bound_memory(extra: int) -> None:
+    """Let the address space of this process grow by at most `extra` bytes from now on."""
+    try:
+        resource = importlib.import_module("resource")
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+    except (ImportError, OSError):
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    bound = pages * resource.getpagesize() + extra
+    if hard != resource.RLIM_INFINITY:
+        bound = min(bound, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (bound, hard))

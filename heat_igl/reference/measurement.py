@@ -194,14 +194,9 @@ def _over_components(mesh: Mesh, seeds: IntArray, run: Callable[[Mesh, IntArray]
 
 
 def _require_manifold(mesh: Mesh, seeds: IntArray) -> None:
-    """Refuse defects by which the exact solvers crash or return too long a distance.
+    """Refuse defects by which the exact solvers crash or return too long a distance, in the components of the seeds.
 
-    Only the components of the seeds must be free of them.
-
-    Raises
-    ------
-    ReferenceSolverError
-        If an edge has more than two triangles or no length, or two surfaces touch in a vertex.
+    They are edges of more than two triangles or of length 0, and vertices in which two surfaces touch.
     """
     around = np.isin(mesh.components, mesh.components[seeds])
     faces = mesh.F[around[mesh.F[:, 0]]]
@@ -230,13 +225,7 @@ def _require_manifold(mesh: Mesh, seeds: IntArray) -> None:
 
 
 def _require_finite(name: str, mesh: Mesh, distance: FloatArray) -> None:
-    """Refuse a distance that has the wrong shape, or is not finite on a connected mesh.
-
-    Raises
-    ------
-    ReferenceSolverError
-        With the name of the solver.
-    """
+    """Refuse a distance that has the wrong shape, or is not finite on a connected mesh."""
     if distance.shape != (mesh.n_vertices,):
         raise ReferenceSolverError(
             f"{name} returned an array of shape {distance.shape} for {mesh.n_vertices} vertices: report this as a bug"
@@ -255,11 +244,6 @@ def _require_between_bounds(
     """Refuse a distance that claims to be exact and is outside the bounds that hold on every mesh.
 
     By more than the fraction `tolerance` of the bound and the length `slack`.
-
-    Raises
-    ------
-    ReferenceSolverError
-        With the name of the solver.
     """
     too_short = distance < straight_lines(mesh, seeds) * (1 - tolerance) - slack
     too_long = distance > edge_paths(mesh, seeds) * (1 + tolerance) + slack

@@ -9,7 +9,6 @@ from heat_igl.runtime.heat_range import SOURCE_HEAT as SOURCE_HEAT
 from heat_igl.runtime.memory import PeakMemory as PeakMemory
 from heat_igl.runtime.memory import available_memory as available_memory
 from heat_igl.runtime.memory import release_free_memory as release_free_memory
-from heat_igl.runtime.memory import resident_memory as resident_memory
 from heat_igl.runtime.progress import TimeLeft as TimeLeft
 from heat_igl.runtime.progress import progress_bar as progress_bar
 from heat_igl.runtime.progress import rich_progress as rich_progress

@@ -99,23 +99,10 @@ def without(n: int, cut: Callable[[FloatArray], BoolArray]) -> Mesh:
 
 
 def by_fermat(V: FloatArray, source: int, left: float, right: float) -> FloatArray:
-    """Least time in the unit square with speed `left` at x < 1/2 and `right` beyond.
+    """Least time (n,) from a point in the unit square with speed `left` at x < 1/2 and `right` beyond.
 
     The path crosses the border at the best of 8001 places (Snell's law), or runs along the faster side of it (the head
     wave); relative error below 1e-6.
-
-    Parameters
-    ----------
-    V : (n, 3) float64
-        Points of the square.
-    source : int
-        The point where time begins.
-    left, right : float
-        Speeds.
-
-    Returns
-    -------
-    (n,) float64
     """
     start, x, y = V[source], V[:, 0] - 0.5, V[:, 1]
     here, there = (left, right) if start[0] < 0.5 else (right, left)

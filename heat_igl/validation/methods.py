@@ -51,10 +51,7 @@ METHODS = (*_OWN, *_NATIVE)
 def resolved(method: Method) -> tuple[str, Prepare | None]:
     """Name of a method, and the function that makes its solver; None for native references.
 
-    Raises
-    ------
-    ValueError
-        If the name is unknown, or if a pair has a name from `METHODS`.
+    A ValueError if the name is unknown, or if a pair has a name from `METHODS`.
     """
     if not isinstance(method, str):
         if not (isinstance(method, tuple) and len(method) == 2 and isinstance(method[0], str) and callable(method[1])):

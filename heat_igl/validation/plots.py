@@ -30,25 +30,8 @@ _COLUMNS, _LARGEST_ROWS = 560, 450  # of the picture of the surface
 def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[str, FloatArray]) -> Figure:
     """A figure with two panels for each method: its error on the surface, and below that against distance.
 
-    Parameters
-    ----------
-    title : str
-        Title of the figure.
-    mesh : Mesh
-        Triangles, or tetrahedra whose boundary is drawn; seen as `heat_igl.plots.plot` shows it, with y upwards.
-    truth : (n,) float64
-        Distance to compare with.
-    distances : mapping of str to (n,) float64
-        Distances of at least one method, by name.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
+    `truth` (n,) is what each of the `distances` (n,) is compared with. The surface is seen as `heat_igl.plots.plot`
+    shows it. A MissingExtraError without matplotlib.
     """
     try:
         from matplotlib.cm import ScalarMappable

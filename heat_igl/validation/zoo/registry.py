@@ -21,16 +21,9 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape of the zoo.
+    """A shape of the zoo: `make` returns the `Mesh`, the same bits at every call.
 
-    Attributes
-    ----------
-    name, family : str
-        Its name, and the kind of shapes that it belongs to.
-    make : callable
-        Returns the `Mesh`; the same bits at every call.
-    held_out : bool
-        Whether it is one of those that no default may be tuned on.
+    No default may be tuned on those that are `held_out`.
     """
 
     name: str
