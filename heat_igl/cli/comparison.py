@@ -88,15 +88,12 @@ def _print(report: ValidationReport) -> None:
         print(report.to_markdown(), end="")
         return
     table = Table(box=None, pad_edge=False, header_style="bold")
+    columns = "mean %", "max %", "precompute s", "solve ms", "memory MB"
     table.add_column("method")
-    for head in ("mean %", "max %", "once s", "ms", "MB"):
-        table.add_column(head, justify="right")
+    for column in columns:
+        table.add_column(column, justify="right")
     for row in report.rows:
-        errors = (None, None) if row.errors is None else (100 * row.errors.mean, 100 * row.errors.maximum)
-        costs = row.precompute_seconds, row.solve_seconds and 1e3 * row.solve_seconds
-        cells = (*errors, *costs, row.peak_memory and row.peak_memory / 1e6)
-        shown = ["failed"] if row.failure else ["-" if cell is None else f"{cell:.3g}" for cell in cells]
-        table.add_row(row.method, *shown)
+        table.add_row(*row.cells(columns))
     console.print(heading.replace("**", ""))
     console.print(table)
     if remarks.startswith("- "):

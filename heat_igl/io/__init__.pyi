@@ -1,7 +1,9 @@
 from heat_igl.io.atomic import complete_file as complete_file
 from heat_igl.io.by_nibabel import MAP_SUFFIXES as MAP_SUFFIXES
 from heat_igl.io.curves import CURVE_SUFFIXES as CURVE_SUFFIXES
+from heat_igl.io.curves import Polyline as Polyline
 from heat_igl.io.curves import is_flat as is_flat
+from heat_igl.io.curves import read_polylines as read_polylines
 from heat_igl.io.curves import write_curves as write_curves
 from heat_igl.io.curves import write_svg as write_svg
 from heat_igl.io.files import MESH_SUFFIXES as MESH_SUFFIXES
@@ -15,5 +17,3 @@ from heat_igl.io.point_clouds import is_mesh_or_cloud_path as is_mesh_or_cloud_p
 from heat_igl.io.point_clouds import read_mesh_or_cloud as read_mesh_or_cloud
 from heat_igl.io.point_clouds import read_point_cloud as read_point_cloud
 from heat_igl.io.point_clouds import write_point_cloud as write_point_cloud
-from heat_igl.io.polylines import Polyline as Polyline
-from heat_igl.io.polylines import read_polylines as read_polylines

@@ -1,20 +1,21 @@
-"""Writing curves on a surface to files: lines of OBJ, PLY and VTP, CSV, SVG and DXF."""
+"""Files of curves: written as lines of OBJ, PLY and VTP, CSV, SVG and DXF, and read from OBJ."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MissingExtraError, real_numbers, shown
+from heat_igl.errors import MeshError, MissingExtraError, real_numbers, shown
 from heat_igl.io.atomic import replacing
 from heat_igl.io.text import format_rows
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, as_simplices, flat_curves
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = ["CURVE_SUFFIXES", "is_flat", "write_curves", "write_svg"]
+__all__ = ["CURVE_SUFFIXES", "Polyline", "is_flat", "read_polylines", "write_curves", "write_svg"]
 
 # A mesh is flat if all vertices are at most this far from a plane, as a fraction of the extent.
 _FLAT = 1e-9
@@ -106,18 +107,27 @@ def _checked_projection(projection: ArrayLike) -> FloatArray:
 
 def _plane(mesh: Mesh, path: Path) -> FloatArray:
     """Directions of x and y in the plane of a flat mesh, (2, 3)."""
-    used = mesh.V[mesh.referenced]
-    extent = float(np.linalg.norm(np.ptp(used, axis=0)))
-    if np.ptp(used[:, 2]) <= _FLAT * extent:
-        return np.eye(2, 3)
-    axes = np.linalg.svd(used - used.mean(axis=0), full_matrices=False)[2]
-    off = float(np.abs((used - used.mean(axis=0)) @ axes[2]).max())
+    axes, off, extent = _flatness(mesh)
     if off > _FLAT * extent:
         raise ValueError(
             f"{path}: a drawing needs a flat mesh, and this one reaches {off:.3g} off its plane: pass a projection, or "
             "write .obj or .dxf"
         )
-    return np.asarray(axes[:2])
+    return np.eye(2, 3) if np.ptp(mesh.V[mesh.referenced, 2]) <= _FLAT * extent else axes[:2]
+
+
+def _flatness(mesh: Mesh) -> tuple[FloatArray, float, float]:
+    """The principal axes (3, 3) of the vertices, how far one is off the plane of the first two, and their extent."""
+    used = mesh.V[mesh.referenced]
+    centred = used - used.mean(axis=0)
+    axes = np.linalg.svd(centred, full_matrices=False)[2]
+    return axes, float(np.abs(centred @ axes[2]).max()), float(np.linalg.norm(np.ptp(used, axis=0)))
+
+
+def is_flat(mesh: Mesh) -> bool:
+    """Whether all vertices that faces use lie in one plane."""
+    _, off, extent = _flatness(mesh)
+    return off <= _FLAT * extent
 
 
 def _numbered(lines: _Lines) -> Iterator[tuple[str, FloatArray, IntArray]]:
@@ -181,13 +191,6 @@ def _write_vtp(path: Path, lines: _Lines) -> None:
     )
 
 
-def is_flat(mesh: Mesh) -> bool:
-    """Whether all vertices that faces use lie in one plane."""
-    used = mesh.V[mesh.referenced]
-    smallest = np.linalg.svd(used - used.mean(axis=0), compute_uv=False)[2]
-    return bool(smallest <= _FLAT * np.linalg.norm(np.ptp(used, axis=0)))
-
-
 def write_svg(path: Path, lines: _Lines, dotted: str | None = None) -> None:
     """Write lines in the plane, (k, 2) each and whether it is closed, in groups by name; one group may be dotted."""
     from xml.sax.saxutils import quoteattr  # imported here, since it loads a web client
@@ -237,3 +240,46 @@ _FORMATS: dict[str, Callable[[Path, _Lines], None]] = {
     ".dxf": _write_dxf,
 }
 CURVE_SUFFIXES = tuple(_FORMATS)
+
+
+class Polyline(NamedTuple):
+    """The corners (k, 3) of a polyline in space, each once, and whether a line leads from the last to the first."""
+
+    positions: FloatArray
+    is_closed: bool
+
+
+def read_polylines(path: str | os.PathLike[str]) -> list[Polyline]:
+    """Read the polylines (records ``l``) of an OBJ file; one is closed if its last index is the first again.
+
+    Other records are ignored. A MeshError names the first vertex that is not three numbers, or line that has fewer than
+    two vertices or one that is not in the file; or says that there is no line.
+    """
+    source = Path(os.fspath(path))
+    positions: list[list[float]] = []
+    lines: list[tuple[int, list[int]]] = []
+    for number, record in enumerate(source.read_text(encoding="utf8", errors="replace").splitlines(), 1):
+        words = record.split("#")[0].split()
+        try:
+            if words[:1] == ["v"]:
+                x, y, z = (float(word) for word in words[1:4])
+                positions.append([x, y, z])
+            elif words[:1] == ["l"]:
+                lines.append((number, [int(word.split("/")[0]) for word in words[1:]]))
+        except ValueError:
+            raise MeshError(f"{source}, line {number}: {' '.join(words)[:60]!r} is no vertex or line of OBJ") from None
+    if not lines:
+        raise MeshError(f"{source} holds no curve: a record that starts with l is expected, as write_curves writes it")
+    found = []
+    for number, indices in lines:
+        wrong = [index for index in indices if not 1 <= index <= len(positions)]
+        if wrong:
+            raise MeshError(
+                f"{source}, line {number}: vertex {wrong[0]} is not one of the {len(positions)} in the file"
+            )
+        closed = len(indices) > 2 and indices[0] == indices[-1]
+        kept = indices[:-1] if closed else indices
+        if len(kept) < 2:
+            raise MeshError(f"{source}, line {number}: a curve needs two vertices or more")
+        found.append(Polyline(np.array(positions)[np.array(kept) - 1], closed))
+    return found

@@ -39,6 +39,7 @@ _BRIGHTEST = 255
 _NOT_OF_LENGTH_1 = 0.01
 
 _Points = tuple[FloatArray, FloatArray | None]
+_Attributes = Mapping[str, FloatArray]
 
 
 def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
@@ -82,7 +83,7 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
     [1.0, 1.0, 0.0]
     """
     path = checked_path(path, POINT_CLOUD_SUFFIXES, POINT_CLOUD_SUFFIXES)
-    P, normals = _FORMATS[form_suffix(path)](path, file_bytes(path))
+    P, normals = _FORMATS[form_suffix(path)][0](path, file_bytes(path))
     try:
         return PointCloud(P, None if normals is None else usable_normals(normals, f"{path}: "))
     except MeshError as error:
@@ -138,7 +139,7 @@ def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud, /, **attr
     >>> bool((heat_igl.read_point_cloud("points.ply").P == cloud.P).all())
     True
     """
-    path = checked_path(path, tuple(_WRITERS), tuple(_WRITERS))
+    path = checked_path(path, POINT_CLOUD_SUFFIXES, POINT_CLOUD_SUFFIXES)
     suffix = form_suffix(path)
     if attributes and suffix != ".ply":
         raise MeshError(f"{path}: this format holds no attributes of points ({', '.join(attributes)}); .ply does")
@@ -146,10 +147,7 @@ def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud, /, **attr
         raise MeshError(f"cloud must be a PointCloud, not {shown(cloud)}: write_mesh writes meshes")
     arrays = checked_attributes(attributes, cloud.n_vertices)
     with replacing(path) as temporary:
-        if suffix == ".ply":
-            _to_ply(temporary, cloud, arrays)
-        else:
-            _WRITERS[suffix](temporary, cloud)
+        _FORMATS[suffix][1](temporary, cloud, arrays)
         pack(path, temporary)
 
 
@@ -219,36 +217,26 @@ def _normals_or_colours(columns: AnyArray) -> AnyArray | None:
     return None if may_be_colours and (np.abs(length - 1) > _NOT_OF_LENGTH_1).any() else columns
 
 
-_FORMATS: dict[str, Callable[[Path, bytes], _Points]] = {
-    ".ply": _from_ply,
-    ".obj": _from_obj,
-    ".xyz": _from_xyz,
-    ".npy": _from_npy,
-}
-
-POINT_CLOUD_SUFFIXES = tuple(_FORMATS)
-
-
-def _to_ply(path: Path, cloud: PointCloud, attributes: Mapping[str, FloatArray] | None = None) -> None:
+def _to_ply(path: Path, cloud: PointCloud, attributes: _Attributes) -> None:
     columns = dict(zip(("x", "y", "z", "nx", "ny", "nz"), _rows(cloud).T, strict=False))
-    for name, values in (attributes or {}).items():
+    for name, values in attributes.items():
         if name in columns or values.ndim != 1:
             raise MeshError(f"{path}: {name} must be another name than those of coordinates, and have shape (n,)")
         columns[name] = values
     ply.write_vertices(path, columns)
 
 
-def _to_obj(path: Path, cloud: PointCloud) -> None:
+def _to_obj(path: Path, cloud: PointCloud, _: _Attributes) -> None:
     normals = "" if cloud.normals is None else format_rows("vn %r %r %r\n", cloud.normals)
     path.write_text(format_rows("v %r %r %r\n", cloud.P) + normals)
 
 
-def _to_xyz(path: Path, cloud: PointCloud) -> None:
+def _to_xyz(path: Path, cloud: PointCloud, _: _Attributes) -> None:
     rows = _rows(cloud)
     path.write_text(format_rows(" ".join(["%r"] * rows.shape[1]) + "\n", rows))
 
 
-def _to_npy(path: Path, cloud: PointCloud) -> None:
+def _to_npy(path: Path, cloud: PointCloud, _: _Attributes) -> None:
     with path.open("wb") as file:
         np.save(file, _rows(cloud))
 
@@ -258,9 +246,12 @@ def _rows(cloud: PointCloud) -> FloatArray:
     return cloud.P if cloud.normals is None else np.hstack([cloud.P, cloud.normals])
 
 
-_WRITERS: dict[str, Callable[[Path, PointCloud], None]] = {
-    ".ply": _to_ply,
-    ".obj": _to_obj,
-    ".xyz": _to_xyz,
-    ".npy": _to_npy,
+# How each format is read and written.
+_FORMATS: dict[str, tuple[Callable[[Path, bytes], _Points], Callable[[Path, PointCloud, _Attributes], None]]] = {
+    ".ply": (_from_ply, _to_ply),
+    ".obj": (_from_obj, _to_obj),
+    ".xyz": (_from_xyz, _to_xyz),
+    ".npy": (_from_npy, _to_npy),
 }
+
+POINT_CLOUD_SUFFIXES = tuple(_FORMATS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["ValidationReport", "ValidationRow", "plain"]
+
+
+# The columns of a table: a field of the row, or of one of its records, and the factor to the unit of the column.
+_COLUMNS = {
+    "mean %": ("errors.mean", 1e2),
+    "median %": ("errors.median", 1e2),
+    "95 % %": ("errors.percentile_95", 1e2),
+    "max %": ("errors.maximum", 1e2),
+    "L1 %": ("errors.l1", 1e2),
+    "L2 %": ("errors.l2", 1e2),
+    "L-inf %": ("errors.l_infinity", 1e2),
+    "near field %": ("errors.near_field", 1e2),
+    "eikonal": ("eikonal", 1),
+    "below line": ("bounds.n_below", 1),
+    "above edges": ("bounds.n_above", 1),
+    "precompute s": ("precompute_seconds", 1),
+    "solve ms": ("solve_seconds", 1e3),
+    "memory MB": ("peak_memory", 1e-6),
+}
 
 
 @dataclass(frozen=True)
@@ -75,24 +94,24 @@ class ValidationRow:
         """The row as values that JSON can carry; an infinite error becomes the string ``"inf"``."""
         return {name: plain(value) for name, value in asdict(self).items()}
 
-
-_COLUMNS = (
-    "method",
-    "mean %",
-    "median %",
-    "95 % %",
-    "max %",
-    "L1 %",
-    "L2 %",
-    "L-inf %",
-    "near field %",
-    "eikonal",
-    "below line",
-    "above edges",
-    "precompute s",
-    "solve ms",
-    "memory MB",
-)
+    def cells(self, columns: Iterable[str] = tuple(_COLUMNS)) -> list[str]:
+        """The cells of a table below some of the columns of `ValidationReport.to_markdown`, the method first."""
+        if self.failure is not None:
+            return [self.method, "failed"] + ["-"] * (len(list(columns)) - 1)
+        found = []
+        for column in columns:
+            path, factor = _COLUMNS[column]
+            value: Any = self
+            for name in path.split("."):
+                value = None if value is None else getattr(value, name)
+            found.append(
+                "-"
+                if value is None
+                else f"{value:d}"
+                if factor == 1 and isinstance(value, int)
+                else f"{factor * value:.3g}"
+            )
+        return [self.method, *found]
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,10 +192,10 @@ class ValidationReport:
             f"**{self.name}**: {self.mesh.n_vertices} vertices, {self.mesh.n_faces} faces, "
             f"{len(self.source_sets)} {'set' if len(self.source_sets) == 1 else 'sets'} of sources, {against}",
             "",
-            "| " + " | ".join(_COLUMNS) + " |",
-            "|---" + "|---:" * (len(_COLUMNS) - 1) + "|",
+            "| " + " | ".join(("method", *_COLUMNS)) + " |",
+            "|---" + "|---:" * len(_COLUMNS) + "|",
         ]
-        lines += ["| " + " | ".join(_cells(row)) + " |" for row in self.rows]
+        lines += ["| " + " | ".join(row.cells()) + " |" for row in self.rows]
         said = [] if self.failure is None else [(f"reference {self.reference}", self.failure)]
         said += [(row.method, text) for row in self.rows for text in (row.failure, *row.notes) if text]
         remarks = ["", *(f"- {method}: {text}" for method, text in said)] if said else []
@@ -208,30 +227,6 @@ class ValidationReport:
         title = f"{self.name}: relative error against {self.reference}"
         distances = {method: rows[case] for method, rows in self.distances.items()}
         return error_figure(title, self.mesh, self.truths[case], distances)
-
-
-def _cells(row: ValidationRow) -> list[str]:
-    if row.failure is not None:
-        return [row.method, "failed"] + ["-"] * (len(_COLUMNS) - 2)
-    errors, bounds = row.errors, row.bounds
-    percent: list[float | None] = [None] * 8
-    if errors is not None:
-        fractions = (errors.mean, errors.median, errors.percentile_95, errors.maximum)
-        percent = [100 * e for e in (*fractions, errors.l1, errors.l2, errors.l_infinity, errors.near_field)]
-    return [
-        row.method,
-        *(_number(value) for value in percent),
-        _number(row.eikonal),
-        "-" if bounds is None else str(bounds.n_below),
-        "-" if bounds is None else str(bounds.n_above),
-        _number(row.precompute_seconds),
-        _number(None if row.solve_seconds is None else 1e3 * row.solve_seconds),
-        _number(None if row.peak_memory is None else row.peak_memory / 1e6),
-    ]
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
 
 
 def plain(value: Any) -> Any:
