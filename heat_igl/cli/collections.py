@@ -14,16 +14,8 @@ import typer
 from rich.console import Console
 
 import heat_igl
+from heat_igl.cli import options as opt
 from heat_igl.cli.matrices import estimated_seconds, make_symmetric, write_matrix
-from heat_igl.cli.options import (
-    DtypeOption,
-    JsonOption,
-    MethodOption,
-    NormalizeOption,
-    PointsOption,
-    ToleranceOption,
-    one_of,
-)
 from heat_igl.cli.output import print_json, prints_json, say
 from heat_igl.errors import BatchError
 from heat_igl.io import complete_file
@@ -46,14 +38,14 @@ def batch(
     ] = "all",
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler; else this machine.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
-    method: MethodOption = None,
-    tolerance: ToleranceOption = 1e-5,
-    dtype: DtypeOption = "float32",
-    normalize: NormalizeOption = False,
-    points: PointsOption = False,
+    method: opt.MethodOption = None,
+    tolerance: opt.ToleranceOption = 1e-5,
+    dtype: opt.DtypeOption = "float32",
+    normalize: opt.NormalizeOption = False,
+    points: opt.PointsOption = False,
     log: Annotated[Path | None, typer.Option(help="File for a log of meshes and blocks.")] = None,
     dashboard: Annotated[bool, typer.Option(help="Serve Dask's dashboard (needs bokeh).")] = False,
-    json_file: JsonOption = None,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """Distances on every mesh of a folder, written to a store; resumes if it was interrupted."""
     from heat_igl import cluster
@@ -79,12 +71,13 @@ def dataset(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of meshes, searched with all below it.")],
     output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Folder for the files; continued if it is there.")],
     form: Annotated[
-        str, typer.Option("--format", help="Of the files, one for each mesh.", callback=one_of(("npy", "mat", "zarr")))
+        str,
+        typer.Option("--format", help="Of the files, one for each mesh.", callback=opt.one_of(("npy", "mat", "zarr"))),
     ] = "npy",
-    normalize: NormalizeOption = False,
-    dtype: DtypeOption = "float32",
+    normalize: opt.NormalizeOption = False,
+    dtype: opt.DtypeOption = "float32",
     workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; one a processor.")] = None,
-    json_file: JsonOption = None,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """Exact distances between all pairs of vertices on every mesh of a folder, as symmetric matrices in files."""
     from heat_igl import cluster

@@ -12,7 +12,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 import heat_igl
-from heat_igl.cli.options import JsonOption, MeshArgument, PictureOption, PointsOption, positive
+from heat_igl.cli import options as opt
 from heat_igl.cli.output import described, plan_row, print_json, print_rows, prints_json, say
 from heat_igl.drawing.output import Picture
 from heat_igl.io import read_mesh_or_cloud
@@ -24,7 +24,7 @@ __all__ = ["info", "validate"]
 _DEFAULT_METHODS = "heat,sweep,windows,meshlab,igl"
 
 
-def info(mesh: MeshArgument, points: PointsOption = False, json_file: JsonOption = None) -> None:
+def info(mesh: opt.MeshArgument, points: opt.PointsOption = False, json_file: opt.JsonOption = None) -> None:
     """Describe a mesh or the triangles of a point cloud: sizes, defects, and properties that affect distances."""
     loaded = read_mesh_or_cloud(mesh, points)
     report = loaded.report()
@@ -39,18 +39,18 @@ def info(mesh: MeshArgument, points: PointsOption = False, json_file: JsonOption
 
 
 def validate(
-    mesh: MeshArgument,
+    mesh: opt.MeshArgument,
     sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="For drawing them.")] = 0,
     methods: Annotated[str, typer.Option(help=f"Separated by commas: {', '.join(METHODS)}.")] = _DEFAULT_METHODS,
     reference: Annotated[str, typer.Option(help="Method to measure errors against.")] = "exact",
-    timeout: Annotated[float, typer.Option(help="Seconds for one native solve.", callback=positive)] = TIMEOUT,
-    points: PointsOption = False,
-    json_file: JsonOption = None,
-    picture: PictureOption = None,
+    timeout: Annotated[float, typer.Option(help="Seconds for one native solve.", callback=opt.positive)] = TIMEOUT,
+    points: opt.PointsOption = False,
+    json_file: opt.JsonOption = None,
+    picture: opt.PictureOption = None,
     fail_above: Annotated[
         float | None,
-        typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.", callback=positive),
+        typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.", callback=opt.positive),
     ] = None,
 ) -> None:
     """Errors of methods against a reference, with time and memory."""

@@ -11,16 +11,7 @@ import typer
 
 import heat_igl
 from heat_igl import drawing
-from heat_igl.cli.options import (
-    CurveOutput,
-    JsonOption,
-    MeshArgument,
-    PictureOption,
-    PointsOption,
-    TimeStepOption,
-    choice,
-    position,
-)
+from heat_igl.cli import options as opt
 from heat_igl.cli.output import Row, check_output, check_writable, print_rows, write_results, wrote
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat import Level, SignedHeatSolver
@@ -35,8 +26,8 @@ CurvesOption = Annotated[
 
 
 def path(
-    mesh: MeshArgument,
-    output: CurveOutput,
+    mesh: opt.MeshArgument,
+    output: opt.CurveOutput,
     waypoints: Annotated[
         list[str] | None,
         typer.Argument(
@@ -50,8 +41,8 @@ def path(
     end: Annotated[
         int | None, typer.Option("--to", metavar="VERTEX", help="Vertex where the shortest path ends.")
     ] = None,
-    points: PointsOption = False,
-    json_file: JsonOption = None,
+    points: opt.PointsOption = False,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """A geodesic through waypoints, a closed one, or the shortest path between two vertices."""
     loaded = as_simplices(read_mesh_or_cloud(mesh, points))
@@ -76,25 +67,25 @@ def path(
 
 
 def trace(
-    mesh: MeshArgument,
+    mesh: opt.MeshArgument,
     start: Annotated[str, typer.Option("--from", metavar="V|X,Y,Z", help="Vertex, counted from 0, or position.")],
     direction: Annotated[str, typer.Option(metavar="X,Y,Z", help="Direction in space; its length does not matter.")],
     length: Annotated[float, typer.Option(help="Length of the line, in the unit of the mesh.")],
-    output: CurveOutput,
-    points: PointsOption = False,
-    json_file: JsonOption = None,
+    output: opt.CurveOutput,
+    points: opt.PointsOption = False,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """A straight line on the surface, from a point in a direction."""
     loaded = as_simplices(read_mesh_or_cloud(mesh, points))
     place, gap = _place(loaded, start)
-    towards = position(direction, "--direction")
+    towards = opt.position(direction, "--direction")
     _report(loaded, heat_igl.trace_geodesic(loaded, place, towards, length), output, json_file, [gap])
 
 
 def _place(mesh: Mesh, text: str) -> tuple[int | SurfacePoints, float | None]:
     """The vertex of this number, or the closest point of the surface to this position and the distance between them."""
     if "," in text:
-        found = closest_points(mesh, [position(text, "position")])
+        found = closest_points(mesh, [opt.position(text, "position")])
         return found.points, float(found.gap[0])
     try:
         return int(text), None
@@ -116,16 +107,16 @@ def _report(
 
 
 def signed(
-    mesh: MeshArgument,
+    mesh: opt.MeshArgument,
     curves: CurvesOption,
     output: Annotated[Path | None, typer.Option(help="PLY or VTU file for mesh and distance.")] = None,
-    picture: PictureOption = None,
+    picture: opt.PictureOption = None,
     level: Annotated[
-        str | None, choice(Level, "The integrated distance: what is 0 of it, each curve, or the mean over all.")
+        str | None, opt.choice(Level, "The integrated distance: what is 0 of it, each curve, or the mean over all.")
     ] = None,
-    t_coef: TimeStepOption = None,
-    points: PointsOption = False,
-    json_file: JsonOption = None,
+    t_coef: opt.TimeStepOption = None,
+    points: opt.PointsOption = False,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """Distance from curves, negative on their left; curves may have gaps."""
     loaded = as_simplices(read_mesh_or_cloud(mesh, points))
@@ -151,12 +142,12 @@ def signed(
 
 
 def cut(
-    mesh: MeshArgument,
+    mesh: opt.MeshArgument,
     curves: CurvesOption,
     output: Annotated[Path, typer.Option(help="File for the cut mesh; with --split, one for each piece beside it.")],
     split: Annotated[bool, typer.Option("--split", help="Write each piece to a file of its own.")] = False,
-    points: PointsOption = False,
-    json_file: JsonOption = None,
+    points: opt.PointsOption = False,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """Cut a mesh along curves, so that they become edges."""
     loaded = as_simplices(read_mesh_or_cloud(mesh, points))

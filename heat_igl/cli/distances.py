@@ -13,23 +13,7 @@ from rich.console import Console
 
 import heat_igl
 from heat_igl import drawing
-from heat_igl.cli.options import (
-    BoundaryOption,
-    CurveOutput,
-    JsonOption,
-    MeshArgument,
-    MethodOption,
-    PictureOption,
-    PointsOption,
-    RegionOption,
-    SourcesOption,
-    TimeStepOption,
-    ToleranceOption,
-    choice,
-    position,
-    positive,
-    region_mask,
-)
+from heat_igl.cli import options as opt
 from heat_igl.cli.output import Row, check_output, described, plan_row, print_rows, write_results, wrote
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import SolverChoice
@@ -50,27 +34,27 @@ _MOST_LINES = 10000
 
 
 def distance(
-    mesh: MeshArgument,
-    source: SourcesOption = None,
+    mesh: opt.MeshArgument,
+    source: opt.SourcesOption = None,
     at: Annotated[
         list[str] | None, typer.Option(metavar="X,Y,Z", help="Source at the closest point of the surface; repeatable.")
     ] = None,
-    method: MethodOption = None,
-    tolerance: ToleranceOption = 1e-5,
-    cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=positive)] = None,
-    region: RegionOption = None,
+    method: opt.MethodOption = None,
+    tolerance: opt.ToleranceOption = 1e-5,
+    cutoff: Annotated[float | None, typer.Option(help="Distances beyond this are inf.", callback=opt.positive)] = None,
+    region: opt.RegionOption = None,
     output: Annotated[
         Path | None, typer.Option(help="PLY, VTU or GIFTI file for mesh and distance, or NPY or CSV file for it.")
     ] = None,
-    picture: PictureOption = None,
-    t_coef: TimeStepOption = None,
-    t: Annotated[float | None, typer.Option(help="Heat: time step, a squared length.", callback=positive)] = None,
-    laplacian: Annotated[str, choice(Laplacian, "Heat: triangulation to solve on.")] = "auto",
-    boundary: BoundaryOption = "neumann",
-    magnitude: Annotated[str, choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
-    backend: Annotated[str, choice(Backend, "Heat: linear solver.")] = "auto",
-    points: PointsOption = False,
-    json_file: JsonOption = None,
+    picture: opt.PictureOption = None,
+    t_coef: opt.TimeStepOption = None,
+    t: Annotated[float | None, typer.Option(help="Heat: time step, a squared length.", callback=opt.positive)] = None,
+    laplacian: Annotated[str, opt.choice(Laplacian, "Heat: triangulation to solve on.")] = "auto",
+    boundary: opt.BoundaryOption = "neumann",
+    magnitude: Annotated[str, opt.choice(Magnitude, "Heat: length of the field that is integrated.")] = "auto",
+    backend: Annotated[str, opt.choice(Backend, "Heat: linear solver.")] = "auto",
+    points: opt.PointsOption = False,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """Distance from one or more sources: vertices, or points of the surface."""
     loaded = read_mesh_or_cloud(mesh, points)
@@ -80,11 +64,11 @@ def distance(
     sources: Any = vertices
     gaps: list[Row] = []
     if at:
-        places, gap = closest_points(loaded, [position(text) for text in at])
+        places, gap = closest_points(loaded, [opt.position(text) for text in at])
         sources = places if vertices is None else [vertices, places]
         gaps = [("off the surface", ", ".join(f"{each:.6g}" for each in gap), gap.tolist())]
     check_output(loaded, output)
-    mask = None if region is None else region_mask(mesh, region)
+    mask = None if region is None else opt.region_mask(mesh, region)
     chosen = _choice(
         method,
         tolerance,
@@ -143,14 +127,14 @@ def _warm_up(mesh: Mesh | PointCloud, choice: SolverChoice) -> None:
 
 
 def isolines(
-    mesh: MeshArgument,
-    source: SourcesOption,
-    spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=positive)],
-    output: CurveOutput,
-    method: MethodOption = None,
-    tolerance: ToleranceOption = 1e-5,
-    points: PointsOption = False,
-    json_file: JsonOption = None,
+    mesh: opt.MeshArgument,
+    source: opt.SourcesOption,
+    spacing: Annotated[float, typer.Option(help="Distance from one line to the next.", callback=opt.positive)],
+    output: opt.CurveOutput,
+    method: opt.MethodOption = None,
+    tolerance: opt.ToleranceOption = 1e-5,
+    points: opt.PointsOption = False,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """Curves of equal distance from one or more source vertices; in SVG they are dotted behind the surface."""
     loaded = as_simplices(read_mesh_or_cloud(mesh, points))

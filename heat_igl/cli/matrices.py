@@ -14,17 +14,7 @@ from rich.console import Console
 
 import heat_igl
 from heat_igl.applications import Statistic
-from heat_igl.cli.options import (
-    DtypeOption,
-    JsonOption,
-    MeshArgument,
-    NormalizeOption,
-    RegionOption,
-    choice,
-    positive,
-    region_mask,
-    values_of,
-)
+from heat_igl.cli import options as opt
 from heat_igl.cli.output import Row, check_writable, described, print_rows, say, wrote
 from heat_igl.io import complete_file, read_mesh
 from heat_igl.mesh import Mesh
@@ -40,20 +30,20 @@ _ROWS = 512
 
 
 def matrix(
-    mesh: MeshArgument,
+    mesh: opt.MeshArgument,
     output: Annotated[
         Path, typer.Option(help="NPY, CSV or MAT file; with --radius a sparse matrix: NPZ of scipy, or MAT.")
     ],
-    radius: Annotated[float | None, typer.Option(help="Only distances up to this.", callback=positive)] = None,
+    radius: Annotated[float | None, typer.Option(help="Only distances up to this.", callback=opt.positive)] = None,
     parcels: Annotated[
         str | None,
         typer.Option(metavar="FILE|NAME", help="Between parcels: labels in an NPY, GIFTI or CIFTI file, or attribute."),
     ] = None,
-    statistic: Annotated[str, choice(Statistic, "Distance between two parcels.")] = "mean",
-    region: RegionOption = None,
-    normalize: NormalizeOption = False,
-    dtype: DtypeOption = "float32",
-    json_file: JsonOption = None,
+    statistic: Annotated[str, opt.choice(Statistic, "Distance between two parcels.")] = "mean",
+    region: opt.RegionOption = None,
+    normalize: opt.NormalizeOption = False,
+    dtype: opt.DtypeOption = "float32",
+    json_file: opt.JsonOption = None,
 ) -> None:
     """Distances between all vertices, those within a radius, or parcels of a surface."""
     suffixes = _DENSE if radius is None else _SPARSE
@@ -63,14 +53,14 @@ def matrix(
         raise ValueError("--radius and --parcels ask for different matrices: leave one of them away")
     check_writable(output)
     loaded = read_mesh(mesh)
-    mask = None if region is None else region_mask(mesh, region)
+    mask = None if region is None else opt.region_mask(mesh, region)
     unit = float(np.sqrt(loaded.measures.sum())) if normalize else 1.0
     shows = Console(stderr=True).is_terminal
     with complete_file(output) as temporary:
         if radius is not None:
             found: Any = heat_igl.distances_within(loaded, radius, region=mask) / unit
         elif parcels is not None:
-            labels = np.nan_to_num(values_of(mesh, "--parcels", parcels), nan=-1).astype(np.int64)
+            labels = np.nan_to_num(opt.values_of(mesh, "--parcels", parcels), nan=-1).astype(np.int64)
             kind = cast(Statistic, statistic)
             found = heat_igl.parcel_distances(loaded, labels, statistic=kind, region=mask, progress=shows) / unit
         else:

@@ -13,18 +13,9 @@ import typer
 from rich.console import Console
 
 from heat_igl import reference
+from heat_igl.cli import options as opt
 from heat_igl.cli.curves import projected
 from heat_igl.cli.demo import demonstrate
-from heat_igl.cli.options import (
-    BoundaryOption,
-    JsonOption,
-    MeshArgument,
-    MethodOption,
-    PointsOption,
-    SourcesOption,
-    TimeStepOption,
-    ToleranceOption,
-)
 from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import SignedHeatSolver
@@ -36,19 +27,19 @@ __all__ = ["demo", "view"]
 
 
 def view(
-    mesh: MeshArgument,
-    source: SourcesOption = None,
-    t_coef: TimeStepOption = None,
-    boundary: BoundaryOption = "neumann",
-    method: MethodOption = None,
-    tolerance: ToleranceOption = 1e-5,
+    mesh: opt.MeshArgument,
+    source: opt.SourcesOption = None,
+    t_coef: opt.TimeStepOption = None,
+    boundary: opt.BoundaryOption = "neumann",
+    method: opt.MethodOption = None,
+    tolerance: opt.ToleranceOption = 1e-5,
     exact: Annotated[bool, typer.Option("--exact", help="Show the exact distance beside it; takes seconds.")] = False,
     curves: Annotated[
         Path | None, typer.Option(metavar="OBJ", help="Show the signed distance from these polylines, too.")
     ] = None,
-    points: PointsOption = False,
+    points: opt.PointsOption = False,
     html: Annotated[Path | None, typer.Option(help="File for the page, which is not opened then.")] = None,
-    json_file: JsonOption = None,
+    json_file: opt.JsonOption = None,
 ) -> None:
     """An interactive page, opened in the browser: a click moves the source, and the distance follows."""
     from heat_igl.drawing import page

@@ -152,8 +152,6 @@ def marching_triangles(V: ArrayLike, F: ArrayLike, u: ArrayLike, isoval: float =
 Node = tuple[int, Sequence[float]]
 """A vertex and (), an edge and its share of the way to the second end, or a face and two or three coordinates."""
 
-LevelSetConstraint = Literal["ZeroSet", "None", "Multiple"]
-
 _LEVELS: dict[str, Literal["zero", "none", "constant"]] = {"zeroset": "zero", "none": "none", "multiple": "constant"}
 # This package's own factor for potpourri3d's default of 1.
 _SIGNED_TIME_STEP = 0.25
