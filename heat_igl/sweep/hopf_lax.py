@@ -31,10 +31,8 @@ class HopfLaxEngine(SimplexEngine):
         E = X[:, 1:] - X[:, :1]
         others = np.swapaxes(np.linalg.inv(E) if is_solid else np.linalg.pinv(E), 1, 2)
         gradient = np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)
-        tensors: Any = simplices.tensors
-        inverse = np.linalg.inv(tensors) if is_solid else np.linalg.pinv(tensors, hermitian=True)
-        # What `HopfLax` reads: squared lengths, inverses, gradients of coordinates, and positions.
-        self._in_metric = simplices.squared_lengths(), *map(np.ascontiguousarray, (inverse, gradient)), place
+        # What `HopfLax` reads: squared lengths, gradients of coordinates, and positions.
+        self._in_metric = simplices.squared_lengths(), np.ascontiguousarray(gradient), place
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:  # noqa: ARG002
         """Lower distance to that of second order."""

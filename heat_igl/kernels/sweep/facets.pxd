@@ -26,6 +26,7 @@ cdef class Facet:
     cdef double H[3][3]
 
     cdef bint is_flat(self) noexcept nogil
+    cdef double dual(self, int k, const double* e) noexcept nogil
     cdef double along_edges(self) noexcept nogil
     cdef double length(self, const double* x) noexcept nogil
     cdef double value(self, const double* x) noexcept nogil

@@ -28,6 +28,23 @@ class Facet:
         )
         return det < FLAT * m[0] * m[4] * m[8]
 
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def dual(self, k: cython.int, e: cython.pointer[cython.const[cython.double]]) -> cython.double:
+        """The square of the slope that rises by e towards the corners, in the inverse of the metric k of `product`."""
+        m = cython.address(self.product[9 * k])
+        if self.p == 2:
+            return (m[4] * e[0] * e[0] - 2.0 * m[1] * e[0] * e[1] + m[0] * e[1] * e[1]) / (m[0] * m[4] - m[1] * m[1])
+        # Cofactors.
+        a: cython.double = m[4] * m[8] - m[5] * m[5]
+        b: cython.double = m[5] * m[2] - m[1] * m[8]
+        c: cython.double = m[1] * m[5] - m[4] * m[2]
+        own: cython.double = a * e[0] * e[0]
+        own += (m[0] * m[8] - m[2] * m[2]) * e[1] * e[1] + (m[0] * m[4] - m[1] * m[1]) * e[2] * e[2]
+        mixed: cython.double = b * e[0] * e[1] + c * e[0] * e[2] + (m[1] * m[2] - m[0] * m[5]) * e[1] * e[2]
+        return (own + 2.0 * mixed) / (m[0] * a + m[1] * b + m[2] * c)
+
     def along_edges(self) -> cython.double:
         """The least value along an edge to v; sets `share`."""
         i: cython.int

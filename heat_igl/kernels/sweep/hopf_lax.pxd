@@ -24,7 +24,6 @@ cdef class HopfLax(Facet):
     cdef const int[::1] incident
     cdef const double[:, :, :, ::1] squares
     cdef const double[:, :, ::1] mean
-    cdef const double[:, :, :, ::1] inverse
     cdef const double[:, :, ::1] gradient
     cdef const double[:, ::1] V
     cdef PriorityQueue queue
@@ -40,8 +39,10 @@ cdef class HopfLax(Facet):
     # The derivative of distance by the position of each vertex, where it is known.
     cdef double[:, ::1] slope
     cdef unsigned char[::1] is_sloped
-    # The corner whose facet gave each vertex its distance, and what bounds the values through each simplex.
+    # The corner whose facet gave each vertex its distance, the place there, and what bounds the values through each
+    # simplex.
     cdef int[::1] facet
+    cdef double[:, ::1] place
     cdef double[::1] widest
     cdef double[::1] slack
     # The corners of the facet in the simplex.
@@ -61,5 +62,5 @@ cdef class HopfLax(Facet):
     cdef double through(self, int s, int c, double best) noexcept nogil
     cdef double curved(self, int s, int c, double best) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
-    cdef double trust(self, int s, int corner) noexcept nogil
+    cdef double trust(self, int s, int c, int i) noexcept nogil
     cdef void find_slope(self, int s, int c) noexcept nogil

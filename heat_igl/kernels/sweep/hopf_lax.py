@@ -44,17 +44,15 @@ class HopfLax(Facet):
     squares : (m, q, p + 1, p + 1) float64
         Squared distances between the corners of each simplex, in its metric (q = 1), or in that of each of its corners
         (q = p + 1).
-    inverse : (m, q, 3, 3) float64
-        Of the metrics.
     gradient : (m, p + 1, 3) float64
         Of the barycentric coordinates of each simplex.
     V : (n, 3) float64
         Positions.
     """
 
-    def __init__(self, corners, first, incident, squares, inverse, gradient, V):
+    def __init__(self, corners, first, incident, squares, gradient, V):
         self.corners, self.first, self.incident, self.squares = corners, first, incident, squares
-        self.inverse, self.gradient, self.V = inverse, gradient, V
+        self.gradient, self.V = gradient, V
         self.p, self.q = corners.shape[1] - 1, squares.shape[1]
         self.unit = np.sqrt(squares.mean())
         # The longest edge, and by which factor lengths may be shorter than in the mean metric.
@@ -85,14 +83,25 @@ class HopfLax(Facet):
         raise_caught()
 
     def second_order(self):
-        """After `first_order`: change its distances to those of second order."""
+        """After `first_order`: change its distances to those of second order.
+
+        Returns
+        -------
+        facet : (n,) int32
+            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1.
+        place : (n, p) float64
+            The shares of the other corners, in their order, at the best place on that facet.
+        slope, is_sloped : (n, 3) float64, (n,) uint8
+            The derivative of distance by the position of each vertex, and whether it is known.
+        """
         n = self.d.shape[0]
         self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
-        self.facet = np.full(n, -1, np.int32)
+        self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen()
         raise_caught()
+        return tuple(map(np.asarray, (self.facet, self.place, self.slope, self.is_sloped)))
 
     @cython.cfunc
     @cython.inline
@@ -314,6 +323,7 @@ class HopfLax(Facet):
         self.face(c)
         for i in range(self.p):
             self.share[i] = kept[i]
+            self.place[v, i] = kept[i]
         self.d[v], self.facet[v] = best, best_at
         self.label[v] = self.label[self.corners[s, self.nearest_corner()]]
         self.lay(s, c)
@@ -388,7 +398,7 @@ class HopfLax(Facet):
         for i in range(self.p):
             self.D[i] = self.d[self.corners[s, self.side[i]]] - start
             is_source = is_source or not self.D[i] > 0.0
-            x[i] = self.trust(s, self.side[i])
+            x[i] = self.trust(s, c, i)
         for i in range(self.p):
             for j in range(i):
                 sag: cython.double = 0.0
@@ -457,22 +467,19 @@ class HopfLax(Facet):
         least: cython.double = max(rise - from_i, -from_j - rise) - level
         return max(min(sag, most), least)
 
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def trust(self, s: cython.int, corner: cython.int) -> cython.double:
-        """How far the slope at a corner has length 1 in simplex s, as it has unless metrics jump: from 0 to 1."""
-        v: cython.int = self.corners[s, corner]
+    def trust(self, s: cython.int, c: cython.int, i: cython.int) -> cython.double:
+        """How far the slope at a corner i of `side` has length 1 in simplex s, as unless metrics jump: from 0 to 1."""
+        v: cython.int = self.corners[s, self.side[i]]
         if not self.is_sloped[v]:
             return 0.0
-        at: cython.int = corner if self.q > 1 else 0
-        square: cython.double = 0.0
-        i: cython.int
+        e: cython.double[3]
         j: cython.int
-        for i in range(3):
-            for j in range(3):
-                square += self.inverse[s, at, i, j] * self.slope[v, i] * self.slope[v, j]
+        k: cython.int
+        for j in range(self.p):
+            e[j] = 0.0
+            for k in range(3):
+                e[j] += self.slope[v, k] * (self.V[self.corners[s, self.side[j]], k] - self.V[self.corners[s, c], k])
+        square: cython.double = self.dual(i + 1 if self.q > 1 else 0, e)
         return max(1.0 - fabs(log(square)), 0.0) if square > 0.0 else 0.0
 
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
