@@ -160,6 +160,85 @@ def test_activation_of_a_twisted_block():
         assert times == pytest.approx(np.min(arrivals, axis=0), rel=1e-9)
 
 
+def differentiable(name: str, rng: np.random.Generator) -> tuple[Mesh, FloatArray]:
+    """A body or a disk, and a metric at its vertices, or one that jumps between layers of tetrahedra."""
+    if name == "disk":
+        mesh, _, g = twisted_disk(8, 3.0)
+        return mesh, g
+    mesh = shapes.box(5)
+    mesh = mesh.with_vertices(mesh.V + 0.03 * rng.uniform(-1, 1, mesh.V.shape))
+    if name == "layers":
+        return mesh, random_metric(2, rng, 0.5)[(np.arange(mesh.n_faces) >= mesh.n_faces // 2).astype(int)]
+    x, y, z = mesh.V.T
+    fibre = np.stack([np.cos(2 * z), np.sin(2 * z), 0.3 * x], axis=1)
+    return mesh, fibre_metric(fibre, 1 + 0.3 * y, 2.5)
+
+
+@pytest.mark.parametrize("name", ["fibres", "layers", "disk"])
+def test_derivatives_against_central_differences(name):
+    """By positions, by tensors and by offsets, in random directions, where a second difference shows no kink."""
+    rng = np.random.default_rng(4)
+    mesh, g = differentiable(name, rng)
+    start, step = np.array([0.1, 0.12]), 1e-6
+
+    def answer(dV: float | FloatArray = 0.0, dg: float | FloatArray = 0.0, later: float | FloatArray = 0.0) -> tuple:
+        domain = metric_operators(mesh.with_vertices(mesh.V + dV), g + dg)
+        return GeodesicSolver(domain).distance_vjp(OffsetSources([7, 100], start + later))
+
+    phi, pull_back = answer()
+    assert phi == pytest.approx(solver(mesh, g).distance(OffsetSources([7, 100], start)), rel=5e-3)
+    assert len(pull_back.inexact) <= 1
+    random = rng.standard_normal(len(phi))
+
+    def differences(**direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+        ((name, by),) = direction.items()
+        two = [answer(**{name: s * step * by})[0] for s in (1, -1)]
+        smooth = np.abs(two[0] + two[1] - 2 * phi) < 1e-3 * step
+        assert smooth.mean() > 0.95
+        return (two[0] - two[1]) / (2 * step), random * smooth
+
+    dV = rng.standard_normal(mesh.V.shape) * ([1, 1, 0] if name == "disk" else 1)
+    found, weight = differences(dV=dV)
+    change = pull_back.push_forward(dV)
+    assert change[weight != 0] == pytest.approx(found[weight != 0], rel=1e-5, abs=1e-6)
+    assert (pull_back(random) * dV).sum() == pytest.approx(random @ change, rel=1e-10)
+    # A layer stays one: of two metrics at an edge, the shorter length counts.
+    turn = rng.standard_normal(g.shape)[np.unique(g, axis=0, return_inverse=True)[1].ravel()]
+    dg = np.einsum("kij,kjl,kln->kin", g, turn + np.swapaxes(turn, 1, 2), g)
+    found, weight = differences(dg=dg)
+    assert (pull_back.by_metric(weight) * dg).sum() == pytest.approx(weight @ found, rel=1e-5)
+    for i, later in enumerate(np.eye(2)):
+        found, weight = differences(later=later)
+        assert pull_back.by_offsets(weight)[i] == pytest.approx(weight @ found, rel=1e-5)
+
+
+def test_derivatives_have_the_degrees_of_lengths():
+    """Euler: lengths are of degree 1 in positions and 1/2 in the metric; a later start delays all that it reaches."""
+    mesh, g = differentiable("fibres", np.random.default_rng(1))
+    phi, pull_back = solver(mesh, g).distance_vjp(40)
+    weight = np.random.default_rng(2).standard_normal(len(phi))
+    assert pull_back.push_forward(mesh.V) == pytest.approx(phi, rel=1e-9, abs=1e-12)
+    assert (pull_back.by_metric(weight) * g).sum() == pytest.approx(weight @ phi / 2, rel=1e-9)
+    assert pull_back.by_offsets(weight) == pytest.approx([weight.sum()], rel=1e-9)
+    rows = np.stack([weight, phi])
+    assert pull_back(rows)[1] == pytest.approx(pull_back(phi))
+
+
+def test_derivatives_by_speeds_of_layers():
+    mesh = shapes.box(4)
+    speed = np.where(mesh.V[mesh.F].mean(axis=1)[:, 2] < 0.5, 1.0, 3.0)
+    phi, pull_back = GeodesicSolver(speed_operators(mesh, speed)).distance_vjp(0)
+    by_speed = pull_back.by_speed(phi)
+    # Of degree -1 in the speeds, and no slower when faster.
+    assert by_speed @ speed == pytest.approx(-phi @ phi, rel=1e-9)
+    with pytest.raises(ValueError, match=r"give metric_operators the metric at the vertices, \(n, 3, 3\)"):
+        GeodesicSolver(speed_operators(mesh, 1 + mesh.V[mesh.F].mean(axis=1)[:, 2])).distance_vjp(0)[1](phi)
+    with pytest.raises(ValueError, match=r"g must have shape \(125,\) or \(k, 125\)"):
+        pull_back(phi[1:])
+    with pytest.raises(ValueError, match=r"dV must be \(125, 3\) finite numbers"):
+        pull_back.push_forward(mesh.V[1:])
+
+
 @pytest.mark.parametrize(
     ("D", "times", "message"),
     [

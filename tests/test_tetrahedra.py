@@ -242,6 +242,30 @@ def test_what_is_seen_is_at_the_length_of_the_line(seed):
         np.testing.assert_allclose(found[seen], line[seen], rtol=1e-4)
 
 
+@pytest.mark.parametrize("hollow", [0.0, 0.25], ids=["cube", "cavity"])
+def test_derivatives_of_lines(hollow):
+    """Central differences under linear maps, which keep walls flat; lines bend around a cavity."""
+    rng = np.random.default_rng(3)
+    mesh = without(8, lambda centre: (np.abs(centre - 0.5) < hollow).all(axis=1), 0.2 if hollow == 0 else 0.0)
+    mesh = mesh.with_vertices(mesh.V @ rng.normal(np.eye(3), 0.1))
+    sources = heat_igl.OffsetSources([2, mesh.n_vertices - 3], [0.0, 0.1])
+    solver = GeodesicSolver(mesh)
+    phi, pull_back = solver.distance_vjp(sources)
+    np.testing.assert_array_equal(phi, solver.distance(sources))
+    dV, step = mesh.V @ rng.standard_normal((3, 3)), 1e-7
+    moved = [GeodesicSolver(mesh.with_vertices(mesh.V + s * step * dV)).distance(sources) for s in (1, -1)]
+    smooth = np.abs(moved[0] + moved[1] - 2 * phi) < 1e-4 * step
+    smooth[pull_back.inexact] = False
+    assert smooth.mean() > (0.98 if hollow == 0 else 0.8)
+    change = pull_back.push_forward(dV)
+    assert change[smooth] == pytest.approx((moved[0] - moved[1])[smooth] / (2 * step), abs=1e-5)
+    weight = rng.standard_normal(len(phi))
+    assert (pull_back(weight) * dV).sum() == pytest.approx(weight @ change, rel=1e-10)
+    # Of degree 1 in the positions, but for the offsets.
+    by_offsets = pull_back.by_offsets(smooth * weight)
+    assert (pull_back(smooth * weight) * mesh.V).sum() + by_offsets[1] * 0.1 == pytest.approx((smooth * weight) @ phi)
+
+
 def test_halved_tetrahedra():
     mesh = scattered(200, "cube")
     halved = MetricSimplices.in_space(mesh).halved()

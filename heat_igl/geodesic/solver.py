@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from heat_igl.heat.directions import Directions
     from heat_igl.heat.side_lengths import SidesOfMesh
     from heat_igl.intrinsic import TangentFrames
+    from heat_igl.sweep.simplex_derivative import SimplexDerivative
 
 __all__ = ["GeodesicSolver"]
 
@@ -308,12 +309,18 @@ class GeodesicSolver(BatchedSolver):
             engine = guarded_windows(MeshTriangles(surface), surface.V, 0.0, None)
         return engine, tangent_frames(surface)
 
-    def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
+    def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative | SimplexDerivative]:
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
-        Arguments and errors as for `distance`; a ValueError also if the engine is not windows, and for what has no
-        derivative, see `differentiable_surface`. The derivative is that of the exact paths.
+        Arguments and errors as for `distance`; a ValueError also if the engine is a sweep, and for what has no
+        derivative, see `differentiable_surface`. The derivative is that of the exact paths. Of the Hopf-Lax formula,
+        it is that of its fixed point, which ``phi`` is to rounding, see `SimplexDerivative`.
         """
+        from heat_igl.windows.engine import SimplexEngine
+
+        if isinstance(self._engine, SimplexEngine):
+            answer = self._engine.derivative(self._source_set(sources))
+            return answer.distance, answer
         from heat_igl.heat.derivatives import DistanceDerivative, differentiable_surface
         from heat_igl.heat.side_lengths import SideLengths
 

@@ -38,6 +38,9 @@ class MetricSimplices:
     tensors : (m, q, 3, 3) float64 or None
         A metric that is not the same everywhere: of each simplex (q = 1), or at each of its corners (q = p + 1), with
         logarithms of lengths that are linear in between.
+    is_given : bool
+        Whether tensors, or positions without tensors, are those that the user gave in space: then distance has
+        derivatives by them.
     """
 
     corners: IntArray
@@ -47,13 +50,14 @@ class MetricSimplices:
     place: FloatArray | None = None
     least: float = 1.0
     tensors: FloatArray | None = None
+    is_given: bool = False
 
     @classmethod
     def in_space(cls, mesh: Mesh) -> MetricSimplices:
         """The faces of a mesh, by the positions of its vertices."""
         X = mesh.V[mesh.F]
         lengths = np.linalg.norm(X[:, :, None] - X[:, None], axis=3)
-        return cls(mesh.F, lengths, mesh.n_vertices, mesh.V, mesh.V)
+        return cls(mesh.F, lengths, mesh.n_vertices, mesh.V, mesh.V, is_given=True)
 
     @classmethod
     def in_metric(cls, mesh: Mesh, tensors: FloatArray) -> MetricSimplices:
@@ -65,15 +69,18 @@ class MetricSimplices:
         first = tensors[0, 0]
         if p == 3 and np.abs(tensors - first).max() <= _ROUNDING * np.abs(first).max():
             # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
-            return cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(first), mesh.F))
-        if p == 3 and tensors.shape[1] == 1:
+            mapped = cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(first), mesh.F))
+            return replace(mapped, is_given=False)
+        is_given = tensors.shape[1] > 1
+        if p == 3 and not is_given:
             tensors = _at_corners(mesh, tensors[:, 0])
+            is_given = tensors.shape[1] == 1
         inside = tensors
         if p == 2:
             axes = plane_axes(mesh)[:, None]
             inside = axes @ tensors @ np.swapaxes(axes, 2, 3)
         least = float(np.sqrt(np.linalg.eigvalsh(inside)[..., 0].min()))
-        simplices = cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors)
+        simplices = cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors, is_given)
         squares = simplices.squared_lengths()
         lengths = np.sqrt(squares[:, 0])
         if tensors.shape[1] > 1:
@@ -120,8 +127,7 @@ class MetricSimplices:
         """
         if self.V is None or self.corners.shape[1] != 4:
             raise ValueError("only tetrahedra in space can be halved: give their positions V")
-        pairs, _ = self.edges
-        ends, middle = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+        ends, middle = self._middles()
         ab, ac, ad, bc, bd, cd = self.n + middle.reshape(-1, 6).T
         a, b, c, d = self.corners.T
         # Four at the corners, and the octahedron between them around its diagonal from ac to bd.
@@ -130,6 +136,17 @@ class MetricSimplices:
         parts += [(ac, bd, one, other) for one, other in around]
         corners = np.concatenate([np.stack(part, axis=1) for part in parts])
         return MetricSimplices.in_space(Mesh(np.concatenate([self.V, self.V[ends].mean(axis=1)]), corners))
+
+    def halfway(self) -> sp.csr_array:
+        """The weights (n + e, n) of the vertices in those of `halved`."""
+        ends, _ = self._middles()
+        e, column = len(ends), np.concatenate([np.arange(self.n), ends.ravel()])
+        row = np.concatenate([np.arange(self.n), self.n + np.repeat(np.arange(e), 2)])
+        return sp.csr_array((np.repeat([1, 0.5], [self.n, 2 * e]), (row, column)), shape=(self.n + e, self.n))
+
+    def _middles(self) -> tuple[IntArray, IntArray]:
+        """The ends (e, 2) of each edge, and the edge of each of six sides of the tetrahedra."""
+        return np.unique(np.sort(self.edges[0], axis=1), axis=0, return_inverse=True)
 
 
 def _at_corners(mesh: Mesh, g: FloatArray) -> FloatArray:
@@ -169,8 +186,9 @@ def _at_corners(mesh: Mesh, g: FloatArray) -> FloatArray:
         return g[:, None]
     found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
     count = np.maximum(at.sum(axis=1), 1)[:, None]
-    for _ in range(2):
-        # A mean over neighbours flattens curves: until the means over the corners are the given tensors.
+    for _ in range(10):
+        # A mean over neighbours flattens curves: until the means over the corners are the given tensors. From a corner
+        # where a speed doubles over an edge, distance is 1.8 % off after two rounds, 1.0 after ten, 0.8 after thirty.
         rest = (logs - found[mesh.F].mean(axis=1)) * share[mesh.F].min(axis=1)[:, None]
         found += at @ rest / count
     found += level

@@ -8,10 +8,15 @@ import numpy as np
 
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.operators import MetricSimplices
+from heat_igl.sources import SourceSet
+from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.typing import AnyArray, FloatArray
 from heat_igl.windows.engine import SimplexEngine
 
 __all__ = ["HopfLaxEngine"]
+
+# How far distances settle before they are differentiated, so that the facets are those of the fixed point.
+_SETTLED = 0.9e-9
 
 
 class HopfLaxEngine(SimplexEngine):
@@ -36,7 +41,19 @@ class HopfLaxEngine(SimplexEngine):
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:  # noqa: ARG002
         """Lower distance to that of second order."""
+        self._found(offset, distance, label)
+
+    def _found(
+        self, offset: FloatArray, distance: FloatArray, label: AnyArray, *settled: float
+    ) -> tuple[AnyArray, ...]:
         kernel: Any = HopfLax
         scheme = kernel(self._corners, self._first, self._incident, *self._in_metric)
         scheme.first_order(distance, label, offset)
-        scheme.second_order()
+        found: tuple[AnyArray, ...] = scheme.second_order(*settled)
+        return found
+
+    def derivative(self, sources: SourceSet) -> FixedPointDerivative:
+        """The distance from source vertices with its derivative."""
+        distance, label = self._begun(sources)
+        found = self._found(sources.vertex_offset, distance, label, _SETTLED)
+        return FixedPointDerivative(self._simplices, sources, self.distance(sources), distance, label, *found)

@@ -13,6 +13,7 @@ from heat_igl.kernels.bodies.sight import look_around
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
+from heat_igl.sweep.line_derivative import LineDerivative, line_slopes
 from heat_igl.sweep.reflex_edges import reflex_edges
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import ROUNDING, SimplexEngine
@@ -86,8 +87,40 @@ class LineEngine(SimplexEngine):
             labels[shorter] = other[shorter]
         return distance, labels
 
+    def derivative(self, sources: SourceSet) -> LineDerivative:
+        """The distance from source vertices with its derivative."""
+        distance, label, length, slopes = self._differentiated(sources)
+        return LineDerivative(self._simplices, sources, distance, label, length, slopes)
+
+    def _differentiated(self, sources: SourceSet) -> tuple[FloatArray, IntArray, FloatArray, sp.csr_array]:
+        """Distances and source vertices (n,) by number, lengths of ways (n,), and their slopes (n, 3 n)."""
+        distance, label = self._begun(sources)
+        vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
+        edges, way = self._ways(vertices, offset, distance, label)
+        self._keep_bounds(vertices, offset, distance, label)
+        ends = np.where(label >= 0, vertices[label], np.arange(len(label)))
+        length, slopes = line_slopes(self._V, ends, edges, way, distance)
+        length += np.append(offset, 0)[label]
+        if self._finer is not None:
+            n = len(distance)
+            found, other, finer_length, finer_slopes = self._finer._differentiated(sources)
+            finer_slopes = finer_slopes[:n] @ sp.kron(self._simplices.halfway(), sp.eye_array(3), format="csr")
+            is_shorter = found[:n] < distance * (1 - ROUNDING)
+            distance, label, length = (
+                np.where(is_shorter, x[:n], y) for x, y in ((found, distance), (other, label), (finer_length, length))
+            )
+            chosen = sp.diags_array(is_shorter.astype(float))
+            slopes = sp.csr_array(chosen @ finer_slopes + (sp.eye_array(n) - chosen) @ slopes)
+        return distance, label, length, slopes
+
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
         """Lower distance to straight lines, and to ways of straight lines that bend around edges of the body."""
+        self._ways(vertices, offset, distance, label)
+
+    def _ways(
+        self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray
+    ) -> tuple[AnyArray, AnyArray]:
+        """As `_lower`; returns edges (e, 2), and the edge (n,) around which the way to each vertex bends last."""
         begin = distance.copy()
         order = self._order(vertices, straight=len(vertices) == 1)
         edges, outward, wall = self._reflex_edges
@@ -115,6 +148,7 @@ class LineEngine(SimplexEngine):
             is_continued = self._continue_along_edges(distance, begin, label)
             if not is_continued and not (self._is_small and len(edges) and len(vertices) > 1):
                 break
+        return edges, way
 
     def _nearest(self, vertices: AnyArray) -> AnyArray:
         """The source (n,) that each vertex looks for first: the nearest in space, or -1 for those of its neighbours."""

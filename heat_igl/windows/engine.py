@@ -19,6 +19,7 @@ from heat_igl.windows.tables import MARGIN, Tables, from_mesh, from_triangulatio
 if TYPE_CHECKING:
     from heat_igl.intrinsic import IntrinsicTriangulation
     from heat_igl.operators import MetricSimplices, Operators, Surface
+    from heat_igl.sweep.simplex_derivative import SimplexDerivative
 
 __all__ = ["ROUNDING", "Engine", "MeshTriangles", "OperatorTriangles", "SimplexEngine", "TriangleEngine", "Triangles"]
 
@@ -70,17 +71,23 @@ class SimplexEngine(Engine):
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
         """Lower distance (n,), which begins with the offsets of the vertices and ``inf``; label (n,) counts these."""
 
+    @abstractmethod
+    def derivative(self, sources: SourceSet) -> SimplexDerivative:
+        """The distance from source vertices with its derivative."""
+
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:  # noqa: ARG002
         """Distance (n,), and the source (n,) that it is measured from."""
-        n = self._simplices.n
+        distance, label = self._begun(sources)
         vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
-        distance = np.full(n, np.inf)
-        distance[vertices] = offset
-        label: AnyArray = np.full(n, -1, np.int32)
-        label[vertices] = np.arange(len(vertices))
         self._lower(vertices, offset, distance, label)
         self._keep_bounds(vertices, offset, distance, label)
         return distance, np.concatenate([sources.vertex_label, [-1]])[label]
+
+    def _begun(self, sources: SourceSet) -> tuple[FloatArray, AnyArray]:
+        """Distance (n,), ``inf`` but at the sources, and the number (n,) of the source there, else -1."""
+        distance, label = np.full(self._simplices.n, np.inf), np.full(self._simplices.n, -1, np.int32)
+        distance[sources.vertices], label[sources.vertices] = sources.vertex_offset, np.arange(len(sources.vertices))
+        return distance, label
 
     @cached_property
     def _edges(self) -> tuple[AnyArray, FloatArray]:

@@ -10,8 +10,10 @@ cdef extern from *:
     // Second order ends once no distance changes by more than SETTLED of itself; it begins with the larger one.
     #define FIRST_SETTLED 1e-2
     #define SETTLED 0.9e-4
+    // Difference of values, as a share of them, that is rounding.
+    #define EQUAL 1e-12
     """
-    double FIRST_GAIN, GAIN, FIRST_SETTLED, SETTLED
+    double FIRST_GAIN, GAIN, FIRST_SETTLED, SETTLED, EQUAL
 
 cdef enum:
     # Of a vertex, in the second order.
@@ -55,7 +57,7 @@ cdef class HopfLax(Facet):
     cdef void face(self, int c) noexcept nogil
     cdef double linear(self, int s, int c) noexcept nogil
     cdef double across(self, int s, int c, double da, double db, double dc) noexcept nogil
-    cdef void sharpen(self) noexcept nogil
+    cdef void sharpen(self, double least) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
     cdef bint rests_on(self, int v, int u) noexcept nogil

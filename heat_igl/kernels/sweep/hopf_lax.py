@@ -17,6 +17,7 @@ from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet
 from cython.cimports.heat_igl.kernels.sweep.hopf_lax import (
+    EQUAL,
     FIRST_GAIN,
     FIRST_SETTLED,
     GAIN,
@@ -82,8 +83,13 @@ class HopfLax(Facet):
             self.spread()
         raise_caught()
 
-    def second_order(self):
+    def second_order(self, settled: cython.double = SETTLED):
         """After `first_order`: change its distances to those of second order.
+
+        Parameters
+        ----------
+        settled : float
+            It ends once no distance changes by more than this share of it, or after `MOST_VISITS` of a vertex.
 
         Returns
         -------
@@ -99,7 +105,7 @@ class HopfLax(Facet):
         self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
-            self.sharpen()
+            self.sharpen(settled)
         raise_caught()
         return tuple(map(np.asarray, (self.facet, self.place, self.slope, self.is_sloped)))
 
@@ -259,7 +265,7 @@ class HopfLax(Facet):
         self.share[0], self.share[1], self.share[2] = 1.0 - fb - fe, fb, fe
         return da + (db - da) * fb + (dc - da) * fe + far
 
-    def sharpen(self) -> cython.void:
+    def sharpen(self, least: cython.double) -> cython.void:
         """Second order: the nearest vertex next, until no distance around any has changed by more than is settled."""
         v: cython.int
         k: cython.int
@@ -293,7 +299,7 @@ class HopfLax(Facet):
                         if change > settled and self.n_visits[u] < MOST_VISITS:
                             self.wait(u)
                 v = self.nearest_waiting()
-            if self.queue.count > 0 or not settled > SETTLED:
+            if self.queue.count > 0 or not settled > least:
                 break
             settled *= 0.1
 
@@ -313,7 +319,8 @@ class HopfLax(Facet):
             s: cython.int = at // size
             c: cython.int = at % size
             value: cython.double = self.through(s, c, best)
-            if value < best:
+            # Facets that share the best place have equal values but for rounding: the first one stays.
+            if value + EQUAL * fabs(value) < best:
                 best, best_at = value, at
                 for i in range(self.p):
                     kept[i] = self.share[i]
@@ -468,7 +475,10 @@ class HopfLax(Facet):
         return max(min(sag, most), least)
 
     def trust(self, s: cython.int, c: cython.int, i: cython.int) -> cython.double:
-        """How far the slope at a corner i of `side` has length 1 in simplex s, as unless metrics jump: from 0 to 1."""
+        """How far the slope at a corner i of `side` has length 1 in simplex s, as unless metrics jump: from 0 to 1.
+
+        With the square of the logarithm, distances have a derivative where metrics begin to differ.
+        """
         v: cython.int = self.corners[s, self.side[i]]
         if not self.is_sloped[v]:
             return 0.0
@@ -480,7 +490,8 @@ class HopfLax(Facet):
             for k in range(3):
                 e[j] += self.slope[v, k] * (self.V[self.corners[s, self.side[j]], k] - self.V[self.corners[s, c], k])
         square: cython.double = self.dual(i + 1 if self.q > 1 else 0, e)
-        return max(1.0 - fabs(log(square)), 0.0) if square > 0.0 else 0.0
+        square = log(square) if square > 0.0 else 1.0
+        return max(1.0 - square * square, 0.0)
 
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
         """The derivative of the length of v - x by the position of v, at the best place x."""

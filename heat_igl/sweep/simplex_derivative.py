@@ -1,0 +1,454 @@
+"""The derivative of a distance by the Hopf-Lax formula, by offsets, positions and tensors.
+
+Each vertex has its distance and slope from the corners of one facet: y_v = F_v(y_corners, positions, tensors). The
+answer is the fixed point y = F(y) with the facets that the search chose. Its derivative goes by the adjoint: the
+transposed system (1 - dF/dy)^T x = g is solved once, and x times dF by positions and tensors is the gradient.
+
+dF is found by complex steps: F is analytic but for its clips, so that Im F(y + i h) / h with h = 1e-100 is exact to
+rounding. The place on the facet, where a function f is least, moves by -H^-1 times the change of its gradient.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from heat_igl.errors import real_numbers
+from heat_igl.operators import MetricSimplices
+from heat_igl.sources import SourceSet
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+
+__all__ = ["FixedPointDerivative", "SimplexDerivative"]
+
+# A complex step, whose square is no double.
+_STEP = 1e-100
+# Steps of Newton's methods, and the relative change at which they end.
+_MOST_STEPS, _SETTLED = 12, 1e-12
+# Where the fixed point is farther away than this share of a distance, the search had not settled, and the derivative is
+# that at what it found. From the second share on, a distance is another than the engine gives.
+_UNSETTLED, _SAME = 1e-2, 1e-3
+# A share of a corner that is rounding.
+_ROUNDING = 1e-9
+# Squared volume of a flat tetrahedron, as in `heat_igl.kernels.sweep.facets`.
+_FLAT = 1e-4
+
+
+class _Inputs(NamedTuple):
+    """What the values of k vertices are found from.
+
+    Attributes
+    ----------
+    distance, slope : (k, p) float64, (k, p, 3) float64
+        At the corners of the facet.
+    X : (k, p + 1, 3) float64
+        Positions of the vertex and of the corners.
+    tensors : (k, q, 3, 3) float64
+        The metric, or those at the vertex and the corners.
+    start : (k,) float64
+        The least offset of the sources of the corners.
+    """
+
+    distance: AnyArray
+    slope: AnyArray
+    X: AnyArray
+    tensors: AnyArray
+    start: AnyArray
+
+
+class _FacetUpdate:
+    """The second-order update of k vertices, each through its own facet, with a derivative by everything.
+
+    Parameters
+    ----------
+    is_sloped : (k, p) bool
+        Whether the slope at a corner is known.
+    same : (k, p, p) bool
+        Whether two corners have their distance from one source.
+    share : (k, p) float64
+        The place on the facet; corners of share 0 keep it.
+    """
+
+    def __init__(self, is_sloped: BoolArray, same: BoolArray, share: FloatArray) -> None:
+        self._is_sloped, self._same = is_sloped, same & is_sloped[:, :, None] & is_sloped[:, None]
+        self.share = share.copy()
+
+    def place(self, at: _Inputs) -> None:
+        """Move the places to where values are least, by Newton's method; shares that come to 0 stay."""
+        p = self.share.shape[1]
+        M = np.zeros((len(self.share), p + 1, p + 1))
+        for _ in range(_MOST_STEPS):
+            stays = self.share < _ROUNDING
+            self.share[stays] = 0.0
+            self.share /= self.share.sum(axis=1, keepdims=True)
+            self._is_corner = (~stays).sum(axis=1) == 1
+            for i in range(p):
+                M[:, :p, i] = np.imag(self._gradient(at, self.share + 1j * _STEP * np.eye(p)[i])) / _STEP
+            # The shares sum to 1.
+            M[:, p, :p] = M[:, :p, p] = 1
+            M[:, :p] = np.where(stays[:, :, None], np.eye(p, p + 1), M[:, :p])
+            self._moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -np.linalg.inv(M)[:, :p, :p])
+            step = np.einsum("kij,kj->ki", self._moves, self._gradient(at, self.share))
+            # Not beyond an edge of the facet.
+            room = np.min(np.where(step < 0, -self.share / np.minimum(step, -1e-300), 1.0), axis=1)
+            self.share += np.minimum(room, 1.0)[:, None] * step
+            if np.abs(step).max() < _SETTLED:
+                break
+
+    def values(self, at: _Inputs) -> AnyArray:
+        """The distance and slope (k, 4) of the vertices; from complex inputs, with what the places move."""
+        share = self.share
+        change = np.imag(self._gradient(at, share))
+        if change.any():
+            share = share + 1j * np.einsum("kij,kj->ki", self._moves, change)
+        T, length, _, lean = self._value(at, share)
+        e = at.X[:, 1:] - at.X[:, :1]
+        slope = np.einsum("kpx,kpq,kq->kx", e, np.linalg.inv(e @ np.swapaxes(e, 1, 2)), lean)
+        return np.concatenate([(at.start + T + length)[:, None], slope], axis=1)
+
+    def _gradient(self, at: _Inputs, x: AnyArray) -> AnyArray:
+        return self._value(at, x)[2]
+
+    def _value(self, at: _Inputs, x: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray, AnyArray]:
+        """T and the length at shares x (k, p), the gradient of their sum by x, and what the length gains by moving.
+
+        As `Facet.value` and `Facet.length`; the last is for the vertex moved towards each corner.
+        """
+        D = at.distance - at.start[:, None]
+        e = at.X[:, 1:] - at.X[:, :1]
+        product = np.einsum("kix,kqxy,kjy->kqij", e, at.tensors, e, optimize=True)
+        hang = 0.5 * np.einsum("kij,kj->ki", self._sag(at, D, e, product), x)
+        mean = (x * D).sum(axis=1)
+        # At a corner T is its distance; that of a source is 0, where the square has no root to derive.
+        T = np.where(self._is_corner, mean, np.sqrt(np.where(self._is_corner, 1.0, mean**2 - (x * hang).sum(axis=1))))
+        to_T = np.where(self._is_corner[:, None], D, (mean[:, None] * D - hang) / np.where(T == 0, 1, T)[:, None])
+        by = np.einsum("kqij,kj->kqi", product, x)
+        square = np.einsum("kqi,ki->kq", by, x)
+        near = np.sqrt(square[:, 0])
+        if product.shape[1] == 1:
+            g = by[:, 0] / near[:, None]
+            return T, near, to_T + g, -g
+        by *= 2 / square[..., None]
+        level = np.log(square[:, 1:])
+        far = np.exp(0.5 * (x * level).sum(axis=1))
+        middle = 4 * np.sqrt(near * far)
+        a, b = (near + 0.5 * middle)[:, None] / 12, (far + 0.5 * middle)[:, None] / 12
+        bent = np.einsum("kj,kji->ki", x, by[:, 1:])
+        lean = a * (level - np.log(square[:, :1]) - by[:, 0]) - b * bent
+        return T, (near + middle + far) / 6, to_T + a * by[:, 0] + b * (level + bent), lean
+
+    def _sag(self, at: _Inputs, D: AnyArray, e: AnyArray, product: AnyArray) -> AnyArray:
+        """By how much squared distance sags between two corners (k, p, p), as `HopfLax.sag_between`."""
+        k, p = D.shape
+        metric = product if product.shape[1] == 1 else product[:, 1:]
+        w = np.einsum("kix,kjx->kij", at.slope, e)
+        square = np.einsum("kij,kijl,kil->ki", w, np.linalg.inv(np.broadcast_to(metric, (k, p, p, p))), w)
+        is_known = self._is_sloped & (np.real(square) > 0)
+        trust = _larger(1 - np.log(np.where(is_known, square, 1.0)) ** 2, 0.0) * is_known
+        flat = np.zeros(k, bool)
+        if p == 3:
+            own = np.real(product[:, 0])
+            flat = np.linalg.det(own) < _FLAT * np.einsum("kii->ki", own).prod(axis=1)
+        result = np.zeros((k, p, p), D.dtype if np.iscomplexobj(D) else np.result_type(D, w, product))
+        for i in range(p):
+            for j in range(i):
+                Di, Dj = D[:, i], D[:, j]
+                at_i, at_j = 2 * Di * (w[:, i, j] - w[:, i, i]), 2 * Dj * (w[:, j, j] - w[:, j, i])
+                rise, more = Dj**2 - Di**2, trust[:, i] - trust[:, j]
+                up = np.real(rise) > 0
+                other_j, other_i = 2 * rise - at_i, 2 * rise - at_j
+                other_j, other_i = np.where(up, other_j, -_larger(-other_j, 0)), other_i
+                down = np.real(rise) < 0
+                other_i = np.where(down, other_i, _larger(other_i, 0))
+                i_is_better = np.real(more) > 0
+                at_j, at_i = (
+                    at_j + np.where(i_is_better, more * (other_j - at_j), 0),
+                    at_i - np.where(i_is_better, 0, more * (other_i - at_i)),
+                )
+                level = (Dj - Di) ** 2
+                sag, doubt = 0.5 * (at_j - at_i) - level, rise - 0.5 * (at_i + at_j)
+                doubted = np.abs(np.real(doubt)) >= np.abs(np.real(sag))
+                ratio = doubt / np.where(np.real(sag) == 0, 1, sag)
+                share = _larger(_size(ratio), 1 - _smaller(trust[:, i], trust[:, j]))
+                sag = sag - _size(doubt) * share * np.sign(np.real(sag))
+                edge = [metric[:, m % metric.shape[1]] for m in (i, j)]
+                from_i, from_j = (
+                    2 * d * np.sqrt(g[:, i, i] + g[:, j, j] - 2 * g[:, i, j])
+                    for d, g in zip((Di, Dj), edge, strict=True)
+                )
+                sag = _smaller(sag, _smaller(rise + from_i, from_j - rise) - level)
+                sag = _larger(sag, _larger(rise - from_i, -from_j - rise) - level)
+                result[:, i, j] = result[:, j, i] = np.where(doubted | flat | ~self._same[:, i, j], 0, sag)
+        return result
+
+
+def _size(x: AnyArray) -> AnyArray:
+    """|x| of real parts, with its derivative."""
+    return np.where(np.real(x) < 0, -x, x)
+
+
+def _larger(x: AnyArray, y: Any) -> AnyArray:
+    """The larger by real parts; the first of equal ones, whatever their rounding."""
+    a, b = np.real(x), np.real(y)
+    return np.where(a >= b - 1e-12 * np.abs(b), x, y)
+
+
+def _smaller(x: AnyArray, y: AnyArray) -> AnyArray:
+    return -_larger(-x, -y)
+
+
+class SimplexDerivative(ABC):
+    """The derivative of one distance through simplices: called with a gradient, it returns that by the positions.
+
+    Where the way is not unique, the one that was found decides.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        What is differentiated.
+    unreachable : (k,) int64
+        Vertices at distance ``inf``. Their derivative is 0.
+    inexact : (k,) int64
+        Vertices whose derivative is that of another distance than the engine gives.
+    """
+
+    distance: FloatArray
+    inexact: IntArray
+
+    def __init__(self, simplices: MetricSimplices, sources: SourceSet) -> None:
+        self._simplices, self._sources = simplices, sources
+
+    @property
+    def unreachable(self) -> IntArray:
+        """Vertices at distance ``inf``."""
+        return np.flatnonzero(np.isinf(self.distance))
+
+    def __call__(self, g: ArrayLike) -> FloatArray:
+        """The gradient (n, 3), or (k, n, 3), by positions, for g (n,) or (k, n) by distances; tensors stay.
+
+        Raises
+        ------
+        ValueError
+            If g has another shape or is not finite at a reachable vertex, or if distance is found with other tensors
+            than those that were given: tensors per tetrahedron that are samples of a smooth field, those of triangles,
+            and one for all tetrahedra. Give the metric at the vertices then.
+        """
+        rows = gradient_rows(g, self.distance)
+        self._require_given()
+        result = self._by_positions(rows)
+        return result if np.ndim(g) == 2 else result[0]
+
+    def by_offsets(self, g: ArrayLike) -> FloatArray:
+        """The gradient (s,) by the offset of each source, as they were listed; `g` (n,) as for a call."""
+        (row,), sources = gradient_rows(g, self.distance, 1), self._sources
+        return np.asarray(np.bincount(sources.vertex_label, self._by_starts(row), sources.n_labels), np.float64)
+
+    def push_forward(self, dV: ArrayLike) -> FloatArray:
+        """How the distances (n,) change when the vertices move by dV (n, 3), and tensors stay; 0 where unreachable."""
+        moved = real_numbers("dV", dV)
+        if moved.shape != (self._simplices.n, 3) or not np.isfinite(moved).all():
+            raise ValueError(f"dV must be ({self._simplices.n}, 3) finite numbers, not of shape {moved.shape}")
+        self._require_given()
+        return self._moved(moved)
+
+    def _require_given(self) -> None:
+        if not self._simplices.is_given:
+            raise ValueError(
+                "distance is found with other tensors than those that were given, so that it has derivatives by "
+                "offsets alone: give metric_operators the metric at the vertices, (n, 3, 3)"
+            )
+
+    @abstractmethod
+    def _by_positions(self, rows: FloatArray) -> FloatArray:
+        """The gradients (k, n, 3) by positions, for checked ones (k, n)."""
+
+    @abstractmethod
+    def _by_starts(self, row: FloatArray) -> FloatArray:
+        """The gradient (s,) by the offset of each source vertex, for a checked one (n,)."""
+
+    @abstractmethod
+    def _moved(self, dV: FloatArray) -> FloatArray:
+        """How the distances (n,) change when the vertices move by dV (n, 3)."""
+
+
+class FixedPointDerivative(SimplexDerivative):
+    """The derivative of distance by the Hopf-Lax formula, each vertex through the facet that was chosen.
+
+    `distance` is the fixed point of the updates to rounding, and the engine ends once distances change by less than
+    1e-4. `inexact` are the vertices at which bounds, or a search that has not settled, give another distance by more
+    than a thousandth.
+
+    Parameters
+    ----------
+    simplices : MetricSimplices
+        With tensors.
+    sources : SourceSet
+        Vertices.
+    answer : (n,) float64
+        The distance that the engine gives.
+    distance, label, facet, place, slope, is_sloped
+        What `HopfLax` found before bounds were kept.
+    """
+
+    def __init__(
+        self,
+        simplices: MetricSimplices,
+        sources: SourceSet,
+        answer: FloatArray,
+        distance: FloatArray,
+        label: IntArray,
+        facet: IntArray,
+        place: FloatArray,
+        slope: FloatArray,
+        is_sloped: AnyArray,
+    ) -> None:
+        super().__init__(simplices, sources)
+        n = simplices.n
+        size = simplices.corners.shape[1]
+        others = np.array([[j for j in range(size) if j != c] for c in range(size)])
+        v = np.flatnonzero(facet >= 0)
+        self._simplex, corner = np.divmod(facet[v], size)
+        self._corner = np.concatenate([corner[:, None], others[corner]], axis=1)
+        # The vertex, and the corners of its facet.
+        self._vertices = simplices.corners[self._simplex[:, None], self._corner]
+        labels = label[self._vertices[:, 1:]]
+        self._first = np.take_along_axis(labels, sources.vertex_offset[labels].argmin(axis=1)[:, None], axis=1)[:, 0]
+        same = labels[:, :, None] == labels[:, None]
+        self._update = _FacetUpdate(is_sloped[self._vertices[:, 1:]].astype(bool), same, place[v])
+        self._rank = np.empty(n, np.int64)
+        self._rank[np.argsort(distance, kind="stable")] = np.arange(n)
+        self._state = np.concatenate([distance[:, None], slope], axis=1)
+        found = self._state
+        for _ in range(_MOST_STEPS):
+            change = self._linearized()
+            self._state = self._state + change
+            if (np.abs(change[:, 0]) <= _SETTLED * distance).all():
+                break
+        with np.errstate(invalid="ignore"):
+            off = np.abs(self._state - found)[:, 0] > _UNSETTLED * distance
+            if off.any():
+                self._state = found
+                off = np.abs(self._linearized()[:, 0]) > _SAME * distance
+            self.distance = self._state[:, 0].copy()
+            self.inexact = np.flatnonzero(off | (np.abs(self.distance - answer) > _SAME * answer))
+
+    def _linearized(self) -> FloatArray:
+        """Derive the updates at the state, and return the step of Newton's method (n, 4) to the fixed point."""
+        self._at = self._inputs()
+        self._update.place(self._at)
+        self._factor = self._factored()
+        rest = np.zeros_like(self._state)
+        rest[self._vertices[:, 0]] = self._update.values(self._at) - self._state[self._vertices[:, 0]]
+        return self._solved(rest)
+
+    def _by_positions(self, rows: FloatArray) -> FloatArray:
+        adjoint = np.stack([self._adjoint(row) for row in rows])
+        result = np.zeros((*adjoint.shape[:2], 3))
+        for (i, x), by in self._derivatives("X"):
+            for into, row in zip(result, adjoint, strict=True):
+                into[:, x] += self._summed(self._vertices[:, i], row, by, len(into))
+        return result
+
+    def _by_starts(self, row: FloatArray) -> FloatArray:
+        adjoint, vertices = self._adjoint(row), self._sources.vertices
+        ((_, by),) = self._derivatives("start")
+        return np.asarray(adjoint[vertices, 0] + self._summed(self._first, adjoint, by, len(vertices)))
+
+    def by_metric(self, g: ArrayLike) -> FloatArray:
+        """The gradient (n, 3, 3) or (m, 3, 3) by the tensors given to `metric_operators`; `g` (n,) as for a call.
+
+        Raises
+        ------
+        ValueError
+            As for a call.
+        """
+        (row,) = map(self._adjoint, gradient_rows(g, self.distance, 1))
+        self._require_given()
+        simplices = self._simplices
+        is_at_vertices = self._at.tensors.shape[1] > 1
+        result = np.zeros((simplices.n if is_at_vertices else len(simplices.corners), 3, 3))
+        for (i, x, y), by in self._derivatives("tensors"):
+            where = self._vertices[:, i] if is_at_vertices else self._simplex
+            result[:, x, y] += self._summed(where, row, by, len(result))
+        return (result + np.swapaxes(result, 1, 2)) / 2
+
+    def by_speed(self, g: ArrayLike) -> FloatArray:
+        """The gradient (m,) by the speeds given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
+        by_metric, tensors = self.by_metric(g), self._simplices.tensors
+        if tensors is None or tensors.shape[1] > 1:
+            raise ValueError("the solver knows no speeds, but a metric at the vertices: use by_metric")
+        return np.asarray(-2 * np.trace(by_metric, axis1=1, axis2=2) * tensors[:, 0, 0, 0] ** 1.5)
+
+    def _moved(self, dV: FloatArray) -> FloatArray:
+        change = np.zeros_like(self._state)
+        for (i, x), by in self._derivatives("X"):
+            change[self._vertices[:, 0]] += by * dV[self._vertices[:, i], x][:, None]
+        return np.asarray(self._solved(change)[:, 0])
+
+    def _summed(self, where: IntArray, row: FloatArray, by: FloatArray, size: int) -> FloatArray:
+        """The adjoint `row` (n, 4) times the derivatives (k, 4), added up by entry (k,) of an input."""
+        return np.asarray(np.bincount(where, (row[self._vertices[:, 0]] * by).sum(axis=1), size), np.float64)
+
+    def _inputs(self) -> _Inputs:
+        simplices, facet, distance = self._simplices, self._vertices[:, 1:], self._state[:, 0]
+        tensors, place = simplices.tensors, simplices.place
+        if tensors is None or place is None:
+            raise ValueError("these simplices have lengths, and no tensors")
+        tensors = tensors[self._simplex]
+        if tensors.shape[1] > 1:
+            tensors = np.take_along_axis(tensors, self._corner[:, :, None, None], axis=1)
+        start = self._sources.vertex_offset[self._first]
+        return _Inputs(distance[facet], self._state[facet, 1:], place[self._vertices], tensors, start)
+
+    def _derivatives(self, name: str) -> Iterator[tuple[tuple[int, ...], FloatArray]]:
+        """For each entry of an input, its index and the derivative (k, 4) of distances and slopes by it."""
+        given = getattr(self._at, name)
+        for entry in np.ndindex(given.shape[1:]):
+            moved = given.astype(complex)
+            moved[(slice(None), *entry)] += 1j * _STEP
+            yield entry, np.imag(self._update.values(self._at._replace(**{name: moved}))) / _STEP
+
+    def _factored(self) -> Any:
+        """The factors of 1 - dF/dy; vertices from near to far, where the matrix is nearly triangular."""
+        row, column, value = [np.arange(self._state.size)], [np.arange(self._state.size)], [np.ones(self._state.size)]
+        for name in ("distance", "slope"):
+            for (i, *x), by in self._derivatives(name):
+                row.append((4 * self._rank[self._vertices[:, :1]] + np.arange(4)).ravel())
+                column.append(np.repeat(4 * self._rank[self._vertices[:, i + 1]] + (1 + x[0] if x else 0), 4))
+                value.append(-by.ravel())
+        A = sp.csc_array((np.concatenate(value), (np.concatenate(row), np.concatenate(column))))
+        return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0)
+
+    def _solved(self, right: FloatArray, way: str = "N") -> FloatArray:
+        ordered = np.empty_like(right)
+        ordered[self._rank] = right
+        return np.asarray(self._factor.solve(ordered.ravel(), way).reshape(-1, 4)[self._rank])
+
+    def _adjoint(self, row: FloatArray) -> FloatArray:
+        """The derivative (n, 4) by what each update adds to distances and slopes, from that by distances (n,)."""
+        return self._solved(np.pad(row[:, None], ((0, 0), (0, 3))), "T")
+
+
+def gradient_rows(g: ArrayLike, distance: FloatArray, most: int = 2) -> FloatArray:
+    """The derivatives of functions by distances (n,), checked, as rows (k, n), 0 at unreachable vertices.
+
+    Raises
+    ------
+    ValueError
+        If `g` has another shape than (n,), or (k, n) if `most` is 2, or is not finite at a reachable vertex.
+    """
+    array = real_numbers("g", g)
+    n = len(distance)
+    if not 1 <= array.ndim <= most or array.shape[-1] != n:
+        also = f" or (k, {n})" if most == 2 else ""
+        raise ValueError(f"g must have shape ({n},){also}, one entry per vertex, but it has shape {array.shape}")
+    rows = np.array(array.reshape(-1, n))
+    rows[:, np.isinf(distance)] = 0.0
+    if not np.isfinite(rows).all():
+        row, vertex = np.argwhere(~np.isfinite(rows))[0]
+        raise ValueError(f"g must be finite at reachable vertices, but is {rows[row, vertex]} at vertex {vertex}")
+    return rows
