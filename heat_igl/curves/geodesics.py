@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.curves.places import Waypoints, corners, mixed_places
 from heat_igl.curves.routes import Router
-from heat_igl.curves.shortening import Course, Shortened, Shortener, as_curve, course_of
+from heat_igl.curves.shortening import FaceSequence, Shortened, Shortener, as_curve, course_of
 from heat_igl.errors import MeshError, SourceError, names_guessed, truth
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import FloatArray, IntArray
@@ -188,9 +188,9 @@ class GeodesicPathSolver:
             self._router = Router(self._mesh, self._shortener.faces)
         return self._router
 
-    def _loop(self, legs: list[Course]) -> SurfaceCurve:
+    def _loop(self, legs: list[FaceSequence]) -> SurfaceCurve:
         """The closed geodesic of the loop that these legs make."""
-        loop = Course(
+        loop = FaceSequence(
             np.concatenate([leg.faces[:-1] for leg in legs]),
             np.concatenate([leg.joins for leg in legs]),
             legs[0].ends[[0, 0]],

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.curves.shortening import Course
+from heat_igl.curves.shortening import FaceSequence
 from heat_igl.errors import SourceError
 from heat_igl.kernels.paths import routes
 from heat_igl.mesh import Mesh
@@ -25,7 +25,7 @@ class Router:
         self._mesh = mesh
         self._routes = kernel.EdgeRoutes(faces, mesh.V)
 
-    def legs(self, faces: IntArray, barycentric: FloatArray) -> list[Course]:
+    def legs(self, faces: IntArray, barycentric: FloatArray) -> list[FaceSequence]:
         """The k - 1 courses between places (k,), each from one to the next.
 
         Raises
@@ -39,7 +39,7 @@ class Router:
             joins = np.full((len(vertices), 3), -1, np.int32)
             joins[:, 2] = vertices
             ends = faces[i : i + 2].astype(np.int32)
-            found.append(Course(np.concatenate([ends[:1], between, ends[1:]]), joins, barycentric[i : i + 2]))
+            found.append(FaceSequence(np.concatenate([ends[:1], between, ends[1:]]), joins, barycentric[i : i + 2]))
         return found
 
     def _leg(self, faces: IntArray, barycentric: FloatArray, i: int) -> tuple[AnyArray, AnyArray]:

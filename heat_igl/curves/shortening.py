@@ -10,7 +10,7 @@ import numpy as np
 
 from heat_igl.curves.places import snapped
 from heat_igl.errors import SourceError
-from heat_igl.intrinsic import corner_angles
+from heat_igl.intrinsic import HalfEdges, corner_angles
 from heat_igl.kernels.mesh import polar_angles
 from heat_igl.kernels.paths import shortening, strips
 from heat_igl.mesh import Mesh, SurfaceCurve, is_oriented_manifold
@@ -18,7 +18,7 @@ from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Course", "Shortened", "Shortener", "as_curve", "course_of"]
+__all__ = ["FaceSequence", "Shortened", "Shortener", "as_curve", "course_of"]
 
 # The compiled modules, whose signatures are those of Cython.
 kernel: Any = shortening
@@ -28,13 +28,13 @@ _SHORTEST = 1e-12
 # Of each face the edge `length` opposite each corner, the `angle` at each, `vertex` and `edge` numbers. Corner c lies
 # `along` of the way from corner c + 2 to c + 1, and `above` this edge, in lengths of the edge.
 _FACE = np.dtype(
-    [*((name, "f8", 3) for name in ("length", "angle", "along", "above")), ("vertex", "i4", 3), ("edge", "i4", 3)]
+    [*((name, "f8", 3) for name in ("length", "angle", "along", "above")), ("vertex", "i4", 3)], align=True
 )
 # Segments are joined if their ends are no farther apart than this, in mean edge lengths.
 _GAP = 1e-6
 
 
-class Course(NamedTuple):
+class FaceSequence(NamedTuple):
     """The faces that a curve runs through, one after another.
 
     Attributes
@@ -62,7 +62,7 @@ class Shortened(NamedTuple):
     points: FloatArray
 
 
-def course_of(mesh: Mesh, curve: SurfaceCurve) -> Course:
+def course_of(mesh: Mesh, curve: SurfaceCurve) -> FaceSequence:
     """The course of a curve, whose segments are checked to be joined.
 
     Raises
@@ -93,7 +93,7 @@ def course_of(mesh: Mesh, curve: SurfaceCurve) -> Course:
             "must start where the one before it ends"
         )
     first = snapped(curve.start[:1])[0]
-    return Course(faces.astype(np.int32), joins, np.stack([first, first if curve.is_closed else end[-1]]))
+    return FaceSequence(faces.astype(np.int32), joins, np.stack([first, first if curve.is_closed else end[-1]]))
 
 
 def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArray, FloatArray]:
@@ -130,9 +130,9 @@ class Shortener:
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
         face, edge = _faces(mesh), mesh.facets
-        first_side, side = (rows.astype(np.int32) for rows in group_by_label(edge.of_face.ravel(), len(edge.n_faces)))
+        edges, _ = HalfEdges.of_mesh(mesh)
         first_corner, corner = (rows.astype(np.int32) for rows in group_by_label(mesh.F.ravel(), mesh.n_vertices))
-        self.faces = tables.FaceTable(face, first_side, side, first_corner, corner)
+        self.faces = tables.FaceTable(face, edges, first_corner, corner)
         sums = np.bincount(mesh.F.ravel(), face["angle"].ravel(), mesh.n_vertices)
         # At a vertex with angles of 2 pi or more, and on the boundary, at most one side is locally shortest. On edges
         # of more than two faces there are more than two sides.
@@ -140,14 +140,11 @@ class Shortener:
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
         directions = np.empty(0), np.empty(0), np.empty(0, np.int32)
         if edge.n_faces.max() <= 2 and is_oriented_manifold(mesh):
-            opposite = np.full(len(side), -1, np.int32)
-            inner = first_side[:-1][edge.n_faces == 2]
-            opposite[side[inner]], opposite[side[inner + 1]] = side[inner + 1], side[inner]
             first = np.where(np.diff(first_corner) > 0, corner[np.minimum(first_corner[:-1], len(corner) - 1)], -1)
-            directions = *_directions(face["angle"].ravel(), opposite, first), opposite
+            directions = *_directions(face["angle"].ravel(), edges.twin, first), edges.twin
         self._kernel = kernel.Shortener(self.faces, half_turn, int(np.diff(first_corner).max()), directions)
 
-    def shortest(self, course: Course, *, is_closed: bool = False) -> Shortened:
+    def shortest(self, course: FaceSequence, *, is_closed: bool = False) -> Shortened:
         """The locally shortest curve of the class of a course: between the ends, or as a loop."""
         faces, joins, ends = course
         stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed)
@@ -172,7 +169,7 @@ def _faces(mesh: Mesh) -> AnyArray:
     # By Heron's formula. `left` is the side from corner c to corner c + 2.
     face["along"] = ((left - right) * (left + right) / base + base) / (2 * base)
     face["above"] = 2 * np.sqrt(np.maximum(half * (half - base) * (half - left) * (half - right), 0)) / base**2
-    face["vertex"], face["edge"] = mesh.F, mesh.facets.of_face
+    face["vertex"] = mesh.F
     return face
 
 

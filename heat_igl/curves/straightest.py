@@ -148,12 +148,16 @@ class _Starts(NamedTuple):
 
 
 class _Ends(NamedTuple):
-    """Ends of k geodesics: faces and barycentric coordinates, the lengths, and the number of segments of each."""
+    """Ends of k geodesics: faces and barycentric coordinates, and the lengths."""
 
     faces: IntArray
     barycentric: FloatArray
     lengths: FloatArray
-    counts: IntArray
+
+    @classmethod
+    def of(cls, k: int) -> _Ends:
+        """Room for k geodesics."""
+        return cls(np.empty(k, np.int64), np.empty((k, 3)), np.empty(k))
 
 
 class Tracer:
@@ -260,12 +264,11 @@ class Tracer:
     def ends(self, starts: _Starts, turn: FloatArray, lengths: FloatArray) -> _Ends:
         """Trace geodesics for their ends, on all processors."""
         k = len(turn)
-        found = _Ends(np.empty(k, np.int64), np.empty((k, 3)), np.empty(k), np.empty(k, np.int64))
-        none = np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2, 3))
+        found = _Ends.of(k)
 
         def work(part: slice) -> None:
             given = (starts.faces[part], starts.barycentric[part], turn[part], lengths[part])
-            kernel.trace(self._triangles, *given, *(field[part] for field in found), *none)
+            kernel.trace(self._triangles, *given, *(field[part] for field in found))
 
         threads = n_threads() if k >= _FEW else 1
         bounds = np.linspace(0, k, threads + 1).astype(int)
@@ -275,12 +278,9 @@ class Tracer:
         return found._replace(faces=faces, barycentric=barycentric)
 
     def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:
-        """Trace one geodesic, twice: for the number of segments, then to store them."""
-        found = self.ends(start, turn, length)
-        n = int(found.counts[0])
-        faces, points = np.empty(n, np.int64), np.empty((n, 2, 3))
+        """Trace one geodesic."""
         given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
-        kernel.trace(self._triangles, *given, *found, np.zeros(1, np.int64), faces, points)
+        faces, points = kernel.trace(self._triangles, *given, *_Ends.of(1), True)
         faces, points = on_one_side(faces, points, self._mesh.n_faces)
         return SurfaceCurve(faces, points[:, 0], points[:, 1], mesh=self._mesh)
 

@@ -23,7 +23,7 @@ cdef struct Location:
     double u, v, w
 
 # The straight walk in the plane of the first face: from, to, and the difference.
-cdef struct Ray:
+cdef struct Walk:
     double ox, oy, tx, ty, dx, dy
 
 # The side by which the walk leaves a face: the half-edge, and the ends of it to the right (r) and left (s) of the ray.
@@ -64,4 +64,4 @@ cdef class _Refinement:
 
 cdef void _find_sharp(GrowingTriangulation t, unsigned char[::1] seen, unsigned char[::1] is_sharp) noexcept nogil
 cdef Location _circumcenter(GrowingTriangulation t, long long f) noexcept nogil
-cdef Location _walk(GrowingTriangulation t, Ray ray, Exit way) noexcept nogil
+cdef Location _walk(GrowingTriangulation t, Walk ray, Exit way) noexcept nogil

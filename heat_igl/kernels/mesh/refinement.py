@@ -15,7 +15,7 @@ from cython.cimports.heat_igl.kernels.mesh.refinement import (
     SPLIT,
     Exit,
     Location,
-    Ray,
+    Walk,
 )
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
@@ -321,7 +321,7 @@ def _circumcenter(t: GrowingTriangulation, f: cython.longlong) -> Location:
     py: cython.double[3]
     px[0], py[0], px[1], py[1] = 0.0, 0.0, c, 0.0
     px[2], py[2] = foot(c, b, a), 2.0 * area(a, b, c) / c
-    ray: Ray
+    ray: Walk
     ray.ox, ray.oy = (c + px[2]) / 3.0, py[2] / 3.0
     ray.tx, ray.ty = v * c + w * px[2], w * py[2]
     ray.dx, ray.dy = ray.tx - ray.ox, ray.ty - ray.oy
@@ -341,7 +341,7 @@ def _circumcenter(t: GrowingTriangulation, f: cython.longlong) -> Location:
     return _walk(t, ray, Exit(3 * f + side, px[i], py[i], px[j], py[j]))
 
 
-def _walk(t: GrowingTriangulation, ray: Ray, way: Exit) -> Location:
+def _walk(t: GrowingTriangulation, ray: Walk, way: Exit) -> Location:
     """Locate the end of a ray that leaves a face, by unfolding the faces that it crosses into the plane."""
     for _ in range(MOST_STEPS):
         h: cython.longlong = t.twin[way.h]

@@ -7,7 +7,7 @@ distance is needed. `heat_igl.curves.shortening` and `.straightest` make the arg
    begins as it is.
 2. `strips`: the faces that a curve runs through make a strip; where it passes a vertex, the strip is led around it the
    shorter way (`Detour`). Laid out in the plane, the strip is a polygon, in which a funnel finds the shortest path
-   (`Layout`).
+   (`Funnel`).
 3. `straightening`: where that path bends at a vertex with an angle below pi on another side, the strip is led there and
    step 2 is repeated until there is no such bend (`Course`). Vertices with less than 2 pi can be passed on both sides:
    the other side is tried, and kept if the path becomes shorter (`Passing`).

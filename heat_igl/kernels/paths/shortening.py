@@ -180,7 +180,7 @@ class Polyline:
 
     def read(self) -> cython.bint:
         """Take the base of the loop of a course, a vertex, and the bends as joints; False if there are no bends."""
-        n: cython.int = self.course.layout.n_bends - 1
+        n: cython.int = self.course.funnel.n_bends - 1
         i: cython.int
         after: cython.int
         if n < 2:
@@ -189,12 +189,12 @@ class Polyline:
         # Joint 0 is the base, and joint i is at bend i.
         self.joints.make(self.course.vertex)
         for i in range(1, n):
-            bend = cython.address(self.course.layout.bend[i])
-            self.joints.make(self.course.layout.gate[bend.last].vertex[bend.side])
+            bend = cython.address(self.course.funnel.bend[i])
+            self.joints.make(self.course.funnel.gate[bend.last].vertex[bend.side])
         for i in range(n):
-            bend = cython.address(self.course.layout.bend[i])
+            bend = cython.address(self.course.funnel.bend[i])
             self.begin(i, self.course.strip.crossing[bend.last].enter // 3 if i > 0 else self.course.face)
-            self.part.strip.extend(self.course.strip.crossing, bend.last + 1, self.course.layout.bend[i + 1].first)
+            self.part.strip.extend(self.course.strip.crossing, bend.last + 1, self.course.funnel.bend[i + 1].first)
             after = i + 1 if i < n - 1 else 0
             if not self.lay_out(after) > 0.0:
                 return False
@@ -236,7 +236,7 @@ class Polyline:
             return 1
         if not length < (before.length + joint.length) * (1.0 - GAIN_OF_PART):
             return 0
-        if self.part.layout.n_bends - 2 > self.joints.n_free:
+        if self.part.funnel.n_bends - 2 > self.joints.n_free:
             return 0
         self.joints.remove(k)
         self.link(p, q)
@@ -281,13 +281,13 @@ class Polyline:
 
     def link(self, a: cython.int, b: cython.int) -> cython.int:
         """Make the path that is laid out the way from joint a to joint b, with new joints at the bends."""
-        n: cython.int = self.part.layout.n_bends
+        n: cython.int = self.part.funnel.n_bends
         begin: cython.int = 0
         f: cython.int = self.part.face
         i: cython.int
         for i in range(1, n):
-            bend = cython.address(self.part.layout.bend[i])
-            k: cython.int = b if i == n - 1 else self.joints.make(self.part.layout.gate[bend.last].vertex[bend.side])
+            bend = cython.address(self.part.funnel.bend[i])
+            k: cython.int = b if i == n - 1 else self.joints.make(self.part.funnel.gate[bend.last].vertex[bend.side])
             self.joints.joint[a].after, self.joints.joint[k].before = k, a
             self.set_part(a, f, begin, bend.first, i)
             if i < n - 1:
@@ -298,8 +298,8 @@ class Polyline:
     def set_part(self, a: cython.int, f: cython.int, begin: cython.int, end: cython.int, i: cython.int) -> cython.int:
         """Make the part after joint a the line to bend i of the layout: crossings `begin` to `end`, out of face f."""
         joint = cython.address(self.joints.joint[a])
-        p = cython.address(self.part.layout.bend[i - 1])
-        q = cython.address(self.part.layout.bend[i])
+        p = cython.address(self.part.funnel.bend[i - 1])
+        q = cython.address(self.part.funnel.bend[i])
         dx: cython.double = q.x - p.x
         dy: cython.double = q.y - p.y
         c: cython.int = corner_of(self.s, f, joint.vertex)
@@ -313,10 +313,10 @@ class Polyline:
             joint.arrive = self.polar[3 * f + e] + (0.0 if c == (e + 1) % 3 else t.angle[e])
             return 0
         # Seen from the start the right end of the first crossing is on the right, and from the end the left one.
-        gate = cython.address(self.part.layout.gate[begin])
+        gate = cython.address(self.part.funnel.gate[begin])
         angle: cython.double = _left_of(gate.x[1] - p.x, gate.y[1] - p.y, dx, dy)
         joint.leave = self.polar[3 * f + c] + min(angle, self.s.triangle[f].angle[c])
-        gate = cython.address(self.part.layout.gate[end - 1])
+        gate = cython.address(self.part.funnel.gate[end - 1])
         h: cython.int = self.part.strip.crossing[end - 1].enter
         angle = _left_of(gate.x[0] - q.x, gate.y[0] - q.y, -dx, -dy)
         joint.arrive = self.polar[h] + min(angle, self.s.triangle[h // 3].angle[h % 3])
@@ -361,7 +361,7 @@ class Loop:
         self.course.lay_out()
         if self.course.vertex < 0:
             # Joints are vertices.
-            if self.course.layout.n_bends == 2 or not self.move_base():
+            if self.course.funnel.n_bends == 2 or not self.move_base():
                 return 0
             self.course.lay_out()
         if self.polyline.read():
@@ -388,7 +388,7 @@ class Loop:
     def slide(self, length: cython.double) -> cython.double:
         """Move the base of a settled loop without a bend along the edge that it is on; returns the length."""
         side: cython.int = side_of(cython.address(self.course.start))
-        if self.course.vertex >= 0 or side < 0 or self.course.layout.n_bends > 2:
+        if self.course.vertex >= 0 or side < 0 or self.course.funnel.n_bends > 2:
             return length
         f: cython.int = self.course.face
         g: cython.int = self.course.last_face()
@@ -399,8 +399,8 @@ class Loop:
         b_end: cython.int = corner_of(self.course.s, g, t.vertex[b])
         if a_end < 0 or b_end < 0:
             return length
-        p = cython.address(self.course.layout.first)
-        q = cython.address(self.course.layout.last)
+        p = cython.address(self.course.funnel.first)
+        q = cython.address(self.course.funnel.last)
         # From the base to the end of the loop, as the base moves from a to b: d + share e.
         dx: cython.double = q.x[a_end] - p.x[a]
         dy: cython.double = q.y[a_end] - p.y[a]
@@ -450,17 +450,17 @@ class Loop:
 
     def move_base(self) -> cython.int:
         """Base the loop elsewhere: at the middle one of its bends, or else on the middle one of its edges."""
-        n_bends: cython.int = self.course.layout.n_bends
+        n_bends: cython.int = self.course.funnel.n_bends
         at: cython.int = self.course.strip.count // 2
         share: cython.double
         if n_bends > 2:
-            bend = cython.address(self.course.layout.bend[n_bends // 2])
+            bend = cython.address(self.course.funnel.bend[n_bends // 2])
             at = bend.first
             share = 1.0 - bend.side
         else:
-            share = self.course.layout.share(at, 1)
-        left: cython.int = self.course.layout.gate[at].vertex[0]
-        right: cython.int = self.course.layout.gate[at].vertex[1]
+            share = self.course.funnel.share(at, 1)
+        left: cython.int = self.course.funnel.gate[at].vertex[0]
+        right: cython.int = self.course.funnel.gate[at].vertex[1]
         if not self.close():
             return 0
         leave: cython.int = self.course.strip.crossing[at].leave
@@ -528,7 +528,7 @@ class Shortener:
                 else:
                     self.length += self.passing.improve(self.course.settle())
                 self.course.emit()
-        return stuck, self.length, *self.course.segments()
+        return stuck, self.length, *self.course.segments.arrays()
 
     def follow(
         self,
@@ -542,7 +542,7 @@ class Shortener:
         end: Place
         c: cython.int
         i: cython.int
-        self.course.n_segments = 0
+        self.course.segments.n = 0
         self.length = 0.0
         for c in range(3):
             start.c[c], end.c[c] = ends[0, c], ends[1, c]

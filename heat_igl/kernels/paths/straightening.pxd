@@ -1,4 +1,5 @@
-from heat_igl.kernels.paths.strips cimport Detour, Layout, Place, Strip, FaceTable
+from heat_igl.kernels.mesh.segments cimport Segments
+from heat_igl.kernels.paths.strips cimport Detour, FaceTable, Funnel, Place, Strip
 
 cdef extern from *:
     """
@@ -22,12 +23,6 @@ cdef enum:
     MOST_CHOICES = 64
     MOST_TRIED = 256
 
-# A part of a path that lies in one face, by barycentric coordinates.
-cdef struct Segment:
-    double start[3]
-    double end[3]
-    int face
-
 # A vertex to pass on the other side: the crossings at it, and the share of a squared length that this may save.
 cdef struct Choice:
     double saved
@@ -38,9 +33,8 @@ cdef class Course:
     cdef FaceTable s
     cdef Strip strip, straighter
     cdef Detour detour
-    cdef Layout layout
-    cdef Segment[::1] segment
-    cdef int n_segments
+    cdef Funnel funnel
+    cdef Segments segments
     cdef int face, vertex
     cdef Place start, end
 

@@ -7,6 +7,7 @@ such bend is left. At vertices with less than 2 pi both ways can be locally shor
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.mesh.segments import Segments
 from cython.cimports.heat_igl.kernels.paths.straightening import (
     GAIN,
     MARGIN_OF_TURN,
@@ -18,7 +19,7 @@ from cython.cimports.heat_igl.kernels.paths.straightening import (
 from cython.cimports.heat_igl.kernels.paths.strips import (
     Detour,
     FaceTable,
-    Layout,
+    Funnel,
     Place,
     Sides,
     Strip,
@@ -32,7 +33,6 @@ from cython.cimports.libc.math import INFINITY, M_PI, acos, atan2, cos, fabs, sq
 
 __all__ = ["Course", "Passing", "Saved"]
 
-_SEGMENT = np.dtype([("start", "f8", 3), ("end", "f8", 3), ("face", "i4")], align=True)
 _CHOICE = np.dtype([("saved", "f8"), ("vertex", "i4"), ("first", "i4"), ("last", "i4")], align=True)
 
 
@@ -46,13 +46,8 @@ class Course:
 
     def __init__(self, s: FaceTable, n_corners):
         self.s = s
-        self.strip, self.straighter, self.detour, self.layout = Strip(), Strip(), Detour(n_corners), Layout()
-        self.segment = np.empty(64, _SEGMENT)
-
-    def segments(self):
-        """Faces (k,) of all segments, and barycentric coordinates (k, 2, 3) of their starts and ends."""
-        some = self.segment.base[: self.n_segments]
-        return some["face"].astype(np.int64), np.stack([some["start"], some["end"]], axis=1)
+        self.strip, self.straighter, self.detour, self.funnel = Strip(), Strip(), Detour(n_corners), Funnel()
+        self.segments = Segments()
 
     def begin(self, face: cython.int, start: Place) -> cython.void:
         """Begin a strip."""
@@ -91,10 +86,10 @@ class Course:
     def lay_out(self) -> cython.double:
         """Find the shortest path in the strip as it is; returns the length."""
         self._trim()
-        self.layout.lay_out(self.s, self.face, cython.address(self.start), self.strip)
+        self.funnel.lay_out(self.s, self.face, cython.address(self.start), self.strip)
         end = cython.address(self.end)
-        self.layout.pull_tight(weighted(end, self.layout.last.x), weighted(end, self.layout.last.y))
-        return self.layout.length()
+        self.funnel.pull_tight(weighted(end, self.funnel.last.x), weighted(end, self.funnel.last.y))
+        return self.funnel.length()
 
     def _repair(self) -> cython.int:
         """Lead the strip the other way around the bends if that is shorter; 0 if there are none."""
@@ -102,8 +97,8 @@ class Course:
         copied: cython.int = 0
         has_changed: cython.bint = False
         i: cython.int
-        for i in range(1, self.layout.n_bends - 1):
-            bend = cython.address(self.layout.bend[i])
+        for i in range(1, self.funnel.n_bends - 1):
+            bend = cython.address(self.funnel.bend[i])
             # Two bends repaired at once must not share a face.
             if has_changed and bend.first <= copied:
                 continue
@@ -121,9 +116,9 @@ class Course:
 
     def _shorter_way(self, i: cython.int) -> cython.int:
         """Find a shorter way around the i-th bend; returns the number of crossings in ``detour.way``, -1 if none."""
-        bend = cython.address(self.layout.bend[i])
-        first = cython.address(self.layout.gate[bend.first])
-        last = cython.address(self.layout.gate[bend.last])
+        bend = cython.address(self.funnel.bend[i])
+        first = cython.address(self.funnel.gate[bend.first])
+        last = cython.address(self.funnel.gate[bend.last])
         v: cython.int = first.vertex[bend.side]
         far: cython.int = 1 - bend.side
         h: cython.int = self.strip.crossing[bend.first].leave
@@ -132,8 +127,8 @@ class Course:
         e: cython.int = g // 3
         if f == e:
             return 0  # straight through this face
-        from_here = cython.address(self.layout.bend[i - 1])
-        to_there = cython.address(self.layout.bend[i + 1])
+        from_here = cython.address(self.funnel.bend[i - 1])
+        to_there = cython.address(self.funnel.bend[i + 1])
         before: Sides
         after: Sides
         before.this = _angle(from_here.x - bend.x, from_here.y - bend.y, first.x[far] - bend.x, first.y[far] - bend.y)
@@ -155,9 +150,7 @@ class Course:
         """
         j: cython.int
         for j in range(first, last + 1):
-            h: cython.int = self.strip.crossing[j].leave
-            edge: cython.int = self.s.triangle[h // 3].edge[h % 3]
-            if self.s.first_side[edge + 1] != self.s.first_side[edge] + 2:
+            if self.s.twin[self.strip.crossing[j].leave] < 0:
                 return False
         return last - first < self.s.first_corner[v + 1] - self.s.first_corner[v] - 1
 
@@ -197,32 +190,24 @@ class Course:
     def emit(self) -> cython.int:
         """Append the segments of the path through the strip, without those of no length."""
         k: cython.int = self.strip.count
-        if self.n_segments + k + 1 > self.segment.shape[0]:
-            with cython.gil:
-                self.segment = np.concatenate([self.segment, np.empty(self.n_segments + k + 1, _SEGMENT)])
         i: cython.int = 1
         j: cython.int
-        c: cython.int
         share: cython.double = 0.0
         f: cython.int = self.face
         x: Place = self.start
         y: Place
-        n_before: cython.int = self.n_segments
+        n_before: cython.longlong = self.segments.n
         for j in range(k + 1):
             if j == k:
                 y = self.end
             else:
-                while self.layout.bend[i].last < j:
+                while self.funnel.bend[i].last < j:
                     i += 1
-                share = self.layout.share(j, i)
+                share = self.funnel.share(j, i)
                 y = self._on(j, f, share)
             is_point: cython.bint = x.c[0] == y.c[0] and x.c[1] == y.c[1] and x.c[2] == y.c[2]
-            if not is_point or (j == k and self.n_segments == n_before):
-                segment = cython.address(self.segment[self.n_segments])
-                segment.face = f
-                for c in range(3):
-                    segment.start[c], segment.end[c] = x.c[c], y.c[c]
-                self.n_segments += 1
+            if not is_point or (j == k and self.segments.n == n_before):
+                self.segments.append(f, x.c, y.c)
             if j < k:
                 f = self.strip.crossing[j].enter // 3
                 x = self._on(j, f, share)
@@ -230,7 +215,7 @@ class Course:
 
     def _on(self, j: cython.int, f: cython.int, share: cython.double) -> Place:
         """The place in face f that lies `share` of the way from the right to the left end of crossing j."""
-        gate = cython.address(self.layout.gate[j])
+        gate = cython.address(self.funnel.gate[j])
         x: Place
         x.c[0] = x.c[1] = x.c[2] = 0.0
         x.c[corner_of(self.s, f, gate.vertex[0])] = share
@@ -300,17 +285,17 @@ class Passing:
         i: cython.int
         j: cython.int
         side: cython.int
-        for i in range(1, self.course.layout.n_bends):
-            p = cython.address(self.course.layout.bend[i - 1])
-            q = cython.address(self.course.layout.bend[i])
+        for i in range(1, self.course.funnel.n_bends):
+            p = cython.address(self.course.funnel.bend[i - 1])
+            q = cython.address(self.course.funnel.bend[i])
             squared: cython.double = (q.x - p.x) * (q.x - p.x) + (q.y - p.y) * (q.y - p.y)
             for j in range(p.last + 1, q.first):
-                gate = cython.address(self.course.layout.gate[j])
+                gate = cython.address(self.course.funnel.gate[j])
                 for side in range(2):
                     half: cython.double = self.half_turn[gate.vertex[side]]
                     if half <= -1.0:
                         continue
-                    if j > p.last + 1 and self.course.layout.gate[j - 1].vertex[side] == gate.vertex[side]:
+                    if j > p.last + 1 and self.course.funnel.gate[j - 1].vertex[side] == gate.vertex[side]:
                         continue
                     px: cython.double = p.x - gate.x[side]
                     py: cython.double = p.y - gate.y[side]
@@ -326,7 +311,7 @@ class Passing:
 
     def note(self, j: cython.int, side: cython.int, saved: cython.double) -> cython.int:
         """Insert the vertex at a side of crossing j into the sorted choices."""
-        v: cython.int = self.course.layout.gate[j].vertex[side]
+        v: cython.int = self.course.funnel.gate[j].vertex[side]
         if not saved > -self.largest_loss or self.is_tried(v):
             return 0
         if self.count == MOST_CHOICES:
@@ -340,9 +325,9 @@ class Passing:
         self.count += 1
         first: cython.int = j
         last: cython.int = j
-        while first > 0 and self.course.layout.gate[first - 1].vertex[side] == v:
+        while first > 0 and self.course.funnel.gate[first - 1].vertex[side] == v:
             first -= 1
-        while last + 1 < self.course.strip.count and self.course.layout.gate[last + 1].vertex[side] == v:
+        while last + 1 < self.course.strip.count and self.course.funnel.gate[last + 1].vertex[side] == v:
             last += 1
         choice = cython.address(self.choice[i])
         choice.saved, choice.vertex, choice.first, choice.last = saved, v, first, last

@@ -1,3 +1,5 @@
+from heat_igl.kernels.mesh.segments cimport Segments
+
 cdef extern from *:
     """
     #define PI 3.14159265358979323846
@@ -20,14 +22,14 @@ cdef enum:
 # The base is half-edge `h`, from the tail in the origin to the head on the first axis; the face is above it. The point
 # is the share `s` of the base from the tail, unless it `is_inside` the face. `is_at_tail`: it is the tail, and leaves
 # across the side opposite.
-cdef struct Ray:
+cdef struct Heading:
     long long h
     double s, dx, dy
     bint is_inside, is_at_tail
 
 # Face `f` in the plane, with its corners (x, y) from the tail of side `side` on; the ray starts at (start_x, start_y),
 # and leaves at the share `share` of the side from point `k` to the next.
-cdef struct Layout:
+cdef struct FaceInPlane:
     long long f
     int side, k
     double x[3]
@@ -41,19 +43,17 @@ cdef class _Tracer:
     cdef double[:, ::1] angle
     cdef long long[::1] twin
     cdef double[:, ::1] half
-    cdef bint stores
-    cdef long long[::1] faces
-    cdef double[:, :, ::1] points
+    cdef Segments segments  # None if they are not asked for
     # Of the geodesic being traced: the ray, the face laid out around it, and where it enters and leaves that face in
     # barycentric coordinates.
-    cdef Ray ray
-    cdef Layout face
+    cdef Heading ray
+    cdef FaceInPlane face
     cdef double entry[3], leave[3]
 
-    cdef long long trace_one(
-        self, long long face, double* at, double turn, double length, long long first, long long* end_face,
-        double* end, double* travelled
-    ) noexcept nogil
+    cdef int trace_one(
+        self, long long face, double* at, double turn, double length, long long* end_face, double* end,
+        double* travelled
+    ) except -1 nogil
     cdef bint start(self, long long f, double turn) noexcept nogil
     cdef bint leave_corner(self, long long corner, double turn) noexcept nogil
     cdef void lay_out(self) noexcept nogil
@@ -61,4 +61,4 @@ cdef class _Tracer:
     cdef double along(self, int c, double share) noexcept nogil
     cdef bint pass_vertex(self) noexcept nogil
     cdef bint cross_side(self) noexcept nogil
-    cdef void store(self, long long i, long long f) noexcept nogil
+    cdef int store(self, long long f) except -1 nogil

@@ -1,6 +1,7 @@
 """Straightest geodesics over the triangles of an oriented manifold triangulation (Polthier and Schmies 1998)."""
 
 import cython
+from cython.cimports.heat_igl.kernels.mesh.segments import Segments
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot
 from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_SIDE, PI
 from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
@@ -19,18 +20,17 @@ class _Tracer:
         at: cython.p_double,
         turn: cython.double,
         length: cython.double,
-        first: cython.longlong,
         end_face: cython.p_longlong,
         end: cython.p_double,
         travelled: cython.p_double,
-    ) -> cython.longlong:
-        """One geodesic; returns the number of segments, which are stored from `first` on.
+    ) -> cython.int:
+        """One geodesic.
 
         It begins at barycentric coordinates `at` in `face`, at the angle `turn` from the direction of corner 0 to
         corner 1.
         """
         c: cython.int
-        n: cython.longlong = 0
+        has_segments: cython.bint = False
         idle: cython.longlong = 0
         left: cython.double = length
         for c in range(3):
@@ -51,8 +51,8 @@ class _Tracer:
                 travelled[0] = length - left
             end_face[0] = self.face.f
             if step > 0.0 or ends:
-                self.store(first + n, self.face.f)
-                n += 1
+                self.store(self.face.f)
+                has_segments = True
                 idle = 0
             else:
                 idle += 1
@@ -60,12 +60,11 @@ class _Tracer:
             goes_on = not ends and (self.pass_vertex() if is_at_vertex else self.cross_side())
         for c in range(3):
             end[c] = self.leave[c]
-        if n == 0:
+        if not has_segments:
             for c in range(3):
                 self.entry[c] = self.leave[c]
-            self.store(first, end_face[0])
-            n = 1
-        return n
+            self.store(end_face[0])
+        return 0
 
     def start(self, f: cython.longlong, turn: cython.double) -> cython.bint:
         """Set the ray off in face f from `entry`; false if it leads out of the surface at once."""
@@ -255,15 +254,11 @@ class _Tracer:
         self.ray.is_inside, self.ray.is_at_tail = False, False
         return True
 
-    def store(self, i: cython.longlong, f: cython.longlong) -> cython.void:
-        """Store the segment from `entry` to `leave` of face f as number i."""
-        c: cython.int
-        if not self.stores:
-            return
-        self.faces[i] = f
-        for c in range(3):
-            self.points[i, 0, c] = self.entry[c]
-            self.points[i, 1, c] = self.leave[c]
+    def store(self, f: cython.longlong) -> cython.int:
+        """Store the segment from `entry` to `leave` of face f, if segments are asked for."""
+        if self.segments is not None:
+            self.segments.append(cython.cast(cython.int, f), self.entry, self.leave)
+        return 0
 
 
 def trace(
@@ -275,32 +270,28 @@ def trace(
     end_face: cython.longlong[::1],
     end: cython.double[:, ::1],
     travelled: cython.double[::1],
-    count: cython.longlong[::1],
-    first: cython.longlong[::1],
-    faces: cython.longlong[::1],
-    points: cython.double[:, :, ::1],
+    stores: cython.bint = False,
 ):
-    """Trace k geodesics over triangles: fill their ends, the lengths travelled and the numbers of their segments (k,).
+    """Trace k geodesics over triangles: fill their ends and the lengths travelled (k,).
 
     `triangles` are edge lengths (m, 3) > 0, areas (m,), angles (m, 3), twins (3 m,), and at each corner (m, 3) half the
     sum of the angles around the vertex, negative on the boundary.
-    If `first` has k entries, the segments of geodesic i are stored from `first[i]` on: faces (s,) and the barycentric
-    coordinates of both ends (s, 2, 3).
+    Returns what they cross, geodesic after geodesic, if it `stores` that: faces (s,), and barycentric coordinates
+    (s, 2, 3) of both ends of each segment.
     """
     tracer = _Tracer()
     tracer.l, tracer.area, tracer.angle, tracer.twin, tracer.half = triangles
-    tracer.faces, tracer.points = faces, points
-    tracer.stores = first.shape[0] > 0
+    tracer.segments = Segments() if stores else None
     i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(face.shape[0]):
-            count[i] = tracer.trace_one(
+            tracer.trace_one(
                 face[i],
                 cython.address(at[i, 0]),
                 turn[i],
                 length[i],
-                first[i] if tracer.stores else 0,
                 cython.address(end_face[i]),
                 cython.address(end[i, 0]),
                 cython.address(travelled[i]),
             )
+    return tracer.segments.arrays() if stores else None

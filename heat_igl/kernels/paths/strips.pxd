@@ -13,7 +13,6 @@ cdef struct Triangle:
     double along[3]
     double above[3]
     int vertex[3]
-    int edge[3]
 
 # Barycentric coordinates of a point in a face.
 cdef struct Place:
@@ -22,7 +21,7 @@ cdef struct Place:
 
 cdef class FaceTable:
     cdef const Triangle[::1] triangle
-    cdef const int[::1] first_side, side, first_corner, corner
+    cdef const int[::1] twin, ring, first_corner, corner
 
 
 # The corner of face f at vertex v, -1 if it has none.
@@ -33,6 +32,11 @@ cdef inline int corner_of(FaceTable s, int f, int v) noexcept nogil:
     if t.vertex[1] == v:
         return 1
     return 2 if t.vertex[2] == v else -1
+
+
+# The next half-edge of the same edge, in turn; of an edge of one face, h itself.
+cdef inline int next_side(FaceTable s, int h) noexcept nogil:
+    return s.twin[h] if s.twin[h] >= 0 else s.ring[h]
 
 
 # The other half-edge of the face of h at its vertex v.
@@ -126,7 +130,7 @@ cdef struct Gate:
 
 # A corner of the shortest path: where it lies, on which side of the strip (-1 at the start and the end), and the first
 # and the last crossing at it.
-cdef struct Bend:
+cdef struct FunnelCorner:
     double x, y
     int side, first, last
 
@@ -136,9 +140,9 @@ cdef struct Corners:
     double y[3]
 
 
-cdef class Layout:
+cdef class Funnel:
     cdef Gate[::1] gate
-    cdef Bend[::1] bend
+    cdef FunnelCorner[::1] bend
     cdef int n_gates, n_bends
     cdef Corners first, last
     cdef double x, y

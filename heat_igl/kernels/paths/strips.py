@@ -14,12 +14,13 @@ from cython.cimports.heat_igl.kernels.paths.strips import (
     Place,
     Sides,
     corner_of,
+    next_side,
     other_side,
     weighted,
 )
 from cython.cimports.libc.math import hypot, sqrt
 
-__all__ = ["Detour", "Layout", "Strip", "FaceTable"]
+__all__ = ["Detour", "Funnel", "Strip", "FaceTable"]
 
 _CROSSING = np.dtype([("leave", "i4"), ("enter", "i4")])
 _AROUND = np.dtype([("enter", "i4"), ("leave", "i4"), ("before", "i4")])
@@ -31,15 +32,14 @@ _BEND = np.dtype([("x", "f8"), ("y", "f8"), ("side", "i4"), ("first", "i4"), ("l
 @cython.final
 @cython.cclass
 class FaceTable:
-    """m faces on n vertices, which need not be oriented alike, and k edges.
+    """m faces on n vertices, which need not be oriented alike.
 
-    `face` (m,) are structures as `heat_igl.curves.shortening` makes them. The half-edges of edge e are
-    ``side[first_side[e]:first_side[e + 1]]``, and the corners at vertex v, numbered like half-edges,
-    ``corner[first_corner[v]:first_corner[v + 1]]``.
+    `face` (m,) are structures as `heat_igl.curves.shortening` makes them, and `edges` are `HalfEdges`. The corners at
+    vertex v, numbered like half-edges, are ``corner[first_corner[v]:first_corner[v + 1]]``.
     """
 
-    def __init__(self, face, first_side, side, first_corner, corner):
-        self.triangle, self.first_side, self.side = face, first_side, side
+    def __init__(self, face, edges, first_corner, corner):
+        self.triangle, self.twin, self.ring = face, edges.twin, edges.ring
         self.first_corner, self.corner = first_corner, corner
 
 
@@ -122,7 +122,6 @@ class Detour:
         n_tips: cython.int = 2
         nearest: cython.int
         i: cython.int
-        k: cython.int
         self.step[0].enter, self.step[0].leave, self.step[0].before = -1, h, -1
         self.step[1].enter, self.step[1].leave, self.step[1].before = -1, other_side(s, h, v), -1
         self.tip[0].length, self.tip[0].step = before.this, 0
@@ -142,12 +141,13 @@ class Detour:
             leave: cython.int = self.step[at].leave
             if leave < 0:
                 return self._crossings(at)
-            edge: cython.int = s.triangle[leave // 3].edge[leave % 3]
-            is_crowded: cython.bint = s.first_side[edge + 1] - s.first_side[edge] > 2
-            for k in range(s.first_side[edge], s.first_side[edge + 1]):
-                g: cython.int = s.side[k]
+            g: cython.int = leave
+            while True:
+                g = next_side(s, g)
                 f: cython.int = g // 3
-                if g == leave or f == start or (is_crowded and self._is_entered(g, n_steps)):
+                if g == leave:
+                    break
+                if f == start or (s.twin[g] == -2 and self._is_entered(g, n_steps)):
                     continue
                 if n_steps == self.step.shape[0]:
                     return -1
@@ -186,12 +186,9 @@ class Detour:
         total: cython.double = before + after
         count: cython.int = 0
         while total < limit and count < self.way.shape[0]:
-            edge: cython.int = s.triangle[leave // 3].edge[leave % 3]
-            first: cython.int = s.first_side[edge]
-            n_sides: cython.int = s.first_side[edge + 1] - first
-            if n_sides != 2:
-                return -1 if n_sides == 1 else -2
-            enter: cython.int = s.side[first] + s.side[first + 1] - leave
+            enter: cython.int = s.twin[leave]
+            if enter < 0:
+                return enter
             self.way[count].leave, self.way[count].enter = leave, enter
             count += 1
             if enter // 3 == end // 3:
@@ -225,7 +222,7 @@ class Detour:
 
 @cython.final
 @cython.cclass
-class Layout:
+class Funnel:
     """The crossings of a strip in the plane, `gate`, and the corners of the shortest path through them, `bend`.
 
     Side "left" is the side of the second of a half-edge's ends for the first crossing, and carried along from there.

@@ -12,7 +12,8 @@ the order of distance.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.windows.paths import AT_SOURCE, LOST, PathSegments, PathTracer
+from cython.cimports.heat_igl.kernels.mesh.segments import Segments
+from cython.cimports.heat_igl.kernels.windows.paths import AT_SOURCE, LOST, PathTracer
 from cython.cimports.heat_igl.kernels.windows.structures import apart
 
 __all__ = ["pull_back", "push_forward"]
@@ -97,7 +98,7 @@ def pull_back(
     by_side, by_place : (3 m,), (e, 3)
         Take the derivatives.
     """
-    segments: PathSegments = PathSegments()
+    segments: Segments = Segments()
     tracer: PathTracer = PathTracer(tables, found, starts, segments)
     n: cython.int = order.shape[0]
     i: cython.Py_ssize_t
@@ -137,7 +138,7 @@ def push_forward(
     The coordinates of source points change by `moves` (e, 3). On entry, `change` holds the changes of the offsets of
     sources. Other arguments as for `pull_back`.
     """
-    segments: PathSegments = PathSegments()
+    segments: Segments = Segments()
     tracer: PathTracer = PathTracer(tables, found, starts, segments)
     n: cython.int = order.shape[0]
     i: cython.Py_ssize_t

@@ -1,3 +1,5 @@
+from heat_igl.kernels.mesh.segments cimport Segments
+
 cdef class InnerSources:
     cdef int n, n_points
     cdef const int[::1] point_face
@@ -9,13 +11,6 @@ cdef class InnerSources:
 
     cdef int face(self, int root) noexcept nogil
     cdef double nearest(self, const double* side, int root, double* here, double* found) noexcept nogil
-
-cdef class PathSegments:
-    cdef int[::1] face
-    cdef double[:, :, ::1] place
-    cdef long long n
-
-    cdef int append(self, int f, double* start, double* end) except -1 nogil
 
 cdef struct LineEnd:
     # Where a straight part of a path ends: barycentric coordinates in a face, and what the search found there.
@@ -66,7 +61,7 @@ cdef class PathTracer:
     cdef const unsigned char[::1] aligned
     cdef const double[::1] length, double_area, distance, crossing
     cdef InnerSources sources
-    cdef PathSegments segments
+    cdef Segments segments
     cdef long long n_steps
     # Lines to be tried, the next one last.
     cdef Line[MOST_LINES] line

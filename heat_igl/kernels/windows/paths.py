@@ -4,12 +4,12 @@ Sources inside faces, points and segments, have the roots n + i for source i of 
 """
 
 import cython
-import numpy as np
+from cython.cimports.heat_igl.kernels.mesh.segments import Segments
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-__all__ = ["InnerSources", "PathSegments", "PathTracer", "trace_back"]
+__all__ = ["InnerSources", "PathTracer", "trace_back"]
 
 
 @cython.final
@@ -53,32 +53,6 @@ class InnerSources:
         return self.segment_offset[i]
 
 
-@cython.final
-@cython.cclass
-class PathSegments:
-    """Segments, path after path: `face` (r,) int32, and barycentric coordinates `place` (r, 2, 3) of both ends.
-
-    `n` is how many there are so far; there may be room for more.
-    """
-
-    def __init__(self):
-        self.face, self.place = np.empty(1024, np.int32), np.empty((1024, 2, 3))
-
-    def append(self, f: cython.int, start: cython.p_double, end: cython.p_double) -> cython.int:
-        """Add a segment in face f."""
-        k: cython.int
-        if self.n == self.face.shape[0]:
-            with cython.gil:  # twice the room
-                self.face = np.concatenate([self.face, self.face])
-                self.place = np.concatenate([self.place, self.place])
-        self.face[self.n] = f
-        for k in range(3):
-            self.place[self.n, 0, k] = start[k]
-            self.place[self.n, 1, k] = end[k]
-        self.n += 1
-        return 0
-
-
 def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
     """Paths from vertices and points to the sources of a search.
 
@@ -97,10 +71,10 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
 
     Returns
     -------
-    face, place : (r,) int32, (r, 2, 3) float64
+    face, place : (r,) int64, (r, 2, 3) float64
         The segments, path after path: face, and barycentric coordinates of both ends.
     """
-    segments: PathSegments = PathSegments()
+    segments: Segments = Segments()
     tracer: PathTracer = PathTracer(tables, found, sources, segments)
     vertex: cython.const[cython.int][::1] = begin.vertex
     from_face: cython.const[cython.int][::1] = begin.face
@@ -132,7 +106,7 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
             if v == LOST:
                 segments.n = first
             end[i] = segments.n
-    return np.asarray(segments.face)[: segments.n], np.asarray(segments.place)[: segments.n]
+    return segments.arrays()
 
 
 @cython.final
@@ -140,7 +114,7 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
 class PathTracer:
     """Follows paths back to the sources of a search; `segments` takes what they cross."""
 
-    def __init__(self, tables, found, sources, segments: PathSegments):
+    def __init__(self, tables, found, sources, segments: Segments):
         self.vertex, self.twin, self.ring, self.aligned, self.length = tables.edges
         self.double_area = tables.double_area
         self.distance, self.root = found.distance, found.root

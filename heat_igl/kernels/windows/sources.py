@@ -21,7 +21,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     NARROW,
     ROUNDING,
     WIDEST,
-    Ray,
+    Direction,
     Search,
     Window,
     apart,
@@ -218,13 +218,13 @@ def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset:
 @cython.nogil
 @cython.exceptval(check=False)
 def _straighten(
-    s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray), margin: cython.double
+    s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Direction), margin: cython.double
 ) -> cython.bint:
     """Turn around the vertex over a side of corner k by pi, less a margin; true if the fan reaches as far as pi.
 
     `ray` takes the corner that holds the direction, the side over which it was entered, and the angle between them.
     """
-    ahead: Ray
+    ahead: Direction
     sine: cython.double = ray.sine
     ray.sine = sine + margin * ray.cosine
     ray.cosine -= margin * sine
@@ -250,7 +250,7 @@ def _straighten(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _reach(s: cython.pointer(Search), ray: cython.pointer(Ray)) -> cython.double:
+def _reach(s: cython.pointer(Search), ray: cython.pointer(Direction)) -> cython.double:
     """How far the ray meets the half-edge opposite its corner from the end on the side of the ray."""
     k: cython.int = ray.corner
     length: cython.double = s.length[k]
@@ -269,7 +269,7 @@ def _reach(s: cython.pointer(Search), ray: cython.pointer(Ray)) -> cython.double
 @cython.nogil
 @cython.exceptval(check=False)
 def _fill(
-    s: cython.pointer(Search), v: cython.int, first: cython.pointer(Ray), last: cython.pointer(Ray)
+    s: cython.pointer(Search), v: cython.int, first: cython.pointer(Direction), last: cython.pointer(Direction)
 ) -> cython.void:
     """Windows from v between two rays, or between the first ray and the boundary if there is no second."""
     k: cython.int = first.corner
@@ -309,8 +309,8 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     at: cython.double = s.crossing[v]
     norm: cython.double
     margin: cython.double
-    left: Ray
-    right: Ray
+    left: Direction
+    right: Direction
     has_left: cython.bint
     has_right: cython.bint
     s.emitted[v] = s.distance[v]

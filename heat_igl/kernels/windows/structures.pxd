@@ -47,7 +47,7 @@ cdef struct Entry:
     double key
     int what             # a half-edge, or 3 m + v for vertex v
 
-cdef struct Ray:
+cdef struct Direction:
     # A direction at a vertex: in a corner, at an angle from one of its sides.
     int corner, side
     double cosine, sine

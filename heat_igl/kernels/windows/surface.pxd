@@ -1,6 +1,6 @@
-from heat_igl.kernels.windows.structures cimport Ray, Search
+from heat_igl.kernels.windows.structures cimport Direction, Search
 
 cdef int third(int k, int side) noexcept nogil
 cdef int beyond(Search* s, int k, int side) noexcept nogil
-cdef void turn(Search* s, int k, int side, Ray* ray) noexcept nogil
+cdef void turn(Search* s, int k, int side, Direction* ray) noexcept nogil
 cdef unsigned char classify(Search* s, int v) noexcept nogil

@@ -12,7 +12,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     FLATNESS,
     JOINS,
     PASSED,
-    Ray,
+    Direction,
     Search,
     twice_product,
 )
@@ -98,7 +98,7 @@ def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython
     return next_half_edge(t) if is_tail else previous_half_edge(t)
 
 
-def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Ray)) -> cython.void:
+def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Direction)) -> cython.void:
     """Turn a direction by the angle of corner k, which has the side `side`."""
     p: cython.double = s.length[side]
     q: cython.double = s.length[third(k, side)]
@@ -118,7 +118,7 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
     n_seen: cython.int = 0
     n_half_turns: cython.int = 0
     was_below: cython.bint
-    ray: Ray
+    ray: Direction
     ray.cosine, ray.sine = 1.0, 0.0
     while n_seen < n_corners:
         n_seen += 1
