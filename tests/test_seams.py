@@ -145,6 +145,22 @@ def test_soups_are_measured_as_the_mesh(seed: int) -> None:
         np.testing.assert_allclose(heat_igl.geodesic_distance(joined, 0), truth, rtol=1e-12)
 
 
+def test_parts_that_only_touch_are_warned_of() -> None:
+    """Coinciding corners of parts that no seam joins: turned round, three at an edge, or one point in common."""
+    V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0], [0, -1, 0], [0, 0, 0], [1, 0, 0], [0, 0, 1.0]])
+    turned, three = (V[:6], [[0, 1, 2], [3, 4, 5]]), (V, [[0, 1, 2], [4, 3, 5], [7, 6, 8]])
+    point = (V[[0, 1, 2, 3, 5, 8]], [[0, 1, 2], [3, 4, 5]])
+    for soup, n in ((turned, 2), (three, 2), (point, 1)):
+        with pytest.warns(heat_igl.AccuracyWarning, match=rf"{n} places .* inf: .*merge=\"vertices\"") as said:
+            found = as_mesh(soup)
+        assert len(said) == 1
+        assert np.isinf(heat_igl.geodesic_distance(found, 0)).any()
+        assert np.isfinite(heat_igl.geodesic_distance(as_mesh(soup, merge="vertices"), 0)).all()
+    # One part that comes back to where it began: a path leads there, and nothing is said.
+    ring = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 2, 0], [0, 3, 1], [0, 0, 0]]
+    assert as_mesh((ring, [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]])).components.max() == 0
+
+
 def test_merged_vertices_leave_out_collapsed_faces() -> None:
     V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]])
     assert as_mesh((V, [[0, 1, 2], [1, 3, 2]]), merge="vertices").n_faces == 1

@@ -96,7 +96,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     Warns
     -----
     AccuracyWarning
-        If boundary edges lie on each other, as at texture seams: see `as_mesh`.
+        If boundary edges or parts lie on each other, as at texture seams: see `as_mesh`.
 
     Notes
     -----

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import combinations
 from typing import TypeVar
 
@@ -16,7 +16,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, MeshError, refuse_masked
-from heat_igl.kernels.mesh import mesh_arrays
 from heat_igl.mesh import connectivity
 from heat_igl.mesh.quadrilaterals import first_quadrilateral
 from heat_igl.mesh.report import MeshReport, mesh_report
@@ -63,8 +62,8 @@ def checked_positions(V: ArrayLike) -> FloatArray:
     with np.errstate(over="ignore"):
         positions = np.zeros((len(array), 3))
         positions[:, : array.shape[1]] = array
-    if not mesh_arrays.all_finite(positions):
-        bad = ~np.isfinite(positions)
+    bad = ~np.isfinite(positions)
+    if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
         raise MeshError(
             f"V[{row}, {column}] is {positions[row, column]} ({int(bad.any(axis=1).sum())} of {len(positions)} "
@@ -101,8 +100,7 @@ def checked_faces(F: ArrayLike, n: int | None, *, may_repeat: bool = False) -> I
         )
     n = int(array.max()) + 1 if n is None else n
     faces = np.array(array, dtype=np.int64, order="C", copy=True)
-    fault = mesh_arrays.first_fault(faces, n)
-    if fault == mesh_arrays.OUTSIDE:
+    if faces.min() < 0 or faces.max() >= n:
         outside = (array < 0) | (array >= n)
         row, column = (int(i) for i in np.argwhere(outside)[0])
         hint = "; the indices look 1-based, subtract 1" if array.min() == 1 and array.max() == n else ""
@@ -110,10 +108,8 @@ def checked_faces(F: ArrayLike, n: int | None, *, may_repeat: bool = False) -> I
             f"F[{row}, {column}] = {array[row, column]} is no vertex ({int(outside.any(axis=1).sum())} of {len(array)} "
             f"faces are affected): there are {n} vertices, so indices run from 0 to {n - 1}{hint}"
         )
-    if fault == mesh_arrays.REPEATS and not may_repeat:
-        repeats = np.zeros(len(faces), bool)
-        for one, other in combinations(faces.T, 2):
-            repeats |= one == other
+    repeats = reduce(np.logical_or, (one == other for one, other in combinations(faces.T, 2)))
+    if repeats.any() and not may_repeat:
         row = int(np.flatnonzero(repeats)[0])
         raise MeshError(
             f"F[{row}] = {faces[row].tolist()} repeats a vertex ({int(repeats.sum())} of {len(faces)} faces do): "
@@ -174,16 +170,17 @@ class Mesh:
             )
 
     def _hold(self, positions: FloatArray, faces: IntArray) -> None:
-        low, high = mesh_arrays.bounds(positions, faces)
+        positions.setflags(write=False)
+        object.__setattr__(self, "V", positions)
+        object.__setattr__(self, "F", faces)
+        used = positions if self.referenced.all() else positions[self.referenced]
+        # By columns, which takes a tenth of the time.
         with np.errstate(over="ignore"):
-            extent = float(np.linalg.norm(high - low))
+            extent = float(np.linalg.norm([np.ptp(column) for column in used.T]))
         if extent == 0:
             raise MeshError("all vertices in V that F uses lie in one point: there is no distance to measure")
         if not _SMALLEST_EXTENT < extent < _LARGEST_EXTENT:
             raise MeshError(f"V spans {extent:.3g} units, outside what areas in double precision allow: rescale V")
-        positions.setflags(write=False)
-        object.__setattr__(self, "V", positions)
-        object.__setattr__(self, "F", faces)
 
     def with_vertices(self, V: ArrayLike) -> Mesh:
         """The same faces on other positions; properties of the faces alone are shared, not computed again.
@@ -202,9 +199,9 @@ class Mesh:
         if len(positions) != self.n_vertices:
             raise MeshError(f"V has {len(positions)} rows, but the mesh has {self.n_vertices} vertices")
         moved = object.__new__(Mesh)
-        moved._hold(positions, self.F)
         for name in _OF_THE_FACES & self.__dict__.keys():
             moved.__dict__[name] = self.__dict__[name]
+        moved._hold(positions, self.F)
         return moved
 
     def without_duplicate_faces(self) -> tuple[Mesh, IntArray]:

@@ -53,8 +53,9 @@ _NOT_MESHES = {
     ),
 }
 
-# The beginning of the warning, behind a number.
+# The beginnings of the warnings that `merge` answers, behind a number.
 _SEAMS = "boundary edges of the mesh lie on others"
+_PLACES = "places on the boundary of the mesh"
 
 
 @names_guessed
@@ -95,7 +96,8 @@ def as_mesh(
     Warns
     -----
     AccuracyWarning
-        If boundary edges of a mesh that is none of this package lie on each other, and `merge` is not given. If
+        If `merge` is not given, and boundary edges of a mesh that is none of this package lie on each other, or
+        boundary vertices in one place belong to parts that no edge joins, as in triangles without common vertices. If
         vertices at the boundary lie on each other and are no seam, with ``merge="seams"``.
 
     Notes
@@ -125,7 +127,7 @@ def as_mesh(
     if merge is not None:
         require_choice("merge", merge, ("seams", "vertices"))
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", rf"\d+ {_SEAMS}", AccuracyWarning)
+            warnings.filterwarnings("ignore", rf"\d+ ({_SEAMS}|{_PLACES})", AccuracyWarning)
             found = _converted(mesh, F)
         return found if isinstance(found, PointCloud) else _merged(found, merge)
     found = _converted(mesh, F)
@@ -156,12 +158,20 @@ def _merged(found: Mesh | PolygonMesh, merge: str) -> Mesh | PolygonMesh:
 
 
 def warn_of_seams(mesh: Mesh | PolygonMesh | PointCloud) -> None:
-    """Warn if boundary edges lie on each other."""
-    n = 0 if isinstance(mesh, PointCloud) else len(seam_pairs(mesh if isinstance(mesh, Mesh) else mesh.triangles))
-    if n:
+    """Warn if boundary edges lie on each other, or boundary vertices in one place belong to different components."""
+    if isinstance(mesh, PointCloud):
+        return
+    surface = mesh if isinstance(mesh, Mesh) else mesh.triangles
+    if n := len(seam_pairs(surface)):
         warn_caller(
             f"{n} {_SEAMS}, as where a loader has split vertices at texture seams, and distance does not cross there: "
             'heat_igl.as_mesh(mesh, merge="seams") joins them',
+            AccuracyWarning,
+        )
+    elif n := copies_apart(surface, surface.components):
+        warn_caller(
+            f"{n} {_PLACES} hold vertices of parts that no edge joins, so the distance between them is inf: "
+            'heat_igl.as_mesh(mesh, merge="vertices") joins all vertices in one place',
             AccuracyWarning,
         )
 

@@ -1,9 +1,9 @@
-"""Triangles by their corners and edge lengths: checked, joined along edges, numbered, flipped and refined.
+"""Triangles by their corners and edge lengths: joined along edges, numbered, flipped and refined.
 
 Half-edge ``3 f + c`` is the side of face f opposite its corner c; `triangles.pxd` steps from one to the next. A mesh
 goes through these modules, as far as its use needs:
 
-1. `mesh_arrays` checks positions and faces when a mesh is made, and `incidence` finds its edges and components.
+1. `incidence` finds the edges and components of a mesh.
 2. `gluing` joins the half-edges that share an edge and takes their lengths, without the edges of a mesh;
    `numbering` brings neighbours near each other in memory.
 3. `flipping` makes the triangulation Delaunay where nobody asks for the history of the flips, as windows from vertices.
