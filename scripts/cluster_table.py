@@ -24,10 +24,12 @@ import numpy as np
 
 from heat_igl import HeatMethodSolver, Mesh, cluster, read_mesh, shapes, write_mesh
 from heat_igl.cluster.solver_cache import PROCESS_MEMORY, solver_memory
+from heat_igl.geodesic import DistanceMethod
 
 from harness import Row, Table, collected, parsed, publish, ratio, subdivided
 
 SOURCES = 64
+METHODS: tuple[DistanceMethod, ...] = ("heat", "sweep", "windows")
 MEMORY_SIZES = (3, 5, 6, 7)  # subdivisions of the icosphere
 
 
@@ -122,12 +124,12 @@ def memory(real: Sequence[Path]) -> Iterator[Row]:
         largest = max(real, key=lambda path: read_mesh(path).n_vertices)
         meshes[largest.stem] = subdivided(read_mesh(largest))
     for name, mesh in meshes.items():
-        for method in ("heat", "sweep"):
+        for method in METHODS:
             with tempfile.TemporaryDirectory() as scratch, cluster.connected(n_workers=1) as client:
                 store = Path(scratch) / "store"
                 cluster.distances({name: mesh}, list(range(2 * SOURCES)), store, client=client, method=method)
                 (peak,) = client.run(_peak).values()
-            stated = PROCESS_MEMORY + solver_memory(mesh)
+            stated = PROCESS_MEMORY + solver_memory(mesh, method)
             row = {"mesh": name, "n": mesh.n_vertices, "method": method, "ratio": peak / stated}
             yield row | {"peak": peak / 2**20, "stated": stated / 2**20}
 

@@ -9,15 +9,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from heat_igl.cluster.store import rows_per_block
-from heat_igl.geodesic import Solver, SolverChoice
+from heat_igl.geodesic import DistanceMethod, Solver, SolverChoice
 from heat_igl.linear.factor_memory import factor_bytes
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.runtime import release_free_memory
 
 __all__ = ["PROCESS_MEMORY", "SolverCache", "memory_for_solvers", "solver_memory"]
 
-# A worker without a solver: Python, numpy, scipy, libigl, zarr and Dask. Measured 215 MiB.
-PROCESS_MEMORY = 230 * 2**20
+# A worker without a solver: Python, numpy, scipy, libigl, zarr and Dask. Measured 108 MiB.
+PROCESS_MEMORY = 130 * 2**20
 # The mesh, the operators and one block of right-hand sides, measured on spheres of 10k to 164k vertices.
 _BYTES_PER_VERTEX = 500
 _BYTES_PER_FACE = 500
@@ -25,13 +25,13 @@ _BYTES_PER_FACE = 500
 _BYTES_PER_WRITTEN_VALUE = 8
 
 
-def solver_memory(mesh: Mesh | PointCloud) -> int:
+def solver_memory(mesh: Mesh | PointCloud, method: DistanceMethod) -> int:
     """Bytes that a solver on `mesh` and one block of queries take at most, including writing the block."""
     n, m = mesh.n_vertices, mesh.n_faces
-    # Edges by Euler's formula, up to a few for boundaries and handles.
-    n_edges = n + m
+    # Only heat factors. Edges by Euler's formula, up to a few for boundaries and handles.
+    factors = 2 * factor_bytes(n, n + 2 * (n + m)) if method == "heat" else 0
     block = _BYTES_PER_WRITTEN_VALUE * rows_per_block(n) * n
-    return int(2 * factor_bytes(n, n + 2 * n_edges) + _BYTES_PER_VERTEX * n + _BYTES_PER_FACE * m + block)
+    return int(factors + _BYTES_PER_VERTEX * n + _BYTES_PER_FACE * m + block)
 
 
 def memory_for_solvers() -> int:
@@ -79,7 +79,7 @@ class SolverCache:
         Waits until the memory that it is estimated to take is free. A MemoryError if that is more than the worker has.
         """
         key = f"{fingerprint} {choice}"
-        entry = self._reserve(key, solver_memory(mesh), memory_for_solvers())
+        entry = self._reserve(key, solver_memory(mesh, choice.method), memory_for_solvers())
         try:
             with entry.lock:
                 if entry.solver is None:

@@ -1,7 +1,7 @@
 """An interactive view of a distance as one HTML file, without a server, network access or libraries.
 
 The page draws the surface with WebGL. After a click on a new source it computes the distance by the algorithm of
-`heat_igl.windows.sweeping`, implemented in JavaScript in page/sweep.js, and the logarithmic map by page/polar.js. The
+`heat_igl.sweep`, implemented in JavaScript in page/sweep.js, and the logarithmic map by page/polar.js. The
 extra ``view`` is needed for the colours.
 """
 

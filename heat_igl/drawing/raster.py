@@ -53,12 +53,16 @@ def rasterize(points: FloatArray, F: IntArray, width: int, height: int) -> Pixel
     high = np.minimum(np.floor(np.stack([x.max(1), y.max(1)], 1)), limit).astype(np.int64)
     high[edge_on] = low[edge_on] - 1
 
+    def weights(face: IntArray, row: IntArray, column: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Barycentric coordinates of pixels for the second and the third corner of their faces."""
+        dx, dy = column - x[face, 0], row - y[face, 0]
+        b = (dx * e2[face, 1] - dy * e2[face, 0]) * inverse[face]
+        return b, (dy * e1[face, 0] - dx * e1[face, 1]) * inverse[face]
+
     depth = np.full(width * height, -np.inf)
     shown = np.full(width * height, -1, np.int64)
     for face, row, column in _candidates(low, high):
-        dx, dy = column - x[face, 0], row - y[face, 0]
-        b = (dx * e2[face, 1] - dy * e2[face, 0]) * inverse[face]
-        c = (dy * e1[face, 0] - dx * e1[face, 1]) * inverse[face]
+        b, c = weights(face, row, column)
         inside: BoolArray = (b >= -_SLACK) & (c >= -_SLACK) & (b + c <= 1 + _SLACK)
         face, b, c = face[inside], b[inside], c[inside]
         pixel = row[inside] * width + column[inside]
@@ -73,11 +77,8 @@ def rasterize(points: FloatArray, F: IntArray, width: int, height: int) -> Pixel
     place = np.flatnonzero(shown >= 0)
     face = shown[place]
     row, column = np.divmod(place, width)
-    dx, dy = column - x[face, 0], row - y[face, 0]
-    b = (dx * e2[face, 1] - dy * e2[face, 0]) * inverse[face]
-    c = (dy * e1[face, 0] - dx * e1[face, 1]) * inverse[face]
-    weights = np.stack([1 - b - c, b, c], axis=1)
-    return Pixels(place, face, weights, depth.reshape(height, width))
+    b, c = weights(face, row, column)
+    return Pixels(place, face, np.stack([1 - b - c, b, c], axis=1), depth.reshape(height, width))
 
 
 def _candidates(low: IntArray, high: IntArray) -> Iterator[tuple[IntArray, IntArray, IntArray]]:

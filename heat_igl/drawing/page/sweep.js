@@ -1,5 +1,5 @@
 // Distance by unfolding two triangles at a time: the algorithm of heat_igl/kernels/sweep/sweeping.py, in the order of Dijkstra's
-// algorithm instead of the heat. The input is the corners and the edge lengths of triangles. Two triangles are glued at an edge
+// algorithm. The input is the corners and the edge lengths of triangles. Two triangles are glued at an edge
 // if no other triangle has both ends of the edge.
 "use strict";
 

@@ -10,9 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.errors import MissingExtraError, ReferenceSolverError
+from heat_igl.mesh import MeshLike
 from heat_igl.reference.baselines.grids import grid_domain, grid_sources, grid_spacing
+from heat_igl.reference.measurement import measured
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -38,36 +39,15 @@ def fast_marching(mesh: MeshLike, sources: Sources) -> FloatArray:
     ------
     SourceError
         If the sources are not vertices of the mesh.
-    MeshError
+    ReferenceSolverError
         If the mesh is tetrahedral or not manifold, or if the values that potpourri3d returns cannot be distances.
     MissingExtraError
         If potpourri3d is not installed.
     """
-    mesh = as_simplices(mesh)
-    chosen = vertex_sources(sources, mesh.n_vertices)
-    if mesh.is_tetrahedral:
-        raise MeshError("fast marching works on triangles, and the mesh holds tetrahedra")
-    with MissingExtraError.guard("fast marching on meshes", "potpourri3d", "bench"):
-        import potpourri3d
-    distance = np.full(mesh.n_vertices, np.inf)
-    distance[chosen] = 0.0
-    reached = mesh.referenced & np.isin(mesh.components, mesh.components[chosen])
-    if not reached.any():
-        return distance
-    # Only the components of the sources: potpourri3d drops unreferenced vertices at the end of V, and rejects the whole
-    # mesh for an edge of three triangles in any component.
-    number = np.cumsum(reached) - 1
-    faces = number[mesh.F[reached[mesh.F[:, 0]]]]
-    try:
-        solver = potpourri3d.MeshFastMarchingDistanceSolver(mesh.V[reached], faces)
-        # A curve of one point without barycentric coordinates denotes a vertex.
-        found = np.ravel(solver.compute_distance([[(int(number[vertex]), [])] for vertex in chosen if reached[vertex]]))
-    except RuntimeError as error:
-        raise MeshError(f"potpourri3d refuses the mesh: {error}; look for defects with mesh.report()") from None
-    if not (np.isfinite(found) & (found >= 0)).all():
-        raise MeshError("potpourri3d returned what is no distance: look for slivers with mesh.report()")
-    distance[reached] = found
-    distance[chosen] = 0.0
+    distance = measured("potpourri3d_marching", mesh, sources).distance
+    distance[vertex_sources(sources, len(distance))] = 0.0
+    if (distance < 0).any():
+        raise ReferenceSolverError("potpourri3d returned what is no distance: look for slivers with mesh.report()")
     return distance
 
 
