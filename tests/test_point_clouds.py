@@ -395,6 +395,7 @@ def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined() ->
     assert found.unreferenced_vertices.tolist() == [403]
     assert set(found.boundary_points) >= set(P[:, 0].argsort()[[0, -1]])
     # Two sheets at an angle of 30 degrees, with a common edge.
+    P = plane(400, 2)
     folded = np.where(
         P[:, :1] < 0.5, [1, 1, 0] * P, np.stack([1 - 0.5 + 0.87 * (0.5 - P[:, 0]), P[:, 1], P[:, 0] / 2 - 0.25], axis=1)
     )

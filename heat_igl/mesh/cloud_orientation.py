@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.cloud_triangles import pinched_vertices, with_fans_joined, with_one_fan
+from heat_igl.mesh.cloud_triangles import FOLDED_BACK, pinched_vertices, with_fans_joined, with_one_fan
 from heat_igl.mesh.connectivity import facets
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.mesh import Mesh
@@ -28,8 +29,8 @@ __all__ = [
 _MOST_LEFT_OUT = 1.5e-3
 # Cosine of the angle at an edge, -1 where the two triangles are flat, below which nothing tells a wrong join.
 _FLAT = -0.9
-# The same above which two triangles may join sheets: 60 degrees between them.
-_FOLDED_BACK = 0.5
+# The same below which neighbours belong to one sheet: with -0.9 some wrong joins of camelhead spread.
+_NO_FOLD = -0.99
 # Weights of edges on folds, which join sheets wrongly more often than flat ones: powers of half of 1 - cosine, at least
 # the second number. No power is best: on the vertices of cheburashka, cow, camelhead, teapot, truck and a gearbox, 100,
 # 100, 100, 87, 72 and 64 % of the triangles are oriented as on the mesh with 2, and 88, 100, 100, 88, 76 and 67 % with
@@ -101,7 +102,14 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
     if (part[0] == part[1]).any():
         folds = _folds(P, F, pairs, runs_alike)
         weight = np.maximum((1 - folds) / 2, 0) ** _POWER + _LEAST_WEIGHT
-        is_turned = turned_groups(pairs, np.where(runs_alike, -weight, weight), np.arange(len(F)))
+        # Flat edges join first, but for those around a surface with one side.
+        is_flat = folds < _NO_FOLD
+        sheet, is_turned = _parts(pairs[is_flat], runs_alike[is_flat], len(F))
+        group = np.where(sheet[0] == sheet[1], 2 * len(F) + np.arange(len(F)), sheet.min(axis=0))
+        group = np.unique(group, return_inverse=True)[1]
+        is_turned &= sheet[0] != sheet[1]
+        wants_one = runs_alike != (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]])
+        is_turned ^= turned_groups(pairs, np.where(wants_one, -weight, weight), group)
         contradicts = (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]]) != runs_alike
     return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts]
 
@@ -139,32 +147,32 @@ def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolA
     Elements of one of the groups (m,), counted from 0, are turned alike. Groups are joined as in `oriented`.
     """
     is_turned, size, (a, b) = np.zeros(len(group), bool), np.bincount(group), group[pairs].T
-    a, b, weight = a[a != b], b[a != b], weight[a != b]
-    while len(a):
-        n_groups = len(size)
-        code = np.minimum(a, b) * n_groups + np.maximum(a, b)
-        order = np.argsort(code, kind="stable")
-        begin = np.flatnonzero(np.diff(code[order], prepend=-1))
-        weight = np.add.reduceat(weight[order], begin)
-        a, b = code[order[begin]] // n_groups, code[order[begin]] % n_groups
+    while True:
+        n, between = len(size), a != b
+        ends = np.minimum(a, b)[between], np.maximum(a, b)[between]
+        # Sums the weights of all pairs between the same two groups.
+        joined = sp.coo_array((weight[between], ends), shape=(n, n)).tocsr().tocoo()
+        (a, b), weight = joined.coords, joined.data
         # Of equal shares, an arbitrary order: with that of the numbers, groups would be joined one after the other.
         share = np.abs(weight) / (size[a] + size[b]) * (1 + 1e-6 * (np.arange(len(a)) * 7919 % 1009))
-        rank, most = np.empty(len(a), np.int64), np.full(n_groups, -1)
-        rank[np.argsort(share, kind="stable")] = np.arange(len(a))
-        np.maximum.at(most, a, rank)
-        np.maximum.at(most, b, rank)
-        joins = (rank == most[a]) & (rank == most[b]) & (share > 0)
+        most, to, turns = np.zeros(n), np.arange(n), np.zeros(n, bool)
+        for end in (a, b):
+            np.maximum.at(most, end, share)
+        # The strongest join of each group, if it is to a larger one, or with equal sizes to one of a lower number.
+        b_joins = size[a] >= size[b]
+        smaller, larger = np.where(b_joins, b, a), np.where(b_joins, a, b)
+        joins = (share > 0) & (share == most[smaller])
         if not joins.any():
-            break
-        is_joined, turns, to = np.zeros(n_groups, bool), np.zeros(n_groups, bool), np.arange(n_groups)
-        is_joined[b[joins]], turns[b[joins]], to[b[joins]] = True, weight[joins] < 0, a[joins]
-        to = (np.cumsum(~is_joined) - 1)[to]
+            return is_turned
+        to[smaller[joins]] = larger[joins]
+        turns[smaller[joins]] = (weight < 0)[joins]
+        while (to[to] != to).any():
+            to, turns = to[to], turns ^ turns[to]
         is_turned ^= turns[group]
-        group, size = to[group], np.bincount(to, size).astype(np.int64)
         weight = np.where(turns[a] != turns[b], -weight, weight)
+        to = np.unique(to, return_inverse=True)[1]
+        group, size = to[group], np.bincount(to, size).astype(np.int64)
         a, b = to[a], to[b]
-        a, b, weight = a[a != b], b[a != b], weight[a != b]
-    return is_turned
 
 
 def is_oriented_manifold(surface: Mesh) -> bool:
@@ -176,7 +184,7 @@ def is_oriented_manifold(surface: Mesh) -> bool:
 def doubtful_points(P: FloatArray, F: IntArray) -> IntArray:
     """Points (k,) at edges along which neighbours run alike, or fold back by more than 120 degrees."""
     pairs, runs_alike = _pairs(F, len(P))
-    faces = pairs[runs_alike | (_folds(P, F, pairs, runs_alike) > _FOLDED_BACK)]
+    faces = pairs[runs_alike | (_folds(P, F, pairs, runs_alike) > FOLDED_BACK)]
     common = (F[faces[:, 0], :, None] == F[faces[:, 1], None]).any(axis=2)
     return np.unique(F[faces[:, 0]][common])
 

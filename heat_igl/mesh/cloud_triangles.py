@@ -3,15 +3,14 @@
 In the union of the local triangulations (Sharp and Crane 2020, section 6), nearly all triangles are in the stars of all
 three corners. These never overlap, since each star is planar. If stars differ, on four points near a circle or on
 noisy points, triangles of more stars come first, and of these the smaller ones; others that do not fit are left out.
-Then small gaps are closed in tangent planes, each vertex keeps one fan, loops of outer edges that no plane shows are
-filled in space, and points in no triangle are inserted into the nearest one.
+Then each vertex keeps one fan, loops of outer edges are filled in space, fans that are the only connection of parts are
+joined, and points in no triangle are inserted into the nearest one.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,12 +20,13 @@ from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, unique_rows
-from heat_igl.mesh.grouping import group_by_label, next_in_run
+from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.neighbourhoods import Neighbourhoods
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 __all__ = [
+    "FOLDED_BACK",
     "cloud_triangles",
     "pinched_vertices",
     "with_fans_joined",
@@ -38,25 +38,18 @@ __all__ = [
 # Largest radius of a circumscribed circle, in shares of the radius of the neighbourhood. Below one half, all points
 # inside the circle are known; a little more bridges the gaps of random points.
 _LARGEST_RADIUS = 0.6
-# The same for gaps, in shares of the distance of the farthest neighbour where they are filled in space: larger, since
-# the sides of a gap are known to belong to the surface.
+# The same for gaps, in shares of the distance of the farthest neighbour: larger, since the sides of a gap are known to
+# belong to the surface.
 _LARGEST_GAP = 0.9
-_MOST_ROUNDS = 20
 # Points whose stars are found at a time.
 _BLOCK = 1 << 14
 # Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge.
 _OTHER_SHEET = -0.25
-# Cosine of the angle to the next triangle above which the two lie on each other.
-_MOST_FOLDED = 0.99
+# Cosine of the angle to the next triangle above which the two fold back and may join sheets wrongly: 60 degrees; and
+# above which they lie on each other.
+FOLDED_BACK, _MOST_FOLDED = 0.5, 0.99
 # Triangles of a part for each one that fills its gaps: with fewer, it is the border of the part that was filled.
 _PER_FILLED = 10
-
-
-class _Outer(NamedTuple):
-    """The edges (k, 2) of one triangle alone, ascending and in lexicographic order, and the triangle (k,) of each."""
-
-    ends: IntArray
-    face: IntArray
 
 
 def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) -> IntArray:
@@ -80,10 +73,9 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) ->
     # The angle of a corner is the same number in every star that has the triangle.
     both = np.concatenate([F, candidates])
     F = both[fitting_triangles(P, near.axes, both, len(F))]
-    F = with_gaps_closed(P, F, near, is_settled)
     F = np.concatenate([agreed[~is_open], F])
-    F = with_fans_joined(P, with_one_fan(F, pinched_vertices(F, is_settled)), is_settled)
-    F = with_loops_filled(P, F, near.reach, is_settled)
+    F = with_loops_filled(P, with_one_fan(F, pinched_vertices(F, is_settled)), near.reach, is_settled)
+    F = with_fans_joined(P, F, is_settled)
     return _with_isolated_points(P, F, near)
 
 
@@ -169,27 +161,6 @@ def _facing(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vert
     return found
 
 
-def with_gaps_closed(P: FloatArray, F: IntArray, near: Neighbourhoods, is_settled: BoolArray) -> IntArray:
-    """The triangles F (m, 3) and others in small gaps between them.
-
-    Around settled vertices (n,) there are no gaps, and F need not have all their triangles. Gaps of more than three
-    sides are closed by triangles on two successive sides that overlap no others; gaps of three sides always, even if
-    the three points lie on a line in the tangent planes.
-    """
-    largest = _LARGEST_GAP * near.radius
-    for _ in range(_MOST_ROUNDS):
-        ears = _ears(P, _outer_edges(F, is_settled), near.axes, largest)
-        # Only triangles with a corner in common may overlap.
-        is_near = np.zeros(len(P), bool)
-        is_near[ears] = True
-        around = F[is_near[F].any(axis=1)]
-        fits = fitting_triangles(P, near.axes, np.concatenate([around, ears]), len(around))[len(around) :]
-        if not fits.any():
-            break
-        F = np.concatenate([F, ears[fits]])
-    return np.concatenate([F, _three_sided(P, _outer_edges(F, is_settled), largest)])
-
-
 def with_one_fan(F: IntArray, is_pinched: BoolArray) -> IntArray:
     """The triangles without those that touch the others in a vertex alone: around each vertex, the largest fan.
 
@@ -228,72 +199,6 @@ def pinched_vertices(F: IntArray, is_settled: BoolArray) -> BoolArray:
     of_fan = np.zeros(int(fan.max(initial=-1)) + 1, np.int64)
     of_fan[fan] = F.ravel()
     return np.asarray((np.bincount(of_fan, minlength=len(is_settled)) > 1) & ~is_settled)
-
-
-def _outer_edges(F: IntArray, is_settled: BoolArray) -> _Outer:
-    found = facets(F, len(is_settled))
-    face = np.empty(len(found.vertices), np.int64)
-    face[found.of_face] = np.arange(len(F))[:, None]
-    is_outer = (found.n_faces == 1) & ~is_settled[found.vertices].any(axis=1)
-    return _Outer(found.vertices[is_outer], face[is_outer])
-
-
-def _corners(P: FloatArray, outer: _Outer, axes: FloatArray) -> IntArray:
-    """Paths (k, 3) of two outer edges that follow each other around the vertex in the middle."""
-    ends = group_by_label(np.concatenate([outer.ends[:, 0], outer.ends[:, 1]]), len(P))
-    other = np.concatenate([outer.ends[:, 1], outer.ends[:, 0]])[ends.members]
-    degrees = np.diff(ends.first)
-    at = np.repeat(np.arange(len(P)), degrees)
-    # Between two edges there are two gaps, one of which has the triangles; where touching gaps meet, angles tell.
-    local = np.einsum("rax,rx->ra", axes[at, :2], P[other] - P[at])
-    order = np.lexsort((np.arctan2(local[:, 1], local[:, 0]), at))
-    following = next_in_run(order, degrees[degrees > 0])
-    corners = np.stack([other[order], at[order], other[following]], axis=1)
-    is_second = (degrees[at[order]] == 2) & (order > following)
-    return np.asarray(corners[~is_second])
-
-
-def _ears(P: FloatArray, outer: _Outer, axes: FloatArray, largest: FloatArray) -> IntArray:
-    """Triangles (k, 3) on two successive outer edges, smallest first, with circles no larger than allowed."""
-    ears = _corners(P, outer, axes)
-    radius = _circumradius(P[ears])
-    small = radius < largest[ears].min(axis=1)
-    return np.asarray(ears[small][np.argsort(radius[small], kind="stable")], dtype=np.int32)
-
-
-def _three_sided(P: FloatArray, outer: _Outer, largest: FloatArray) -> IntArray:
-    """Triangles (k, 3) all three sides of which are outer edges, of different triangles."""
-    n = len(P)
-    if not len(outer.ends):
-        return np.asarray(outer.ends[:, [0, 0, 0]], dtype=np.int32)
-    code = outer.ends[:, 0] * n + outer.ends[:, 1]
-    ends = group_by_label(outer.ends[:, 0], n)
-    # Each edge, with the edges from the larger of its ends on.
-    above, which = ends.of(outer.ends[:, 1])
-    a, c = outer.ends[which, 0], outer.ends[above, 1]
-    third = np.minimum(np.searchsorted(code, a * n + c), len(code) - 1)
-    sides = np.stack([which, above, third], axis=1)[code[third] == a * n + c]
-    taken: set[int] = set()
-    found = []
-    for row in sides.tolist():
-        corners = np.unique(outer.ends[row])
-        extent = np.linalg.norm(P[corners] - P[np.roll(corners, 1)], axis=1).max()
-        is_gap = len({int(outer.face[side]) for side in row}) > 1
-        if is_gap and taken.isdisjoint(row) and extent < 2 * largest[corners].min():
-            taken.update(row)
-            found.append(corners)
-    triangles: IntArray = np.reshape(found, (-1, 3)).astype(np.int32)
-    return triangles
-
-
-def _circumradius(corners: FloatArray) -> FloatArray:
-    """Radius (k,) of the circle around each triangle (k, 3, 3); ``inf`` for corners on a line."""
-    a, b = corners[:, 0] - corners[:, 1], corners[:, 2] - corners[:, 1]
-    double_area = np.linalg.norm(np.cross(a, b), axis=1)
-    sides = [np.linalg.norm(side, axis=1) for side in (a, b, a - b)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        radius = (sides[0] / double_area) * sides[1] * sides[2] / 2
-    return np.asarray(np.where(double_area > 0, radius, np.inf))
 
 
 def _in_smaller_fans(F: IntArray, is_pinched: BoolArray) -> BoolArray:
@@ -378,7 +283,7 @@ def _between_fans(P: FloatArray, vertex: int, sides: list[tuple[int, int]]) -> l
 
 
 def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_settled: BoolArray) -> IntArray:
-    """The triangles F (m, 3) int32, and others in small gaps all around which points have two outer edges.
+    """The triangles F (m, 3) int32, and others in gaps all around which points have two outer edges.
 
     Parameters
     ----------
@@ -402,20 +307,21 @@ def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_settled:
     opposite = np.empty(len(ends), np.int32)
     is_side = is_outer[found.of_face]
     opposite[number[found.of_face[is_side]]] = near_gaps[is_side]
-    filled = filling_triangles(
+    filled, is_closed = filling_triangles(
         P,
         ends,
         opposite,
         _two_edges_at(ends, n),
         _LARGEST_GAP * reach,
         found.vertices[:, 0] * n + found.vertices[:, 1],
+        FOLDED_BACK,
         _MOST_FOLDED,
     )
     if not len(filled):
         return F
     part = connected_components(F, n)
-    sizes, gains = (np.bincount(part[of[:, 0]], minlength=n) for of in (F, filled))
-    return np.concatenate([F, filled[(sizes >= _PER_FILLED * gains)[part[filled[:, 0]]]]])
+    sizes, gains = (np.bincount(part[of[:, 0]], minlength=n) for of in (F, filled[is_closed]))
+    return np.concatenate([F, filled[~is_closed | (sizes >= _PER_FILLED * gains)[part[filled[:, 0]]]]])
 
 
 def _two_edges_at(ends: AnyArray, n: int) -> AnyArray:

@@ -1,9 +1,8 @@
-"""Triangles that fill small gaps of a surface of points: ears cut from the loops of the outer edges, in space."""
+"""Triangles in the gaps of a surface of points: ears cut from the loops of the outer edges, in space."""
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.loop_filling import MOST
-from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.math import INFINITY, sqrt
 
 __all__ = ["filling_triangles"]
 
@@ -15,12 +14,14 @@ def filling_triangles(
     at: cython.const[cython.int][:, ::1],
     largest: cython.const[cython.double][::1],
     edges: cython.const[cython.longlong][::1],
+    folded_back: cython.double,
     most_folded: cython.double,
 ):
-    """Triangles in the loops of at most 40 outer edges that can be filled.
+    """Triangles in the loops of outer edges.
 
-    Of each loop, the ear with the smallest circumscribed circle is cut off again and again. A loop is filled whole or
-    not at all.
+    Of each loop, the ear with the smallest circumscribed circle is cut off again and again, as long as one may be: a
+    small gap is filled, and of a hole or of the border the notches. Ears that fold back are cut last, and only where
+    nothing is left of the loop then, as in creases.
 
     Parameters
     ----------
@@ -36,29 +37,37 @@ def filling_triangles(
         Largest radius of circles through each point.
     edges : (e,) int64
         All edges of the surface, the numbers ``lower * n + upper`` in ascending order: none gets another triangle.
-    most_folded : float
-        Cosine of the angle to the neighbour at an edge, 1 where the two lie on each other: no triangle has more.
+    folded_back, most_folded : float
+        Cosines of the angle to the neighbour at an edge, 1 where the two lie on each other: the largest of triangles
+        that are cut first, and of those in loops of which nothing is left.
 
     Returns
     -------
     triangles : (t, 3) int32
-        In each loop two fewer than it has edges.
+    is_closed : (t,) bool
+        Whether nothing is left of the loop.
     """
     k: cython.Py_ssize_t = ends.shape[0]
-    found = np.empty((k, 3), np.int32)
+    found, whole = np.empty((k, 3), np.int32), np.empty(k, np.bool_)
+    is_closed: cython.uchar[::1] = whole.view(np.uint8)
     triangles: cython.int[:, ::1] = found
     seen: cython.uchar[::1] = np.zeros(k, np.uint8)
-    ring: cython.int[::1] = np.empty(MOST, np.int32)
-    beyond: cython.int[::1] = np.empty(MOST, np.int32)
+    ring: cython.int[::1] = np.empty(k, np.int32)
+    beyond: cython.int[::1] = np.empty(k, np.int32)
+    radius: cython.double[::1] = np.empty(k)
     count: cython.Py_ssize_t = 0
     e: cython.Py_ssize_t
     with cython.nogil:
         for e in range(k):
             if not seen[e]:
                 size: cython.Py_ssize_t = _loop(e, ends, opposite, at, seen, ring, beyond)
-                if size >= 3 and _fill(P, ring, beyond, size, largest, edges, most_folded, triangles[count:]):
-                    count += size - 2
-    return found[:count]
+                if size >= 3:
+                    cut: cython.Py_ssize_t = _fill(
+                        P, ring, beyond, radius, size, largest, edges, folded_back, most_folded, triangles[count:]
+                    )
+                    is_closed[count : count + cut] = cut == size - 2
+                    count += cut
+    return found[:count], whole[:count]
 
 
 @cython.cfunc
@@ -73,20 +82,19 @@ def _loop(
     ring: cython.int[::1],
     beyond: cython.int[::1],
 ) -> cython.Py_ssize_t:
-    """The points of the loop from an edge on, and the corners opposite to the edges; their number, 0 if too many."""
+    """The points of the loop from an edge on, and the corners opposite to the edges; their number, 0 if it ends."""
     size: cython.Py_ssize_t = 0
     e: cython.Py_ssize_t = start
     point: cython.int = ends[e, 0]
     while not seen[e]:
         seen[e] = 1
-        if size < MOST:
-            ring[size], beyond[size] = point, opposite[e]
+        ring[size], beyond[size] = point, opposite[e]
         size += 1
         point = ends[e, 1] if ends[e, 0] == point else ends[e, 0]
         if at[point, 0] < 0:
             return 0
         e = at[point, 1] if at[point, 0] == e else at[point, 0]
-    return size if e == start and size <= MOST else 0
+    return size if e == start else 0
 
 
 @cython.cfunc
@@ -96,24 +104,33 @@ def _fill(
     P: cython.const[cython.double][:, ::1],
     ring: cython.int[::1],
     beyond: cython.int[::1],
+    radius: cython.double[::1],
     size: cython.Py_ssize_t,
     largest: cython.const[cython.double][::1],
     edges: cython.const[cython.longlong][::1],
+    folded_back: cython.double,
     most_folded: cython.double,
     triangles: cython.int[:, ::1],
-) -> cython.bint:
-    """Cut ears from a ring of points until nothing is left of it; whether that was possible."""
+) -> cython.Py_ssize_t:
+    """Cut ears from a ring of points while there are any; how many."""
     count: cython.Py_ssize_t = 0
+    flat: cython.Py_ssize_t = -1
+    limit: cython.double = folded_back
     i: cython.Py_ssize_t
+    for i in range(size):
+        radius[i] = _ear(P, ring, beyond, size, i, largest, edges, limit)
     while size > 2:
-        best: cython.Py_ssize_t = -1
-        smallest: cython.double = 0.0
-        for i in range(size):
-            radius: cython.double = _ear(P, ring, beyond, size, i, largest, edges, most_folded)
-            if radius >= 0.0 and (best < 0 or radius < smallest):
-                best, smallest = i, radius
-        if best < 0:
-            return False
+        best: cython.Py_ssize_t = 0
+        for i in range(1, size):
+            if radius[i] < radius[best]:
+                best = i
+        if radius[best] == INFINITY:
+            if flat >= 0:
+                return flat
+            flat, limit = count, most_folded
+            for i in range(size):
+                radius[i] = _ear(P, ring, beyond, size, i, largest, edges, limit)
+            continue
         before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
         triangles[count, 0], triangles[count, 1] = ring[before], ring[best]
         triangles[count, 2] = ring[0 if best == size - 1 else best + 1]
@@ -121,8 +138,14 @@ def _fill(
         beyond[before] = ring[best]
         size -= 1
         for i in range(best, size):
-            ring[i], beyond[i] = ring[i + 1], beyond[i + 1]
-    return True
+            ring[i], beyond[i], radius[i] = ring[i + 1], beyond[i + 1], radius[i + 1]
+        # The two neighbours have other ears now.
+        for i in range(best - 1, best + 1):
+            j: cython.Py_ssize_t = (i + size) % size
+            radius[j] = _ear(P, ring, beyond, size, j, largest, edges, limit)
+        if size == 3:  # one triangle is left
+            radius[0] = radius[1] = radius[2] = _ear(P, ring, beyond, size, 0, largest, edges, limit)
+    return count
 
 
 @cython.cfunc
@@ -138,22 +161,22 @@ def _ear(
     edges: cython.const[cython.longlong][::1],
     most_folded: cython.double,
 ) -> cython.double:
-    """Radius of the circle around the triangle of point i of a ring and its neighbours; -1 if it must not be cut."""
+    """Radius of the circle through point i of a ring and its neighbours; infinite if it may not be cut."""
     before: cython.Py_ssize_t = size - 1 if i == 0 else i - 1
     after: cython.Py_ssize_t = 0 if i == size - 1 else i + 1
     a: cython.int = ring[before]
     b: cython.int = ring[i]
     c: cython.int = ring[after]
     if size > 3 and _is_edge(edges, min(a, c), max(a, c), P.shape[0]):
-        return -1.0
+        return INFINITY
     radius: cython.double = _circumradius(P, a, b, c)
     # The last triangle has no edge of its own, and closes the gap even if its corners lie on a line.
     if size > 3 and radius >= min(largest[a], min(largest[b], largest[c])):
-        return -1.0
+        return INFINITY
     folded: cython.double = max(_fold(P, a, b, c, beyond[before]), _fold(P, b, c, a, beyond[i]))
     if size == 3:
         folded = max(folded, _fold(P, c, a, b, beyond[after]))
-    return -1.0 if folded > most_folded else radius
+    return INFINITY if folded > most_folded else radius
 
 
 @cython.cfunc

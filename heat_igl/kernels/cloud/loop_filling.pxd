@@ -1,5 +1,0 @@
-cdef extern from *:
-    """
-    #define MOST 40
-    """
-    Py_ssize_t MOST
