@@ -11,7 +11,7 @@ from heat_igl import Mesh, SurfacePoints, isolines, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.kernels.windows import windows
 from heat_igl.sources import source_set
-from heat_igl.windows import window_search
+from heat_igl.windows import exact
 from heat_igl.windows.exact import ExactSurface
 
 
@@ -41,9 +41,9 @@ ZOO = {
 
 @pytest.fixture(autouse=True)
 def shared_from_the_start(monkeypatch):
-    monkeypatch.setattr(window_search, "_FEWEST_SHARED", 0)
-    monkeypatch.setattr(window_search, "_PLENTY", 30)
-    monkeypatch.setattr(window_search, "_ROUND", 0.3)
+    monkeypatch.setattr(exact, "_FEWEST_SHARED", 0)
+    monkeypatch.setattr(exact, "_PLENTY", 30)
+    monkeypatch.setattr(exact, "_ROUND", 0.3)
 
 
 def both_ways(surface: ExactSurface, *sources: np.ndarray, **keywords: object) -> tuple[np.ndarray, np.ndarray]:

@@ -33,9 +33,8 @@ from heat_igl.windows import (
     within_store,
     write_distances_within,
 )
-from heat_igl.windows.exact import ExactSurface, exact_distance
+from heat_igl.windows.exact import ExactSurface, Found, exact_distance
 from heat_igl.windows.tables import from_mesh
-from heat_igl.windows.window_search import Found
 
 # --- Local queries: equal to the full search, ended where asked, cleared after each; errors that name the remedy
 

@@ -316,7 +316,7 @@ class GeodesicSolver(BatchedSolver):
         derivative, see `differentiable_surface`. The derivative is that of the exact paths. Of the Hopf-Lax formula,
         it is that of its fixed point, which ``phi`` is to rounding, see `SimplexDerivative`.
         """
-        from heat_igl.windows.engine import SimplexEngine
+        from heat_igl.sweep.simplex_engine import SimplexEngine
 
         if isinstance(self._engine, SimplexEngine):
             answer = self._engine.derivative(self._source_set(sources))

@@ -10,8 +10,8 @@ from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
+from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray
-from heat_igl.windows.engine import SimplexEngine
 
 __all__ = ["HopfLaxEngine"]
 

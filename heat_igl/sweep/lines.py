@@ -15,8 +15,8 @@ from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.line_derivative import LineDerivative, line_slopes
 from heat_igl.sweep.reflex_edges import reflex_edges
+from heat_igl.sweep.simplex_engine import ROUNDING, SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.windows.engine import ROUNDING, SimplexEngine
 
 __all__ = ["LineEngine"]
 

@@ -1,32 +1,47 @@
-"""What engines that measure distance along simplices have in common, and the triangles that they measure on."""
+"""Engines of distance along triangles: windows, whose answers are checked, and the triangles that they measure on."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import igl
 import numpy as np
 
-from heat_igl.kernels.mesh import bounds
-from heat_igl.mesh import Mesh
-from heat_igl.sources import SourceSet
+from heat_igl.errors import AccuracyWarning
+from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.mesh.surface_points import unchecked_points
+from heat_igl.runtime import warn_caller
+from heat_igl.sources import SourceSet, source_set
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.windows.exact import ExactSurface
+from heat_igl.windows.exact import ExactSolution, ExactSurface
+from heat_igl.windows.invariants import Invariants
+from heat_igl.windows.queries import Query, labels_of, starting_points
 from heat_igl.windows.tables import MARGIN, Tables, from_mesh, from_triangulation
 
 if TYPE_CHECKING:
     from heat_igl.intrinsic import IntrinsicTriangulation
-    from heat_igl.operators import MetricSimplices, Operators, Surface
-    from heat_igl.sweep.simplex_derivative import SimplexDerivative
+    from heat_igl.operators import Operators, Surface
+    from heat_igl.windows.curve_directions import CurveDirections
+    from heat_igl.windows.directions import PathAngles, PathDirections
+    from heat_igl.windows.path_lengths import PathLengths
 
-__all__ = ["ROUNDING", "Engine", "MeshTriangles", "OperatorTriangles", "SimplexEngine", "TriangleEngine", "Triangles"]
+__all__ = [
+    "Engine",
+    "GuardedEngine",
+    "MeshTriangles",
+    "OperatorTriangles",
+    "TriangleEngine",
+    "Triangles",
+    "WindowEngine",
+    "contradicted",
+    "distances_instead",
+    "guarded_windows",
+]
 
-#: Share of a distance that is rounding.
-ROUNDING = 1e-9
-# With more sources that begin at different values, lines are bounded by the nearest one and the first value.
-_MANY = 100
+_REPORT = "please report this as a bug, with the mesh and the sources"
 
 
 class Engine(ABC):
@@ -49,70 +64,6 @@ class Engine(ABC):
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
         """The distance of `labelled` alone."""
         return self.labelled(sources, cutoff, threads)[0]
-
-
-class SimplexEngine(Engine):
-    """Distance from vertices through simplices that need not fit together, held between two bounds.
-
-    Parameters
-    ----------
-    simplices : MetricSimplices
-        The domain.
-    """
-
-    def __init__(self, simplices: MetricSimplices) -> None:
-        self._simplices = simplices
-        self._corners = np.ascontiguousarray(simplices.corners, np.int32)
-        used = simplices.corners.ravel()
-        self._incident = np.argsort(used, kind="stable").astype(np.int32)
-        self._first = np.concatenate([[0], np.cumsum(np.bincount(used, minlength=simplices.n))]).astype(np.int32)
-
-    @abstractmethod
-    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
-        """Lower distance (n,), which begins with the offsets of the vertices and ``inf``; label (n,) counts these."""
-
-    @abstractmethod
-    def derivative(self, sources: SourceSet) -> SimplexDerivative:
-        """The distance from source vertices with its derivative."""
-
-    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:  # noqa: ARG002
-        """Distance (n,), and the source (n,) that it is measured from."""
-        distance, label = self._begun(sources)
-        vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
-        self._lower(vertices, offset, distance, label)
-        self._keep_bounds(vertices, offset, distance, label)
-        return distance, np.concatenate([sources.vertex_label, [-1]])[label]
-
-    def _begun(self, sources: SourceSet) -> tuple[FloatArray, AnyArray]:
-        """Distance (n,), ``inf`` but at the sources, and the number (n,) of the source there, else -1."""
-        distance, label = np.full(self._simplices.n, np.inf), np.full(self._simplices.n, -1, np.int32)
-        distance[sources.vertices], label[sources.vertices] = sources.vertex_offset, np.arange(len(sources.vertices))
-        return distance, label
-
-    @cached_property
-    def _edges(self) -> tuple[AnyArray, FloatArray]:
-        pairs, lengths = self._simplices.edges
-        return pairs.astype(np.int32), np.ascontiguousarray(lengths)
-
-    def _keep_bounds(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
-        """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""
-        place, least = self._simplices.place, self._simplices.least
-        if place is not None:
-            if np.ptp(offset) == 0 or len(offset) > _MANY:
-                from scipy.spatial import cKDTree
-
-                line = least * cKDTree(place[vertices]).query(place)[0] + offset.min()
-            else:
-                line = np.full(len(place), np.inf)
-                for vertex, start in zip(vertices, offset, strict=True):
-                    np.minimum(line, start + least * np.linalg.norm(place - place[vertex], axis=1), out=line)
-            line[vertices] = offset.min()
-            np.maximum(distance, line * (1 - ROUNDING), out=distance)
-        if bounds.is_longer(*self._edges, distance):
-            labels = label.astype(np.int64)
-            first, incident = bounds.incident_edges(self._edges[0], len(distance))
-            bounds.shorten(*self._edges, first, incident, distance, labels)
-            label[:] = labels
 
 
 class Triangles(ABC):
@@ -241,6 +192,231 @@ class TriangleEngine(Engine):
     def _with_copies(self, values: AnyArray) -> AnyArray:
         """Values (n,) in which copies of points have those of their originals."""
         return values if self._originals is None else values[self._originals]
+
+
+class WindowEngine(TriangleEngine):
+    """Distance by windows, directions and paths: all exact, which holds every tolerance."""
+
+    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
+        super().__init__(triangles, originals)
+        # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
+        self._from_vertices = ExactSurface(triangles.tables())
+
+    @cached_property
+    def _directions(self) -> PathDirections:
+        """Polar angles of the paths; a `MeshError` where vertices have no tangent plane."""
+        from heat_igl.windows.directions import PathDirections
+
+        return PathDirections(self._triangles.surface)
+
+    @cached_property
+    def _curve_directions(self) -> CurveDirections:
+        from heat_igl.windows.curve_directions import CurveDirections
+
+        return CurveDirections(self._triangles.surface)
+
+    def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
+        """Distance (n,)."""
+        if not sources.on_vertices_alone or sources.vertex_offset.any():
+            return super().distance(sources, cutoff, threads)
+        return self._with_copies(self._from_vertices.distance(sources.vertices, None, cutoff, threads))
+
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
+        """Distance (n,), and the source (n,) that it is measured from."""
+        query = Query.of(sources, self._triangles)
+        found = self.solution(query, query.cutoff(cutoff), threads=threads)
+        labels = labels_of(sources)[found.origin.label]
+        return self._with_copies(query.with_begin(found.distance)), self._with_copies(labels)
+
+    def solution(
+        self,
+        query: Query,
+        cutoff: float = np.inf,
+        *,
+        directed: bool = False,
+        targets: SurfacePoints | None = None,
+        goals: IntArray | None = None,
+        threads: int = 1,
+    ) -> ExactSolution:
+        """Distance and the paths from the sources of a query; see `ExactSurface.solve`."""
+        if query.has_curves:
+            surface = self._on_faces
+        elif query.points is not None or targets is not None or directed:
+            surface = self._on_delaunay
+        else:
+            surface = self._from_vertices
+        return query.solve(surface, cutoff=cutoff, directed=directed, targets=targets, goals=goals, threads=threads)
+
+    def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
+        """Distance (t,) of points or vertices; the search ends when all are known."""
+        query = Query.of(sources, self._triangles)
+        places = targets if isinstance(targets, SurfacePoints) else None
+        goals = np.empty(0, np.int64) if isinstance(targets, SurfacePoints) else targets
+        found = self.solution(query, targets=places, goals=goals)
+        if not isinstance(targets, SurfacePoints):
+            return query.with_begin(found.distance)[targets]
+        if query.begin is None:
+            return found.target_distance
+        begin = query.begin[self._triangles.given_faces[targets.faces, 0]]
+        return found.target_distance + np.where(np.isfinite(found.target_distance), begin, 0.0)
+
+    def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+        """Distance (n,), labels (n,), and of each path the directions and the place at which it starts; all exact.
+
+        Raises
+        ------
+        MeshError
+            If vertices have no tangent plane, see `polar_angles`.
+        """
+        query = Query.of(sources, self._triangles)
+        if query.has_curves:
+            of_curves = self._curve_directions
+            found = self.solution(query, directed=True)
+            angles, starts = of_curves.of_windows(found)
+        else:
+            of_points = self._directions
+            found = self.solution(query, directed=True)
+            angles = of_points.of_windows(found, query.points)
+            starts = starting_points(self._corner_at[sources.vertices], sources.points, found.origin.label)
+        labels = labels_of(sources)[found.origin.label]
+        distance = query.with_begin(found.distance)
+        distance, labels = self._with_copies(distance), self._with_copies(labels)
+        if self._originals is not None:
+            starts = unchecked_points(starts.faces[self._originals], starts.barycentric[self._originals])
+            angles = type(angles)(*(angle[self._originals] for angle in angles))
+        return distance, labels, angles, starts
+
+    @cached_property
+    def _corner_at(self) -> IntArray:
+        """The first corner (n,) of the given faces at each vertex."""
+        F, corner_at = self._triangles.given_faces, np.zeros(self._triangles.components.size, np.int64)
+        corner_at[F.ravel()[::-1]] = np.arange(F.size)[::-1]
+        return corner_at
+
+    def paths(self, sources: SourceSet) -> PathLengths:
+        """The paths whose lengths are the exact distances from vertices and points."""
+        from heat_igl.windows.path_lengths import PathLengths
+
+        return PathLengths(self._on_delaunay, self._triangles.surface.unfolding, sources)
+
+
+def contradicted(problem: str) -> RuntimeError:
+    """The error for an answer that contradicts itself and that nothing replaces."""
+    return RuntimeError(f"the distance contradicts itself ({problem}): {_REPORT}")
+
+
+class GuardedEngine(Engine):
+    """Windows with a check of every answer. A contradiction never leaves it.
+
+    Parameters
+    ----------
+    windows : WindowEngine
+        Asked first.
+    invariants : Invariants
+        What its answers keep.
+    tolerance : float
+        Violations by this share of the largest distance are no contradiction.
+    others : sequence of callables
+        Engines to ask instead, each made when it is needed.
+
+    Raises
+    ------
+    RuntimeError
+        On a query, if the answers of all engines contradict the invariants.
+
+    Warns
+    -----
+    AccuracyWarning
+        On a query that another engine answered.
+    """
+
+    def __init__(
+        self, windows: WindowEngine, invariants: Invariants, tolerance: float, others: tuple[Callable[[], Engine], ...]
+    ) -> None:
+        self.windows, self._invariants, self._tolerance, self._others = windows, invariants, tolerance, others
+
+    def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
+        """Distance (n,)."""
+        found = self.windows.distance(sources, cutoff, threads)
+        problem = self.problem(found, sources, cutoff)
+        return found if problem is None else self._replacement(problem, sources, cutoff, threads)[0]
+
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
+        """Distance (n,), and the source (n,) that it is measured from."""
+        found = self.windows.labelled(sources, cutoff, threads)
+        problem = self.problem(found[0], sources, cutoff)
+        return found if problem is None else self._replacement(problem, sources, cutoff, threads)
+
+    def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
+        """Distance (t,) of points or vertices, see `WindowEngine.to_targets`."""
+        found = self.windows.to_targets(sources, targets)
+        problem = self._invariants.contradiction_at(found, sources, targets)
+        if problem is None:
+            return found
+        if isinstance(targets, SurfacePoints):
+            raise contradicted(problem)
+        return self._replacement(problem, sources, np.inf, 1)[0][targets]
+
+    def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+        """Distance and directions, see `WindowEngine.directed`: no other engine finds these."""
+        found = self.windows.directed(sources)
+        problem = self.problem(found[0], sources)
+        if problem is not None:
+            raise contradicted(problem)
+        return found
+
+    def problem(self, distance: FloatArray, sources: SourceSet, cutoff: float = np.inf) -> str | None:
+        """How an answer (n,) contradicts the invariants; None if it does not."""
+        return self._invariants.contradiction(distance, sources, cutoff, self._tolerance)
+
+    def _replacement(
+        self, problem: str, sources: SourceSet, cutoff: float, threads: int
+    ) -> tuple[FloatArray, IntArray]:
+        for make in self._others:
+            found = make().labelled(sources, cutoff, threads)
+            if self.problem(found[0], sources, cutoff) is None:
+                warn_caller(
+                    f"the distance contradicted itself ({problem}) and was replaced by that of another method, which "
+                    f"is less accurate: {_REPORT}",
+                    AccuracyWarning,
+                )
+                return found
+        raise contradicted(f"{problem}, whatever method finds it")
+
+
+def guarded_windows(
+    triangles: Triangles, V: FloatArray | None, tolerance: float = 0.0, originals: IntArray | None = None
+) -> GuardedEngine:
+    """Windows on triangles with positions V (n, 3), if known; a sweep answers where they contradict themselves.
+
+    Other arguments as for `WindowEngine`.
+    """
+    components = triangles.components if originals is None else triangles.components[originals]
+    if V is None:
+        invariants = Invariants(triangles.faces.F, components, lengths=triangles.faces.l)
+    else:
+        invariants = Invariants(triangles.given_faces, components, V)
+    windows = WindowEngine(triangles, originals)
+    return GuardedEngine(windows, invariants, tolerance, (partial(_sweep, triangles, originals),))
+
+
+def _sweep(triangles: Triangles, originals: IntArray | None) -> Engine:
+    from heat_igl.sweep.sweep import SweepEngine
+
+    return SweepEngine(triangles, originals)
+
+
+def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:
+    """Distances (k, n) from each of some vertices, in place of local answers that contradict themselves."""
+    if not len(vertices):
+        return np.empty((0, mesh.n_vertices))
+    warn_caller(
+        f"distances from vertex {vertices[0]} contradicted themselves ({len(vertices)} sources) and were found again "
+        f"on the whole mesh: {_REPORT}",
+        AccuracyWarning,
+    )
+    engine = guarded_windows(MeshTriangles(mesh), mesh.V)
+    return np.stack([engine.distance(source_set(int(vertex), mesh.n_vertices, None)) for vertex in vertices])
 
 
 def _as_thin_as_given(surface: Surface) -> Surface:

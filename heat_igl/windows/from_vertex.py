@@ -12,8 +12,8 @@ from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.kernels.windows.surface import SEVERAL_FANS
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.windows.exact import Leaving, Searched, search, starts_at
 from heat_igl.windows.tables import Tables, from_mesh
-from heat_igl.windows.window_search import Leaving, Searched, search, starts_at
 
 __all__ = ["vectors_from"]
 

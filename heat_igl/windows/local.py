@@ -13,7 +13,7 @@ from heat_igl.runtime import TimeLeft, available_memory, n_threads
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import local_searches
-from heat_igl.windows.guarded import distances_instead
+from heat_igl.windows.engine import distances_instead
 from heat_igl.windows.tables import Tables, from_mesh
 
 __all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]

@@ -15,8 +15,7 @@ from heat_igl.kernels.windows import derivatives as kernels
 from heat_igl.mesh import SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.windows.exact import ExactSurface
-from heat_igl.windows.window_search import search, starts_at
+from heat_igl.windows.exact import ExactSurface, search, starts_at
 
 __all__ = ["Change", "PathLengths", "SideChange"]
 

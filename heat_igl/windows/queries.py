@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,8 +11,10 @@ from heat_igl.mesh import SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.sources import SourcePoints, SourceSet
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.windows.engine import Triangles
-from heat_igl.windows.exact import ExactSolution, ExactSurface
+
+if TYPE_CHECKING:
+    from heat_igl.windows.engine import Triangles
+    from heat_igl.windows.exact import ExactSolution, ExactSurface
 
 __all__ = ["Query", "labels_of", "starting_points"]
 

@@ -12,8 +12,8 @@ from heat_igl.kernels.windows import paths
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.windows.exact import Searched, search, starts_at
 from heat_igl.windows.tables import MARGIN, Tables, from_triangulation
-from heat_igl.windows.window_search import Searched, search, starts_at
 
 __all__ = ["ExactPaths", "PathStarts", "exact_paths"]
 

@@ -17,7 +17,7 @@ __all__ = ["InnerSources", "PathTracer", "trace_back"]
 class InnerSources:
     """Source points and, after them, source segments of a search by windows.
 
-    `n` is the number of vertices, and `starts` are the sources, see `heat_igl.windows.window_search.Starts`.
+    `n` is the number of vertices, and `starts` are the sources, see `heat_igl.windows.exact.Starts`.
     """
 
     def __init__(self, n, starts):

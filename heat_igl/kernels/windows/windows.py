@@ -26,7 +26,7 @@ class Front:
         m triangles on n vertices, see `heat_igl.windows.tables.Tables`. The kinds of vertices are filled further,
         the same by every search.
     found : Found
-        Takes distances, and where the shortest paths come from, see `heat_igl.windows.window_search.Found`: nothing
+        Takes distances, and where the shortest paths come from, see `heat_igl.windows.exact.Found`: nothing
         found yet at n vertices, with labels for as many source points and segments as there will be.
     tolerance : float
         A window is cut where another path is shorter by more than this fraction of the distance.
@@ -112,12 +112,12 @@ def search(
         Used for one search only; its labels have room for the source points and segments. Of a pair (see
         `pair`), one gets all sources and the other none.
     starts : Starts
-        The sources, see `heat_igl.windows.window_search.Starts`. A source on a side is listed once for every face
+        The sources, see `heat_igl.windows.exact.Starts`. A source on a side is listed once for every face
         there, and the ends of segments must be among the points.
     goal : (g,)
         With `stops_early`, the search ends when the distances of these vertices and of all targets are known.
     targets : Targets
-        Points whose distance is asked for, see `heat_igl.windows.window_search.Targets`.
+        Points whose distance is asked for, see `heat_igl.windows.exact.Targets`.
     cutoff : float
         Distances up to here are exact, larger ones may be too large.
     statistics : (3,)

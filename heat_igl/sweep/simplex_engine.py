@@ -1,0 +1,89 @@
+"""What engines that measure distance along simplices have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from heat_igl.kernels.mesh import bounds
+from heat_igl.sources import SourceSet
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.windows.engine import Engine
+
+if TYPE_CHECKING:
+    from heat_igl.operators import MetricSimplices
+    from heat_igl.sweep.simplex_derivative import SimplexDerivative
+
+__all__ = ["ROUNDING", "SimplexEngine"]
+
+#: Share of a distance that is rounding.
+ROUNDING = 1e-9
+# With more sources that begin at different values, lines are bounded by the nearest one and the first value.
+_MANY = 100
+
+
+class SimplexEngine(Engine):
+    """Distance from vertices through simplices that need not fit together, held between two bounds.
+
+    Parameters
+    ----------
+    simplices : MetricSimplices
+        The domain.
+    """
+
+    def __init__(self, simplices: MetricSimplices) -> None:
+        self._simplices = simplices
+        self._corners = np.ascontiguousarray(simplices.corners, np.int32)
+        used = simplices.corners.ravel()
+        self._incident = np.argsort(used, kind="stable").astype(np.int32)
+        self._first = np.concatenate([[0], np.cumsum(np.bincount(used, minlength=simplices.n))]).astype(np.int32)
+
+    @abstractmethod
+    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
+        """Lower distance (n,), which begins with the offsets of the vertices and ``inf``; label (n,) counts these."""
+
+    @abstractmethod
+    def derivative(self, sources: SourceSet) -> SimplexDerivative:
+        """The distance from source vertices with its derivative."""
+
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:  # noqa: ARG002
+        """Distance (n,), and the source (n,) that it is measured from."""
+        distance, label = self._begun(sources)
+        vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
+        self._lower(vertices, offset, distance, label)
+        self._keep_bounds(vertices, offset, distance, label)
+        return distance, np.concatenate([sources.vertex_label, [-1]])[label]
+
+    def _begun(self, sources: SourceSet) -> tuple[FloatArray, AnyArray]:
+        """Distance (n,), ``inf`` but at the sources, and the number (n,) of the source there, else -1."""
+        distance, label = np.full(self._simplices.n, np.inf), np.full(self._simplices.n, -1, np.int32)
+        distance[sources.vertices], label[sources.vertices] = sources.vertex_offset, np.arange(len(sources.vertices))
+        return distance, label
+
+    @cached_property
+    def _edges(self) -> tuple[AnyArray, FloatArray]:
+        pairs, lengths = self._simplices.edges
+        return pairs.astype(np.int32), np.ascontiguousarray(lengths)
+
+    def _keep_bounds(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
+        """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""
+        place, least = self._simplices.place, self._simplices.least
+        if place is not None:
+            if np.ptp(offset) == 0 or len(offset) > _MANY:
+                from scipy.spatial import cKDTree
+
+                line = least * cKDTree(place[vertices]).query(place)[0] + offset.min()
+            else:
+                line = np.full(len(place), np.inf)
+                for vertex, start in zip(vertices, offset, strict=True):
+                    np.minimum(line, start + least * np.linalg.norm(place - place[vertex], axis=1), out=line)
+            line[vertices] = offset.min()
+            np.maximum(distance, line * (1 - ROUNDING), out=distance)
+        if bounds.is_longer(*self._edges, distance):
+            labels = label.astype(np.int64)
+            first, incident = bounds.incident_edges(self._edges[0], len(distance))
+            bounds.shorten(*self._edges, first, incident, distance, labels)
+            label[:] = labels
