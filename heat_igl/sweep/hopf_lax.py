@@ -36,8 +36,14 @@ class HopfLaxEngine(SimplexEngine):
         E = X[:, 1:] - X[:, :1]
         others = np.swapaxes(np.linalg.inv(E) if is_solid else np.linalg.pinv(E), 1, 2)
         gradient = np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)
-        # What `HopfLax` reads: squared lengths, gradients of coordinates, and positions.
-        self._in_metric = simplices.squared_lengths(), np.ascontiguousarray(gradient), place
+        squares = simplices.squared_lengths()
+        mean = squares[:, 0] if squares.shape[1] == 1 else squares.mean(axis=1)
+        shorter = squares / np.where(mean > 0, mean, np.inf)[:, None]
+        slack = np.sqrt(np.where(mean[:, None] > 0, shorter, 1.0).min(axis=(1, 2, 3)))
+        self._in_metric = (
+            squares,
+            *map(np.ascontiguousarray, (mean, squares.max(axis=(1, 2, 3)), slack, gradient, place)),
+        )
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:  # noqa: ARG002
         """Lower distance to that of second order."""

@@ -30,5 +30,5 @@ cdef class Facet:
     cdef double along_edges(self) noexcept nogil
     cdef double length(self, const double* x) noexcept nogil
     cdef double value(self, const double* x) noexcept nogil
-    cdef double newton(self) noexcept nogil
+    cdef double newton(self, double limit) noexcept nogil
     cdef (double, double) on_triangle(self, double* x) noexcept nogil

@@ -76,7 +76,7 @@ class Facet:
         by: cython.double[3][4]
         slope: cython.double[3]
         bent: cython.double[3]
-        first: cython.double = 0.0
+        size: cython.double[4]
         for k in range(self.q):
             of = 0.0
             for i in range(p):
@@ -86,14 +86,13 @@ class Facet:
                 of += x[i] * by[k][i]
             if not of > 0.0:
                 return 0.0
-            if k == 0:
-                first = of
-            else:
+            size[k] = of
+            if k > 0:
                 self.level[k - 1] = log(of)
                 to += x[k - 1] * self.level[k - 1]
             for i in range(p):
                 by[k][i] *= 2.0 / of
-        near: cython.double = sqrt(first)
+        near: cython.double = sqrt(size[0])
         if self.q == 1:
             for i in range(p):
                 self.g[i] = 0.5 * near * by[0][i]
@@ -115,14 +114,14 @@ class Facet:
                 bent[i] += x[k] * by[k + 1][i]
             slope[i] = self.level[i] + bent[i]
             self.g[i] = a * by[0][i] + b * slope[i]
-            self.lean[i] = a * (self.level[i] - log(first) - by[0][i]) - b * bent[i]
+            self.lean[i] = a * (self.level[i] - log(size[0]) - by[0][i]) - b * bent[i]
         for i in range(p):
             for j in range(i + 1):
-                of = 2.0 * self.product[3 * i + j] / first - by[0][i] * by[0][j]
+                of = 2.0 * self.product[3 * i + j] / size[0] - by[0][i] * by[0][j]
                 to = by[i + 1][j] + by[j + 1][i]
                 for k in range(p):
                     to += x[k] * (
-                        2.0 * self.product[9 * (k + 1) + 3 * i + j] / exp(self.level[k]) - by[k + 1][i] * by[k + 1][j]
+                        2.0 * self.product[9 * (k + 1) + 3 * i + j] / size[k + 1] - by[k + 1][i] * by[k + 1][j]
                     )
                 self.H[i][j] = (
                     a * of
@@ -165,8 +164,11 @@ class Facet:
                 self.H[j][i] = self.H[i][j]
         return self.start + T + L
 
-    def newton(self) -> cython.double:
-        """The least value over the facet, by Newton's method from `share`, which is changed."""
+    def newton(self, limit: cython.double) -> cython.double:
+        """The least value over the facet, by Newton's method from `share`, which is changed; inf if not below `limit`.
+
+        Values are convex, so that none is below the tangent plane of the first.
+        """
         x: cython.double[3]
         y: cython.double[3]
         i: cython.int
@@ -181,6 +183,13 @@ class Facet:
             for i in range(self.p):
                 x[i] = self.share[i] = 1.0 / self.p
             best = self.value(x)
+        low: cython.double = INFINITY
+        at: cython.double = 0.0
+        for i in range(self.p):
+            low = min(low, self.g[i])
+            at += self.g[i] * x[i]
+        if best + low - at >= limit:
+            return INFINITY
         for _step in range(MOST_STEPS):
             if best == INFINITY:
                 return best

@@ -62,7 +62,7 @@ cdef class HopfLax(Facet):
     cdef void lay(self, int s, int c) noexcept nogil
     cdef bint rests_on(self, int v, int u) noexcept nogil
     cdef double through(self, int s, int c, double best) noexcept nogil
-    cdef double curved(self, int s, int c, double best) noexcept nogil
+    cdef double curved(self, int s, int c, double best, double limit) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
     cdef double trust(self, int s, int c, int i) noexcept nogil
     cdef void find_slope(self, int s, int c) noexcept nogil

@@ -45,22 +45,21 @@ class HopfLax(Facet):
     squares : (m, q, p + 1, p + 1) float64
         Squared distances between the corners of each simplex, in its metric (q = 1), or in that of each of its corners
         (q = p + 1).
+    mean : (m, p + 1, p + 1) float64
+        The mean of these over the metrics.
+    widest, slack : (m,) float64
+        The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
     gradient : (m, p + 1, 3) float64
         Of the barycentric coordinates of each simplex.
     V : (n, 3) float64
         Positions.
     """
 
-    def __init__(self, corners, first, incident, squares, gradient, V):
+    def __init__(self, corners, first, incident, squares, mean, widest, slack, gradient, V):
         self.corners, self.first, self.incident, self.squares = corners, first, incident, squares
-        self.gradient, self.V = gradient, V
+        self.mean, self.widest, self.slack, self.gradient, self.V = mean, widest, slack, gradient, V
         self.p, self.q = corners.shape[1] - 1, squares.shape[1]
-        self.unit = np.sqrt(squares.mean())
-        # The longest edge, and by which factor lengths may be shorter than in the mean metric.
-        self.widest = squares.max(axis=(1, 2, 3))
-        apart = squares[:, :, ~np.eye(self.p + 1, dtype=bool)]
-        self.slack = np.sqrt(apart / apart.mean(axis=1, keepdims=True)).min(axis=(1, 2))
-        self.mean = squares[:, 0] if self.q == 1 else np.ascontiguousarray(squares.mean(axis=1))
+        self.unit = sqrt(np.mean(widest))
 
     def first_order(self, d, label, offset):
         """Lower distances `d` (n,) to those from the vertices where they are finite, in place.
@@ -78,7 +77,7 @@ class HopfLax(Facet):
         self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
         self.fixed = np.isfinite(d).view(np.uint8)
         self.queue = PriorityQueue(n)
-        self.handed = np.full(n, np.inf)
+        self.handed, self.facet = np.full(n, np.inf), np.full(n, -1, np.int32)
         with cython.nogil:
             self.spread()
         raise_caught()
@@ -102,7 +101,7 @@ class HopfLax(Facet):
         """
         n = self.d.shape[0]
         self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
-        self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
+        self.place = np.zeros((n, self.p))
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen(settled)
@@ -149,7 +148,7 @@ class HopfLax(Facet):
                         value: cython.double = self.linear(s, c)
                         if value < self.d[u]:
                             self.label[u] = self.label[self.corners[s, self.nearest_corner()]]
-                            self.d[u] = value
+                            self.d[u], self.facet[u] = value, s * size + c
                             if value + gain * fabs(value) < self.handed[u]:
                                 self.wait(u)
                 v = self.nearest_waiting()
@@ -311,7 +310,7 @@ class HopfLax(Facet):
         best: cython.double = INFINITY
         best_at: cython.int = -1
         kept: cython.double[3]
-        # The facet of the last visit first: it rules out most of the others.
+        # The facet of first order, or of the last visit, comes first: it rules out most of the others.
         for k in range(self.first[v] - 1, self.first[v + 1]):
             at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
             if at < 0 or (at == self.facet[v] and k >= self.first[v]):
@@ -366,7 +365,7 @@ class HopfLax(Facet):
         sag: cython.double = near - sqrt(max(near * near - self.widest[s], 0.0))
         if not nearest + self.slack[s] * (linear - nearest) - sag < best:
             return INFINITY
-        return self.curved(s, c, linear)
+        return self.curved(s, c, linear, best)
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """Fill `product`: of v's metric first, then of those of the corners of the facet."""
@@ -387,8 +386,11 @@ class HopfLax(Facet):
                         - sq[size * self.side[i] + self.side[j]]
                     )
 
-    def curved(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
-        """The least value at corner c of simplex s with T of second order, after that of first order; sets `share`."""
+    def curved(self, s: cython.int, c: cython.int, best: cython.double, limit: cython.double) -> cython.double:
+        """The least value at corner c of simplex s with T of second order, after that of first order; sets `share`.
+
+        It may be inf if it is not below `limit`.
+        """
         i: cython.int
         j: cython.int
         start: cython.double = INFINITY
@@ -412,7 +414,7 @@ class HopfLax(Facet):
                 if not is_flat:
                     sag = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
                 self.sag[i][j] = self.sag[j][i] = sag
-        best = self.newton()
+        best = self.newton(limit)
         if is_source:
             # Straight from the source, where the square of T may have no derivatives.
             for i in range(3):
