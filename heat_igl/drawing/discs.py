@@ -10,8 +10,6 @@ from heat_igl.typing import FloatArray
 
 __all__ = ["discs"]
 
-# Radius in shares of the mean length of the edges at a point: neighbouring discs overlap, so no gaps show.
-_RADIUS = 0.8
 _CORNERS, _FEW_CORNERS = 8, 4
 # Above this number of points a disc is a few pixels wide, and is drawn as a square.
 _MANY = 20_000
@@ -33,14 +31,17 @@ def discs(cloud: PointCloud, values: FloatArray, is_flat: bool = False) -> tuple
     x = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     y = np.cross(normals, x) / np.linalg.norm(normals, axis=1, keepdims=True)
-    ends = triangles.edges.ravel()
-    number = np.bincount(ends, minlength=n)
-    length = np.bincount(ends, np.repeat(triangles.edge_lengths, 2), n) / np.maximum(number, 1)
-    length[number == 0] = triangles.edge_lengths.mean()
-    length = length[cloud.originals]
+    # Discs around its corners cover a triangle if they reach the centre of its circle; a triangle with an obtuse angle
+    # needs no more than an equilateral one with its longest side.
+    sides = igl.edge_lengths(V, triangles.F)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.fmin(sides.prod(axis=1) / (4 * triangles.measures), sides.max(axis=1) / np.sqrt(3))
+    radius = np.zeros(n)
+    np.maximum.at(radius, triangles.F, np.broadcast_to(reach[:, None], triangles.F.shape))
+    radius = np.where(radius > 0, radius, reach.mean())[cloud.originals] / np.cos(np.pi / k)
     angle = 2 * np.pi * np.arange(k) / k
     across = np.cos(angle)[:, None] * x[:, None] + np.sin(angle)[:, None] * y[:, None]
-    rim = _RADIUS * length[:, None, None] * across
+    rim = radius[:, None, None] * across
     slope = np.zeros((n, 3)) if is_flat else _slopes(triangles, values)[cloud.originals]
     finite = values[np.isfinite(values)]
     on_rim = values[:, None] + np.einsum("nkx,nx->nk", rim, slope)
