@@ -26,8 +26,8 @@ GROUPS = {
     "Which side": """signed_distance SignedHeatSolver OrientedPoints mesh.region_boundary volume_signed_distance
         VoxelBox""",
     "Sampling": """farthest_points farthest_cells voronoi_cells sampling.VoronoiCells sampling.dual_triangulation
-        sampling.geodesic_centre karcher_mean centroidal_voronoi curves.CentroidalSites diameter""",
-    "Operators of a domain": """Operators operators.polygon_operators operators.point_cloud_operators speed_operators
+        karcher_mean centroidal_voronoi curves.CentroidalSites diameter""",
+    "Operators of a domain": """Operators operators.point_cloud_operators speed_operators
         metric_operators fibre_metric activation_times""",
     "Surface maps": "smooth parcel_distances geodesic_errors",
     "Validation": """validate ValidationReport validation.ValidationRow reference

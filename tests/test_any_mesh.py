@@ -51,7 +51,6 @@ CALLS: dict[str, Call] = {
     "farthest_cells": lambda mesh: heat_igl.farthest_cells(mesh, 4).labels,
     "farthest_points": lambda mesh: heat_igl.farthest_points(mesh, 4),
     "geodesic_bezier": lambda mesh: heat_igl.curves.geodesic_bezier(mesh, [0, 3, 21, 40], 4).positions(MESH),
-    "geodesic_centre": lambda mesh: heat_igl.sampling.geodesic_centre(mesh, SOLVER, [0, 3, 21]).barycentric,
     "geodesic_distance": lambda mesh: heat_igl.geodesic_distance(mesh, 0),
     "geodesic_errors": lambda mesh: heat_igl.geodesic_errors(mesh, [0, 5], [3, 5]),
     "geodesic_path": lambda mesh: heat_igl.geodesic_path(mesh, [0, 40]).positions(MESH),
@@ -65,7 +64,6 @@ CALLS: dict[str, Call] = {
     "offset_curves": lambda mesh: heat_igl.curves.offset_curves(mesh, SOLVER, 0, 0.3)[0].positions(MESH),
     "pair_distances": lambda mesh: heat_igl.pair_distances(mesh, [[0, 7], [3, 9]]),
     "parcel_distances": lambda mesh: heat_igl.parcel_distances(mesh, LABELS, statistic="min"),
-    "polygon_operators": lambda mesh: heat_igl.operators.polygon_operators(mesh).L,
     "region_boundary": lambda mesh: heat_igl.mesh.region_boundary(mesh, vertices=LABELS < 1)[0].positions(MESH),
     "shortest_path": lambda mesh: heat_igl.shortest_path(mesh, 0, 40).points,
     "shortest_paths": lambda mesh: heat_igl.shortest_paths(mesh, 40, 0)[0].positions(MESH),
@@ -164,15 +162,8 @@ def test_a_mesh_of_another_library_gives_the_same(name: str, tmp_path: Path, mon
     if name.startswith("plots."):
         pytest.importorskip("matplotlib")
         monkeypatch.setattr("heat_igl.drawing.plots.lay_out", Drawn)
-    given = heat_igl.PolygonMesh(MESH.V, MESH.F.tolist()) if name == "polygon_operators" else MESH
-    found, expected = plain(CALLS[name](OTHER)), plain(CALLS[name](given))
+    found, expected = plain(CALLS[name](OTHER)), plain(CALLS[name](MESH))
     if isinstance(found, np.ndarray):
         np.testing.assert_array_equal(found, expected)
     else:
         assert found == expected
-
-
-def test_polygon_operators_need_polygons() -> None:
-    for given in (shapes.box(2), heat_igl.PointCloud(MESH.V)):
-        with pytest.raises(heat_igl.MeshError, match="polygon_operators needs polygons, not "):
-            heat_igl.operators.polygon_operators(given)

@@ -215,7 +215,7 @@ TAKE_POSITIONS = {
     "closest_points": lambda V: heat_igl.closest_points(FLAT, V[:5] / 2).points.barycentric,
     "curve_on": lambda V: heat_igl.curve_on(FLAT, V[[0, 4, 9]]).start,
     "PointCloud": lambda V: HeatMethodSolver(PointCloud(V)).distance(3),
-    "polygon_operators": lambda V: heat_igl.operators.polygon_operators(PolygonMesh(V, FLAT.F)).L.toarray(),
+    "PolygonMesh": lambda V: HeatMethodSolver(PolygonMesh(V, FLAT.F)).distance(3),
     "tangent_frames": lambda V: heat_igl.tangent_frames((V, FLAT.F)).x,
     "closed_forms.plane": lambda V: heat_igl.validation.closed_forms.plane((V, FLAT.F), 3),
     "with_vertices": lambda V: HeatMethodSolver(FLAT).with_vertices(2 * V).distance(3),

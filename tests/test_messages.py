@@ -63,7 +63,6 @@ def test_unknown_arguments_name_the_nearest_one(ask, message):
         (lambda: voronoi_cells(SOLVER, [1, 162]), r"sites\[1\] = 162 is no vertex"),
         (lambda: heat_igl.distance_matrix(SOLVER, [162]), r"indices\[0\] = 162 is no vertex"),
         (lambda: heat_igl.diameter(SOLVER, start=162), r"start\[0\] = 162 is no vertex"),
-        (lambda: heat_igl.sampling.geodesic_centre(MESH, SOLVER, [162]), r"points\[0\] = 162 is no vertex"),
     ],
 )
 def test_errors_name_the_argument_of_the_offender(ask, message):

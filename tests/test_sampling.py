@@ -9,7 +9,6 @@ from scipy.spatial import Delaunay
 import heat_igl
 from heat_igl import sampling, shapes
 from heat_igl.mesh import Mesh
-from heat_igl.sampling.centre import _least_in_faces
 
 
 @pytest.fixture(scope="module")
@@ -201,74 +200,6 @@ def test_dual_must_be_a_manifold_with_every_site():
     bow_tie = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
     with pytest.raises(heat_igl.MeshError, match=r"the triangles at cell 0 are not one fan \(1 cells"):
         sampling.dual_triangulation(bow_tie, every_vertex_a_site(bow_tie))
-
-
-def test_least_value_on_a_face_against_a_search():
-    """f of random distances on random triangles: inside, on an edge and in a corner."""
-    rng = np.random.default_rng(2)
-    corner = rng.standard_normal((200, 3, 3))
-    value = rng.uniform(0, 6, (200, 3))
-    x, least = _least_in_faces(corner, value, 1.5)
-    i, j = np.divmod(np.arange(101 * 101), 101)
-    grid = np.stack([i, j, 100 - i - j], axis=1)[i + j <= 100] / 100
-    points = np.einsum("gc,mcx->mgx", grid, corner)
-    # f is linear plus W |p|^2, whatever the origin.
-    squares = (corner**2).sum(axis=2)
-    f = np.einsum("gc,mc->mg", grid, value - 1.5 * squares) + 1.5 * (points**2).sum(axis=2)
-    assert (least <= f.min(axis=1) + 1e-9).all()
-    np.testing.assert_allclose(least, f.min(axis=1), atol=0.01)
-    n_positive = (x > 1e-12).sum(axis=1)
-    assert {1, 2, 3} <= set(n_positive.tolist())
-    np.testing.assert_allclose(x.sum(axis=1), 1)
-
-
-def test_centre_in_the_plane_is_the_weighted_mean(square):
-    mesh, solver = square
-    points, weights = [3, 417, 200, 200, 62], [1.0, 2.0, 0.5, 0.25, 1.5]
-    centre = sampling.geodesic_centre(mesh, solver, points, weights)
-    expected = np.average(mesh.V[points], axis=0, weights=weights)
-    np.testing.assert_allclose(centre.positions(mesh)[0], expected, atol=1e-9)
-
-
-def test_centre_on_an_edge_and_in_a_corner(square):
-    mesh, solver = square
-    on_edge = sampling.geodesic_centre(mesh, solver, [0, 1]).positions(mesh)[0]
-    np.testing.assert_allclose(on_edge, mesh.V[[0, 1]].mean(axis=0), atol=1e-9)
-    in_corner = sampling.geodesic_centre(mesh, solver, [5]).positions(mesh)[0]
-    np.testing.assert_allclose(in_corner, mesh.V[5], atol=1e-9)
-
-
-def test_centre_of_an_arc_of_a_sphere():
-    """Three points at equal distance about an axis, the axis no vertex."""
-    mesh = shapes.icosphere(5)
-    axis = np.array([1.0, 2.0, 3.0]) / np.sqrt(14)
-    e = np.cross(axis, [1, 0, 0]) / np.linalg.norm(np.cross(axis, [1, 0, 0]))
-    angle = 2 * np.pi * np.arange(3)[:, None] / 3
-    ring = np.cos(0.6) * axis + np.sin(0.6) * (np.cos(angle) * e + np.sin(angle) * np.cross(axis, e))
-    points = [int(np.argmax(mesh.V @ p)) for p in ring]
-    # The vertices miss the ring by up to half an edge; weighted tangents at the true Karcher mean sum to 0.
-    mean = axis.copy()
-    for _ in range(50):
-        cosine = mesh.V[points] @ mean
-        tangent = (np.arccos(cosine) / np.sqrt(1 - cosine**2))[:, None] * (mesh.V[points] - cosine[:, None] * mean)
-        mean += tangent.mean(axis=0)
-        mean /= np.linalg.norm(mean)
-    solver = heat_igl.GeodesicSolver(mesh, method="exact")
-    found = sampling.geodesic_centre(mesh, solver, points).positions(mesh)[0]
-    h = mesh.edge_lengths.mean()
-    assert np.linalg.norm(found / np.linalg.norm(found) - mean) < 0.1 * h
-    assert np.linalg.norm(mesh.V - mean, axis=1).min() > 0.2 * h  # no vertex would do
-
-
-def test_centre_refuses_what_has_none():
-    mesh = two_spheres()
-    solver = heat_igl.HeatMethodSolver(mesh)
-    with pytest.raises(heat_igl.SourceError, match="no place is reached from all"):
-        sampling.geodesic_centre(mesh, solver, [0, 200])
-    with pytest.raises(ValueError, match="weights must be 2 positive numbers"):
-        sampling.geodesic_centre(mesh, solver, [0, 1], [1.0, 0.0])
-    with pytest.raises(heat_igl.SourceError, match=r"points\[0\] = 900 is no vertex"):
-        sampling.geodesic_centre(mesh, solver, [900])
 
 
 def test_diameter_of_a_square_and_a_sphere(square):

@@ -9,8 +9,8 @@ import pytest
 import scipy.sparse as sp
 from conftest import perturbed
 
-from heat_igl import HeatMethodSolver, Mesh, PolygonMesh, shapes, steps
-from heat_igl.operators import Operators, operators, polygon_operators, speed_operators, tufted_operators
+from heat_igl import HeatMethodSolver, Mesh, shapes, steps
+from heat_igl.operators import Operators, operators, speed_operators, tufted_operators
 from heat_igl.steps import (
     HeatFlow,
     NormalizedDivergence,
@@ -264,19 +264,6 @@ def test_fitted_laplacian_takes_each_edge_by_its_own_length(t_coef):
         np.testing.assert_allclose(
             np.asarray(found[pairs[:, 0], pairs[:, 1]])[0], expected, rtol=1e-12, atol=1e-12 * expected.max()
         )
-
-
-def test_fitted_laplacian_of_polygons_goes_by_the_distances_within_each():
-    grid = perturbed(shapes.grid(6), 0.3)
-    k = np.arange(42)[np.arange(42) % 7 < 6][:36]
-    domain = polygon_operators(PolygonMesh(grid.V, np.stack([k, k + 1, k + 8, k + 7], axis=1)))
-    t = 0.5 * domain.mean_edge_length**2
-    L, found = domain.L.tocoo(), fitted_laplacian(domain, t)
-    assert L.nnz > 7 * domain.n  # diagonals too
-    for i, j, weight in zip(L.row, L.col, L.data, strict=True):
-        if i != j:
-            expected = max(weight, 0) * fit_of(np.linalg.norm(grid.V[i] - grid.V[j]), t)
-            assert found[i, j] == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 def test_several_edges_between_two_vertices_go_by_the_shortest():

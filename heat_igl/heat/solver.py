@@ -37,8 +37,8 @@ class HeatMethodSolver(BatchedSolver):
     Parameters
     ----------
     mesh : mesh, Operators or (n, 3) array_like
-        Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on with
-        `polygon_operators`, points with those of the triangles between them. Or the operators of a metric, a speed or
+        Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on the triangles
+        around a virtual vertex in each, points on the triangles between them. Or the operators of a metric, a speed or
         another domain, as `metric_operators` returns them.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.

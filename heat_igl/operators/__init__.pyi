@@ -19,13 +19,12 @@ from heat_igl.operators.metric import metric_operators as metric_operators
 from heat_igl.operators.metric_derivatives import MetricSides as MetricSides
 from heat_igl.operators.metric_simplices import MetricSimplices as MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators as point_cloud_operators
-from heat_igl.operators.polygons import fan_operators as fan_operators
-from heat_igl.operators.polygons import polygon_operators as polygon_operators
 from heat_igl.operators.simplices import cotan_operators as cotan_operators
 from heat_igl.operators.speed import speed_operators as speed_operators
 from heat_igl.operators.suitability import is_rough_or_narrow as is_rough_or_narrow
 from heat_igl.operators.suitability import share_on_large_triangles as share_on_large_triangles
 from heat_igl.operators.surface import Surface as Surface
+from heat_igl.operators.triangles import fan_operators as fan_operators
 from heat_igl.operators.triangles import operators as operators
 from heat_igl.operators.triangles import tufted_operators as tufted_operators
 from heat_igl.operators.triangles import unfolding_surface as unfolding_surface

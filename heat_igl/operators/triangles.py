@@ -13,14 +13,14 @@ from heat_igl.intrinsic import (
     intrinsic_triangulation,
     tufted_cover,
 )
-from heat_igl.mesh import Mesh, connectivity
+from heat_igl.mesh import Mesh, PolygonFans, PolygonMesh, connectivity
 from heat_igl.operators.intrinsic import changed_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
 from heat_igl.operators.simplices import cotan_operators, surface_operators
 from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.operators.surface import Surface
 
-__all__ = ["operators", "tufted_operators", "unfolding_surface"]
+__all__ = ["fan_operators", "operators", "tufted_operators", "unfolding_surface"]
 
 
 def operators(
@@ -100,6 +100,15 @@ def tufted_operators(
     triangulation = fit_for_heat(triangulation, laplacian, mesh.components)
     faces = replace(intrinsic_triangulation(mesh), history=history)
     return changed_operators(triangulation, faces, intrinsic_delaunay(faces), mesh, on_laplacian)
+
+
+def fan_operators(mesh: PolygonMesh, laplacian: Laplacian = "auto") -> Operators:
+    """The operators on the triangles between the sides and the virtual vertices of polygons (see `PolygonFans`).
+
+    The virtual vertices follow the n of the polygons, as added vertices. Edges are flipped as `laplacian` says.
+    """
+    fans, drawn = PolygonFans.of(mesh), intrinsic_triangulation(mesh.triangles)
+    return replace(operators(fans.mesh, laplacian), drawn_on=Surface(drawn, drawn, V=mesh.V), fans=fans)
 
 
 def unfolding_surface(mesh: Mesh, margin: float | None = None) -> Surface:

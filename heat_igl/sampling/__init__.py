@@ -1,4 +1,4 @@
-"""Sampling: farthest points, geodesic Voronoi cells and their dual, the centre, the diameter and distance matrices.
+"""Sampling: farthest points, geodesic Voronoi cells and their dual, the diameter and distance matrices.
 
 All functions ask a solver for distances from single vertices, so they work on every domain that has `Operators`, and
 are as accurate as the solver.

@@ -1,4 +1,3 @@
-from heat_igl.sampling.centre import geodesic_centre as geodesic_centre
 from heat_igl.sampling.dual import dual_triangulation as dual_triangulation
 from heat_igl.sampling.extent import diameter as diameter
 from heat_igl.sampling.extent import distance_matrix as distance_matrix
