@@ -32,7 +32,6 @@ def _sort(
     n: cython.Py_ssize_t = key.shape[0]
     p: cython.int
     digit: cython.ulonglong
-    count: cython.longlong
     for i in range(n):
         digits[0, i] = _leading_bits(key[i])
         order[0, i] = i
@@ -41,7 +40,7 @@ def _sort(
     for p in range(3):
         filled: cython.longlong = 0
         for digit in range(1 << BITS):
-            count = place[p, digit]
+            count: cython.longlong = place[p, digit]
             place[p, digit] = filled
             filled += count
         source: cython.int = p % 2

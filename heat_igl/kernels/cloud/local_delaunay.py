@@ -79,7 +79,6 @@ def _neighbours_around(
     nearest ones are left out.
     """
     a: cython.Py_ssize_t
-    b: cython.Py_ssize_t
     size: cython.Py_ssize_t = 0
     n_sides: cython.Py_ssize_t = 0
     reach: cython.double = INFINITY  # squared: twice the largest radius of the circles of the star
@@ -115,7 +114,7 @@ def _neighbours_around(
         angle: cython.double = y / (fabs(x) + fabs(y))
         if x < 0.0:
             angle = 2.0 - angle
-        b = size
+        b: cython.Py_ssize_t = size
         while b > 0 and star[b - 1, ANGLE] > angle:
             _copy(star, members, b - 1, b)
             b -= 1

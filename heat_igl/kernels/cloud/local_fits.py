@@ -213,14 +213,13 @@ def _normal_equations(local: cython.double[:, ::1], system: cython.double[:, ::1
     """The upper half of the matrix (6, 6) of least squares for the terms 1, x, y, xx, xy, yy of z; z in column 6."""
     moment: cython.double[84]
     sums: cython.double[21]
-    j: cython.Py_ssize_t
     block: cython.Py_ssize_t
     lane: cython.Py_ssize_t
     c: cython.Py_ssize_t
     for c in range(21 * LANES):
         moment[c] = 0.0
     for block in range(local.shape[1] // LANES):
-        j = LANES * block
+        j: cython.Py_ssize_t = LANES * block
         for lane in range(LANES):
             x: cython.double = local[0, j + lane]
             y: cython.double = local[1, j + lane]
@@ -291,11 +290,10 @@ def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1
     """The weighted sum of the squared deviations from the quadric whose coefficients are column 6 of `system`."""
     squares: cython.double[4]
     squares[0] = squares[1] = squares[2] = squares[3] = 0.0
-    j: cython.Py_ssize_t
     block: cython.Py_ssize_t
     lane: cython.Py_ssize_t
     for block in range(local.shape[1] // LANES):
-        j = LANES * block
+        j: cython.Py_ssize_t = LANES * block
         for lane in range(LANES):
             x: cython.double = local[0, j + lane]
             y: cython.double = local[1, j + lane]

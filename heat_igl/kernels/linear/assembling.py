@@ -78,9 +78,8 @@ def _distribute(
 ) -> cython.void:
     """Sort entries by column, or by the column of the other one of the side; `begin` is the same before and after."""
     i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     for i in range(entries.shape[0]):
-        j = _column(F, entries[i] ^ other)
+        j: cython.Py_ssize_t = _column(F, entries[i] ^ other)
         sorted_entries[begin[j]] = entries[i]
         begin[j] += 1
     for i in range(begin.shape[0] - 1, 0, -1):
@@ -103,10 +102,9 @@ def _fill_column(
 ) -> cython.int:
     """Append the entries of column j, and the diagonal; returns the number of all entries so far."""
     i: cython.Py_ssize_t
-    row: cython.int
     last: cython.int = -1
     for i in range(entries.shape[0]):
-        row = _column(F, entries[i] ^ 1)
+        row: cython.int = _column(F, entries[i] ^ 1)
         if last < j <= row:
             indices[count], data[count] = j, diagonal
             last = j

@@ -27,12 +27,11 @@ def dissect_pieces(
     d = Dissecting(ends, neighbours, order, is_start, parent)
     large_pieces: cython.longlong[:, ::1] = rest
     n_rest: cython.Py_ssize_t = 0
-    piece: Piece
     with cython.nogil:
         _push(d, 0, n, -1, 0)
         while d.depth > 0:
             d.depth -= 1
-            piece = d.stack[d.depth]
+            piece: Piece = d.stack[d.depth]
             if large < piece.high - piece.low < 0.75 * n:
                 large_pieces[n_rest, 0], large_pieces[n_rest, 1] = piece.low, piece.high
                 large_pieces[n_rest, 2] = piece.above
@@ -143,7 +142,6 @@ def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> 
     Returns the size of the piece, or that of the component in the queue if the piece is not connected.
     """
     i: cython.Py_ssize_t
-    v: cython.Py_ssize_t
     size: cython.Py_ssize_t = high - low
     for i in range(low, high):
         d.near[d.order[i]] = d.far[d.order[i]] = -1
@@ -156,7 +154,7 @@ def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> 
     _breadth_first(d, d.queue[size - 1], d.far)
     _breadth_first(d, d.queue[size - 1], d.near)
     for i in range(low, high):
-        v = d.order[i]
+        v: cython.Py_ssize_t = d.order[i]
         d.f[v] = d.far[v] - d.near[v]
     if size > ROUGH:
         for _ in range(SMOOTHING // 2):

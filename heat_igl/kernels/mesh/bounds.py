@@ -101,7 +101,6 @@ def shorten(
     is_waiting: cython.uchar[::1] = np.zeros(n, np.uint8)
     begin: cython.Py_ssize_t = 0
     count: cython.Py_ssize_t = 0
-    end: cython.Py_ssize_t
     e: cython.Py_ssize_t
     k: cython.Py_ssize_t
     lowered: cython.int
@@ -123,7 +122,7 @@ def shorten(
                 lowered = _lowered(ends, length, d, labels, incident[k])
                 if lowered >= 0 and not is_waiting[lowered]:
                     is_waiting[lowered] = True
-                    end = begin + count
+                    end: cython.Py_ssize_t = begin + count
                     waiting[end if end < n else end - n] = lowered
                     count += 1
 

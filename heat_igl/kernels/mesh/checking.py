@@ -138,7 +138,6 @@ def steepest_edge(
     far: cython.longlong = -1
     near: cython.longlong = -1
     squared: cython.double
-    difference: cython.double
     with cython.nogil:
         for f in range(F.shape[0]):
             for a in range(n_corners):
@@ -155,7 +154,7 @@ def steepest_edge(
                             + (x[3 * a + 1] - x[3 * b + 1]) * (x[3 * a + 1] - x[3 * b + 1])
                             + (x[3 * a + 2] - x[3 * b + 2]) * (x[3 * a + 2] - x[3 * b + 2])
                         )
-                    difference = fabs(d[a] - d[b]) - slack
+                    difference: cython.double = fabs(d[a] - d[b]) - slack
                     # Neither inf nor NaN passes.
                     if difference <= 0 or difference * difference <= squared:
                         continue
@@ -292,10 +291,6 @@ def wrong_rows(
     next_corner: cython.const[cython.int][::1] = tables.next_corner
     i: cython.Py_ssize_t
     r: cython.Py_ssize_t
-    v: cython.int
-    w: cython.int
-    c: cython.uint
-    corner: cython.int
     begin: cython.Py_ssize_t = 0
     with cython.nogil:
         for i in range(source.shape[0]):
@@ -310,17 +305,17 @@ def wrong_rows(
                 distance[s] = 0.0
             wrong: cython.bint = distance[s] != 0.0 or slack == INFINITY
             for r in range(begin, end + 1):
-                v = found[r] if r < end else s
+                v: cython.int = found[r] if r < end else s
                 d: cython.double = distance[v] + slack
                 x: cython.double = position[v, 0] - position[s, 0]
                 y: cython.double = position[v, 1] - position[s, 1]
                 z: cython.double = position[v, 2] - position[s, 2]
                 wrong |= not (d >= 0.0 and x * x + y * y + z * z <= d * d)
                 # The next vertex of each face: so every vertex is reached from one in each of its faces.
-                corner = corner_of_vertex[v]
+                corner: cython.int = corner_of_vertex[v]
                 while corner >= 0:
-                    c = cython.cast(cython.uint, corner) % 3
-                    w = vertex[corner + 1 if c < 2 else corner - 2]
+                    c: cython.uint = cython.cast(cython.uint, corner) % 3
+                    w: cython.int = vertex[corner + 1 if c < 2 else corner - 2]
                     reach: cython.double = d + length[corner + 2 if c == 0 else corner - 1]
                     if distance[w] > reach and (distance[w] < INFINITY or reach < limit[i] - slack):
                         wrong = True

@@ -36,23 +36,21 @@ def flip(edges, tolerance: cython.double, most: cython.longlong) -> int:
     flips.is_obtuse = np.empty(twin.shape[0], np.uint8)
     n_flips: cython.longlong = 0
     f: cython.int
-    h: cython.int
     first: cython.int
-    beyond: cython.int
     with cython.nogil:
         for f in range(twin.shape[0] // 3):
             flips.area[f] = twice_area(length[3 * f], length[3 * f + 1], length[3 * f + 2])
             flips.compare(3 * f)
         for first in range(twin.shape[0]):
             # Without a branch for each test: which half-edge of an edge comes first is as good as random.
-            beyond = max(first, twin[first])
+            beyond: cython.int = max(first, twin[first])
             if (twin[first] < first) | (flips.is_obtuse[first] == 0) & (flips.is_obtuse[beyond] == 0):
                 continue
             flips.waiting[0], flips.is_waiting[first] = first, True
             flips.n_waiting = 1
             while flips.n_waiting > 0:
                 flips.n_waiting -= 1
-                h = flips.waiting[flips.n_waiting]
+                h: cython.int = flips.waiting[flips.n_waiting]
                 flips.is_waiting[h] = False
                 if n_flips < most and flips.improves(h, tolerance):
                     flips.flip(h)

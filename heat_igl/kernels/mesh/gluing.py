@@ -63,7 +63,6 @@ def _by_lower_end(
     """
     f: cython.int
     i: cython.int
-    at: cython.int
     a: cython.int
     b: cython.int
     c: cython.int
@@ -77,7 +76,7 @@ def _by_lower_end(
         begin[i + 1] += begin[i]
     for f in range(F.shape[0]):
         a, b, c = vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2]
-        at = begin[min(b, c)]
+        at: cython.int = begin[min(b, c)]
         begin[min(b, c)] = at + 1
         sides[at, 0], sides[at, 1] = 3 * f, max(b, c)
         at = begin[min(c, a)]
@@ -106,19 +105,16 @@ def _glue_sides(
     """Glue half-edges that have both ends in common, and measure them. `seen` (n,) is working space, full of 0."""
     lower: cython.int
     upper: cython.int
-    first: cython.int
     i: cython.int = 0
     h: cython.int
-    p: cython.int
-    q: cython.int
     x: cython.double
     y: cython.double
     z: cython.double
     for lower in range(V.shape[0]):
-        first = i
+        first: cython.int = i
         while i < end[lower]:
             h, upper = sides[i, 0], sides[i, 1]
-            p = seen[upper]
+            p: cython.int = seen[upper]
             if not (first <= p < i and sides[p, 1] == upper):
                 # The first half-edge of this edge.
                 seen[upper] = i
@@ -138,7 +134,7 @@ def _glue_sides(
                     aligned[p] = aligned[h] = False
                 continue
             if twin[p] >= 0:
-                q = twin[p]
+                q: cython.int = twin[p]
                 aligned[p] = aligned[q] = True
                 twin[p] = twin[q] = -2
                 ring[p], ring[q] = q, p
@@ -150,14 +146,12 @@ def _glue_sides(
 def has_needles(length: cython.const[cython.double][::1], margin: cython.double) -> bool:
     """Whether in some face two sides (3 m,) exceed the third by less than `margin` times the longest side of all."""
     h: cython.Py_ssize_t
-    total: cython.double
-    longest: cython.double
     least: cython.double = INFINITY
     longest_of_all: cython.double = 0.0
     with cython.nogil:
         for h in range(0, length.shape[0], 3):
-            total = length[h] + length[h + 1] + length[h + 2]
-            longest = max(max(length[h], length[h + 1]), length[h + 2])
+            total: cython.double = length[h] + length[h + 1] + length[h + 2]
+            longest: cython.double = max(max(length[h], length[h + 1]), length[h + 2])
             longest_of_all = max(longest_of_all, longest)
             least = min(least, total - 2.0 * longest)
     return least < margin * longest_of_all

@@ -83,14 +83,13 @@ def _by_end(
 ) -> cython.void:
     """Sort sides by one of their ends; those with the same end stay in order. `place` (n + 1,) is working space."""
     i: cython.Py_ssize_t
-    v: cython.longlong
     place[:] = 0
     for i in range(sides.shape[0]):
         place[_end(F, sides[i], is_lower) + 1] += 1
     for i in range(place.shape[0] - 1):
         place[i + 1] += place[i]
     for i in range(sides.shape[0]):
-        v = _end(F, sides[i], is_lower)
+        v: cython.longlong = _end(F, sides[i], is_lower)
         ordered[place[v]] = sides[i]
         place[v] += 1
 
@@ -121,10 +120,9 @@ def components_without(F: cython.const[cython.int][:, ::1], skip: cython.const[c
     above: cython.longlong[::1] = labels
     f: cython.Py_ssize_t
     c: cython.Py_ssize_t
-    first: cython.int
     with cython.nogil:
         for f in range(F.shape[0]):
-            first = -1
+            first: cython.int = -1
             for c in range(F.shape[1]):
                 if skip[F[f, c]]:
                     continue

@@ -52,7 +52,6 @@ def breadth_first(edges, n: cython.int, start: cython.int):
     new_ring: cython.int[::1] = rings
     first: cython.int
     h: cython.int
-    t: cython.int
     v: cython.int
     with cython.nogil:
         search.go_on_from(start)
@@ -65,7 +64,7 @@ def breadth_first(edges, n: cython.int, start: cython.int):
         for h in range(3 * m):
             new_ring[h] = h
             if search.has_many:
-                t = old_ring[3 * search.face[h // 3] + h % 3]
+                t: cython.int = old_ring[3 * search.face[h // 3] + h % 3]
                 new_ring[h] = 3 * search.place[t // 3] + t % 3
     return vertices, twins, rings, alignment, lengths, numbers, faces
 
@@ -97,23 +96,19 @@ class _Search:
     def go_on_from(self, first: cython.int) -> cython.void:
         """Number the faces of the component of this one, unless it has a number."""
         c: cython.int
-        g: cython.int
-        h: cython.int
-        t: cython.int
-        v: cython.int
         self.meet(first)
         while self.n_done < self.n_met:
-            h = 3 * self.face[self.n_done]
-            g = 3 * self.n_done
+            h: cython.int = 3 * self.face[self.n_done]
+            g: cython.int = 3 * self.n_done
             for c in range(3):
-                v = self.vertex[h + c]
+                v: cython.int = self.vertex[h + c]
                 if self.number[v] < 0:
                     self.number[v] = self.n_numbered
                     self.n_numbered += 1
                 self.new_vertex[g + c] = self.number[v]
                 self.new_length[g + c] = self.length[h + c]
                 self.new_aligned[g + c] = self.aligned[h + c]
-                t = self.twin[h + c]
+                t: cython.int = self.twin[h + c]
                 if t >= 0:
                     self.meet(t // 3)
                     t = 3 * self.place[t // 3] + t % 3

@@ -182,7 +182,6 @@ class Polyline:
         """Take the base of the loop of a course, a vertex, and the bends as joints; False if there are no bends."""
         n: cython.int = self.course.funnel.n_bends - 1
         i: cython.int
-        after: cython.int
         if n < 2:
             return False
         self.joints.clear(n)
@@ -195,7 +194,7 @@ class Polyline:
             bend = cython.address(self.course.funnel.bend[i])
             self.begin(i, self.course.strip.crossing[bend.last].enter // 3 if i > 0 else self.course.face)
             self.part.strip.extend(self.course.strip.crossing, bend.last + 1, self.course.funnel.bend[i + 1].first)
-            after = i + 1 if i < n - 1 else 0
+            after: cython.int = i + 1 if i < n - 1 else 0
             if not self.lay_out(after) > 0.0:
                 return False
             self.link(i, after)

@@ -120,14 +120,13 @@ class Detour:
         start: cython.int = h // 3
         n_steps: cython.int = 2
         n_tips: cython.int = 2
-        nearest: cython.int
         i: cython.int
         self.step[0].enter, self.step[0].leave, self.step[0].before = -1, h, -1
         self.step[1].enter, self.step[1].leave, self.step[1].before = -1, other_side(s, h, v), -1
         self.tip[0].length, self.tip[0].step = before.this, 0
         self.tip[1].length, self.tip[1].step = before.other, 1
         while n_tips > 0:
-            nearest = 0
+            nearest: cython.int = 0
             for i in range(1, n_tips):
                 if self.tip[i].length < self.tip[nearest].length:
                     nearest = i

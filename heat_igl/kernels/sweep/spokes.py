@@ -97,7 +97,6 @@ def _fans(
 ) -> cython.int:
     """Glue corners to fans, in rows of spokes from ``end[v]`` on; returns how many fans there are."""
     h: cython.int
-    k: cython.int
     t: cython.int = -1
     n_fans: cython.int = 0
     for h in range(twin.shape[0]):
@@ -117,7 +116,7 @@ def _fans(
         row: cython.int = end[v]
         begin: cython.int = row
         angle: cython.double = 0.0
-        k = start
+        k: cython.int = start
         while True:  # counter-clockwise
             is_done[k] = True
             left[row] = k
@@ -158,7 +157,6 @@ def _fill_spokes(
     """What a spoke knows of the triangle to its left, and of the one beyond."""
     k: cython.int
     h: cython.int = -1
-    t: cython.int
     for k in range(spoke.shape[0]):
         s = cython.address(spoke[k])
         s.beyond = -1
@@ -173,7 +171,7 @@ def _fill_spokes(
         s.length, s.base = length[previous_half_edge(h)], base
         s.along, s.height = corner[h].x * base, corner[h].y * base
         s.neighbour, s.next_neighbour = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
-        t = twin[h]
+        t: cython.int = twin[h]
         if t >= 0:
             # Seen from beyond, the side runs the other way.
             s.beyond_along, s.beyond_depth = (1.0 - corner[t].x) * base, corner[t].y * base

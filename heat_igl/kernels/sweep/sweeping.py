@@ -106,8 +106,6 @@ class _Sweep:
         n: cython.Py_ssize_t = self.order.shape[0]
         i: cython.Py_ssize_t = 0
         again: cython.Py_ssize_t = n  # rank to begin at once more when the end is reached
-        back: cython.Py_ssize_t
-        v: cython.int
         self.n_visits = 0
         while self.n_visits < GIVE_UP * n:
             if i + AHEAD > self.n_ordered and self.n_ordered < n:
@@ -116,7 +114,7 @@ class _Sweep:
                 if again == n:
                     break
                 i, again = again, n
-            v = self.order[i]
+            v: cython.int = self.order[i]
             i += 1
             if self.is_large:
                 self.read_ahead(i)
@@ -126,7 +124,7 @@ class _Sweep:
             self.n_visits += 1
             if self.n_visits % ASK == 0 and is_interrupted():
                 break
-            back = self.visit(v)
+            back: cython.Py_ssize_t = self.visit(v)
             if back < i:
                 if self.n_visits < GO_BACK * n:
                     i = back
@@ -212,9 +210,7 @@ class _Sweep:
         best: cython.double = self.d[v]
         across: cython.double = INFINITY  # squared
         squared: cython.double
-        begin: cython.double
         # The triangle of the best value of either kind.
-        nearest: cython.int
         ignored: cython.int = -1
         along_edge: cython.int = v
         spoke: cython.int = self.t.first[v]
@@ -227,7 +223,7 @@ class _Sweep:
             if not min(da, db) < best:
                 continue
             if self.label[s.neighbour] == self.label[s.next_neighbour]:
-                begin = self.offset[self.label[s.neighbour]]
+                begin: cython.double = self.offset[self.label[s.neighbour]]
                 squared = begin + sqrt(across_side(da - begin, db - begin, s))
             elif self.is_of_one_curve(self.label[s.neighbour], self.label[s.next_neighbour]):
                 squared = front_across_side(da, db, s)
@@ -237,7 +233,7 @@ class _Sweep:
             if squared < across:
                 spoke, across = k, squared
         across = sqrt(across)
-        nearest = self.label[along_edge]
+        nearest: cython.int = self.label[along_edge]
         if across < best:
             source: cython.int = -1
             across = self.seen_from_beyond(spoke, across, cython.address(source))
@@ -336,10 +332,9 @@ class _Sweep:
         """Mark the farther neighbours, which a smaller d[v] can improve. Those still to come are stale anyway."""
         lowest: cython.Py_ssize_t = self.order.shape[0]
         k: cython.int
-        a: cython.int
         dv: cython.double = self.d[v]
         for k in range(self.t.first[v], self.t.first[v + 1]):
-            a = self.t.spoke[k].neighbour
+            a: cython.int = self.t.spoke[k].neighbour
             # Either alone is true at random.
             if (dv < self.d[a]) & (not self.is_stale[a]):
                 self.is_stale[a] = True

@@ -49,11 +49,10 @@ class VisitOrder:
 
     def advance(self, i: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.Py_ssize_t:
         """Go on until it is known which `count` vertices come from rank i on, or all are met; returns `n_ordered`."""
-        v: cython.int
         while self.n_passed + 1 < i:
             self.reach_neighbours()
         while self.n_ordered < i + count:
-            v = take(cython.address(self.ahead), cython.address(self.key[0]))
+            v: cython.int = take(cython.address(self.ahead), cython.address(self.key[0]))
             if v < 0:
                 if self.n_ordered > i or self.n_passed == i:
                     break

@@ -103,12 +103,10 @@ def pull_back(
     n: cython.int = order.shape[0]
     i: cython.Py_ssize_t
     j: cython.longlong
-    v: cython.int
-    row: cython.int
     with cython.nogil:
         for i in range(n - 1, -1, -1):
-            v = cython.cast(cython.int, order[i])
-            row = _follow(tracer, v) if weight[v] != 0.0 else -1
+            v: cython.int = cython.cast(cython.int, order[i])
+            row: cython.int = _follow(tracer, v) if weight[v] != 0.0 else -1
             if row < 0:
                 continue
             for j in range(segments.n):
@@ -143,12 +141,10 @@ def push_forward(
     n: cython.int = order.shape[0]
     i: cython.Py_ssize_t
     j: cython.longlong
-    v: cython.int
-    row: cython.int
     with cython.nogil:
         for i in range(n):
-            v = cython.cast(cython.int, order[i])
-            row = _follow(tracer, v)
+            v: cython.int = cython.cast(cython.int, order[i])
+            row: cython.int = _follow(tracer, v)
             if row < 0:
                 continue
             change[v] = change[row]

@@ -81,8 +81,6 @@ def free_front(s: cython.pointer(Search)) -> cython.void:
 
 def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cython.void:
     """Add to the queue, a binary heap."""
-    i: cython.int
-    above: cython.int
     if s.n_heap == s.n_all_heap:
         more: cython.pointer(Entry) = cython.cast(
             cython.pointer(Entry), realloc(s.heap, 2 * s.n_all_heap * cython.sizeof(Entry))
@@ -92,10 +90,10 @@ def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cyt
             return
         s.heap = more
         s.n_all_heap *= 2
-    i = s.n_heap
+    i: cython.int = s.n_heap
     s.n_heap += 1
     while i > 0:
-        above = (i - 1) // 2
+        above: cython.int = (i - 1) // 2
         if s.heap[above].key <= key:
             break
         s.heap[i] = s.heap[above]
@@ -108,12 +106,10 @@ def pop(s: cython.pointer(Search)) -> Entry:
     """Take the entry with the smallest key."""
     heap: cython.pointer(Entry) = s.heap
     top: Entry = heap[0]
-    last: Entry
     i: cython.int = 0
-    above: cython.int
     below: cython.int = 1
     s.n_heap -= 1
-    last = heap[s.n_heap]
+    last: Entry = heap[s.n_heap]
     # From below: the gap goes down to a leaf, without a branch that depends on keys, and the last entry seldom rises.
     while below + 1 < s.n_heap:
         below += heap[below + 1].key < heap[below].key
@@ -124,7 +120,7 @@ def pop(s: cython.pointer(Search)) -> Entry:
         heap[i] = heap[below]
         i = below
     while i > 0:
-        above = (i - 1) // 2
+        above: cython.int = (i - 1) // 2
         if heap[above].key <= last.key:
             break
         heap[i] = heap[above]
@@ -139,25 +135,19 @@ def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython
     From each vertex, the path takes the edge that makes the way to the goal shortest, were it straight from there on.
     Where that comes no nearer to the goal, there is no bound.
     """
-    k: cython.int
-    h: cython.int
     i: cython.int
-    best: cython.int
     length: cython.double = 0.0
-    along: cython.double
-    left: cython.double
-    shortest: cython.double
     s.aim = goal
     s.within = INFINITY
-    left = straight(s, v)
+    left: cython.double = straight(s, v)
     while v != goal:
-        shortest = INFINITY
-        best = -1
-        k = s.corner_of_vertex[v]
+        shortest: cython.double = INFINITY
+        best: cython.int = -1
+        k: cython.int = s.corner_of_vertex[v]
         while k >= 0:
             for i in range(2):
-                h = next_half_edge(k) if i == 0 else previous_half_edge(k)
-                along = s.length[third(k, h)]
+                h: cython.int = next_half_edge(k) if i == 0 else previous_half_edge(k)
+                along: cython.double = s.length[third(k, h)]
                 if along + straight(s, s.vertex[h]) < shortest:
                     shortest = along + straight(s, s.vertex[h])
                     best = s.vertex[h]
@@ -178,12 +168,11 @@ def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(W
     """
     i: cython.int
     k: cython.int = 0
-    w: cython.pointer(Window)
     # As seen by the windows, whose frame begins at the head of e.
     from_tail: cython.double = straight(s, s.vertex[previous_half_edge(e)])
     from_head: cython.double = straight(s, s.vertex[next_half_edge(e)]) - s.length[e]
     for i in range(n):
-        w = run + i
+        w: cython.pointer(Window) = run + i
         if w.offset + reach(w, w.stop) + (from_tail - w.stop) > s.within:
             continue
         if w.offset + reach(w, w.start) + (from_head + w.start) > s.within:
@@ -258,10 +247,11 @@ def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> c
     """Note a distance of vertex v for the other of two searches."""
     n: cython.int = s.n_news[s.parity]
     room: cython.int = s.n_all_news[s.parity]
-    more: cython.pointer(Entry)
     if n == room:
         room = 2 * room + 64
-        more = cython.cast(cython.pointer(Entry), realloc(s.news[s.parity], room * cython.sizeof(Entry)))
+        more: cython.pointer(Entry) = cython.cast(
+            cython.pointer(Entry), realloc(s.news[s.parity], room * cython.sizeof(Entry))
+        )
         if more == cython.NULL:
             s.failed = True
             return
@@ -287,9 +277,8 @@ def _lowest_key(
     square: cython.double
     x: cython.double
     i: cython.int
-    w: cython.pointer(Window)
     for i in range(n):
-        w = run + i
+        w: cython.pointer(Window) = run + i
         if w.is_plane:
             x = w.x * length + w.depth * bulge
             x = 0.5 * x if s.is_delaunay else w.x * (w.start if w.x > 0.0 else w.stop)
@@ -310,11 +299,11 @@ def _lowest_key(
 @cython.exceptval(check=False)
 def _has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
     """Make room for n more windows of a list; false without memory."""
-    capacity: cython.int
-    more: cython.pointer(Window)
     if one.count + n > one.capacity:
-        capacity = 2 * (one.count + n) + 4
-        more = cython.cast(cython.pointer(Window), realloc(one.windows, capacity * cython.sizeof(Window)))
+        capacity: cython.int = 2 * (one.count + n) + 4
+        more: cython.pointer(Window) = cython.cast(
+            cython.pointer(Window), realloc(one.windows, capacity * cython.sizeof(Window))
+        )
         if more == cython.NULL:
             return False
         one.windows = more
@@ -350,7 +339,6 @@ def append(
     """Add windows to those that wait at half-edge t."""
     i: cython.int
     place: cython.int = s.slot[t]
-    one: cython.pointer(List)
     to: cython.pointer(Window)
     length: cython.double = s.length[t]
     lowest: cython.double = _lowest_key(s, run, n, length, s.bulge[t])
@@ -364,7 +352,7 @@ def append(
         s.lists[place].half_edge = t
         s.lists[place].count = 0
         s.lists[place].key = INFINITY
-    one = cython.address(s.lists[place])
+    one: cython.pointer(List) = cython.address(s.lists[place])
     if not _has_room(one, n):
         s.failed = True
         return
@@ -393,12 +381,13 @@ def append(
 def _free_list(s: cython.pointer(Search)) -> cython.int:
     """A list that is not in use, with the room that it had before; -1 without memory."""
     place: cython.int = s.free_list
-    more: cython.pointer(List)
     if place >= 0:
         s.free_list = s.lists[place].count
         return place
     if s.n_lists == s.n_all_lists:
-        more = cython.cast(cython.pointer(List), realloc(s.lists, 2 * s.n_all_lists * cython.sizeof(List)))
+        more: cython.pointer(List) = cython.cast(
+            cython.pointer(List), realloc(s.lists, 2 * s.n_all_lists * cython.sizeof(List))
+        )
         if more == cython.NULL:
             s.failed = True
             return -1

@@ -84,14 +84,13 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
     from_entered: cython.const[cython.int][::1] = begin.entered
     from_crossing: cython.const[cython.double][::1] = begin.crossing
     i: cython.Py_ssize_t
-    v: cython.int
     line_end: LineEnd
     here: cython.double[3]
     with cython.nogil:
         for i in range(end.shape[0]):
             tracer.n_steps = 0
             first: cython.longlong = segments.n
-            v = vertex[i]
+            v: cython.int = vertex[i]
             line_end.x, line_end.y, line_end.z = from_place[i, 0], from_place[i, 1], from_place[i, 2]
             line_end.face, line_end.distance, line_end.root = from_face[i], from_distance[i], from_root[i]
             line_end.entered, line_end.crossing = from_entered[i], from_crossing[i]
@@ -215,7 +214,6 @@ class PathTracer:
         side: cython.int
         ux: cython.double
         uy: cython.double
-        across: cython.double
         out: Line
         self.segments.n = line.n_segments
         self.n_steps += 1
@@ -239,7 +237,7 @@ class PathTracer:
             ux, uy = (length - apex_x) / self.length[side], -apex_y / self.length[side]
             x = line.x - length
         # The outward frame of the side has the axes (ux, uy) and (-uy, ux).
-        across = ux * line.dy - uy * line.dx
+        across: cython.double = ux * line.dy - uy * line.dx
         if across <= 0.0:
             return GO_ON  # given up
         out.x = x * line.dy / across + (0.0 if side == left else self.length[side])

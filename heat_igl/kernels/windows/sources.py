@@ -57,13 +57,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     at: cython.p_double = s.point + 3 * p
     one: Window
     c: cython.int
-    h: cython.int
-    j: cython.int
     corner: cython.double[3]
-    length: cython.double
-    left_length: cython.double
-    right_length: cython.double
-    distance: cython.double
     place_x: cython.double[3]
     place_y: cython.double[3]
     place_x[0] = place_y[0] = place_y[1] = 0.0
@@ -73,15 +67,15 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     x: cython.double = at[1] * place_x[1] + at[2] * place_x[2]
     y: cython.double = at[2] * place_y[2]
     for c in range(3):
-        h = 3 * f + c
+        h: cython.int = 3 * f + c
         at_corner(c, corner)
-        distance = offset + apart(s.length + 3 * f, corner, at)
+        distance: cython.double = offset + apart(s.length + 3 * f, corner, at)
         relax(s, s.vertex[h], distance, root, -1, 0.0, 3 * f, place_x[c] - x, place_y[c] - y)
         if at[c] <= 0.0:
             continue  # on the side itself, the source belongs to the face beyond it too
-        length = s.length[h]
-        left_length = s.length[previous_half_edge(h)]
-        right_length = s.length[next_half_edge(h)]
+        length: cython.double = s.length[h]
+        left_length: cython.double = s.length[previous_half_edge(h)]
+        right_length: cython.double = s.length[next_half_edge(h)]
         one.x = at[c] * 0.5 * twice_product(length, left_length, right_length) / length
         one.x = length - (one.x + at[previous_half_edge(h) % 3] * length)
         one.depth = at[c] * s.double_area[f] / length
@@ -95,7 +89,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         one.side = one.is_plane = 0
         if one.depth > 0.0:
             add(s, h, cython.address(one), 1, False)
-    j = s.first_target[f] if s.first_target != cython.NULL else -1
+    j: cython.int = s.first_target[f] if s.first_target != cython.NULL else -1
     while j >= 0:
         take(s, j, offset + apart(s.length + 3 * f, s.target + 3 * j, at), root)
         j = s.next_target[j]
@@ -108,14 +102,13 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
     ends: cython.p_double = s.segment + 6 * i
     corner: cython.double[3]
     c: cython.int
-    j: cython.int
     for c in range(3):
         at_corner(c, corner)
         relax(s, s.vertex[3 * f + c], _segment_distance(s, i, corner), root, -1, 0.0, 3 * f, 0.0, 0.0)
         # On the side itself, the segment belongs to the face beyond it too.
         if ends[c] > 0.0 or ends[3 + c] > 0.0:
             _emit_parallel(s, 3 * f + c, ends, root, s.segment_offset[i])
-    j = s.first_target[f] if s.first_target != cython.NULL else -1
+    j: cython.int = s.first_target[f] if s.first_target != cython.NULL else -1
     while j >= 0:
         take(s, j, _segment_distance(s, i, s.target + 3 * j), root)
         j = s.next_target[j]
@@ -224,12 +217,11 @@ def _straighten(
 
     `ray` takes the corner that holds the direction, the side over which it was entered, and the angle between them.
     """
-    ahead: Direction
     sine: cython.double = ray.sine
     ray.sine = sine + margin * ray.cosine
     ray.cosine -= margin * sine
     ray.corner = -1
-    ahead = ray[0]
+    ahead: Direction = ray[0]
     while True:
         k = beyond(s, k, side)
         if k < 0:
@@ -275,12 +267,10 @@ def _fill(
     k: cython.int = first.corner
     side: cython.int = first.side
     near: cython.double = _reach(s, first)
-    far: cython.double
-    length: cython.double
     offset: cython.double = s.distance[v]
     while k >= 0:
-        length = s.length[k]
-        far = length
+        length: cython.double = s.length[k]
+        far: cython.double = length
         if last != cython.NULL and k == last.corner:
             far = length - _reach(s, last)
         _reach_ends(s, k, v, offset)
@@ -299,23 +289,16 @@ def _fill(
 
 def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     """Windows from vertex v into all directions in which a shortest path can go on."""
-    k: cython.int
     h: cython.int = s.entered[v]
     length: cython.double
     right_length: cython.double
     left_length: cython.double
-    x: cython.double
-    y: cython.double
     at: cython.double = s.crossing[v]
-    norm: cython.double
-    margin: cython.double
     left: Direction
     right: Direction
-    has_left: cython.bint
-    has_right: cython.bint
     s.emitted[v] = s.distance[v]
     if h < 0 or s.kind[v] == JOINS:
-        k = s.corner_of_vertex[v]
+        k: cython.int = s.corner_of_vertex[v]
         while k >= 0:
             _reach_ends(s, k, v, s.distance[v])
             _emit_from_bend(s, k, 0.0, s.length[k], v, s.distance[v])
@@ -323,18 +306,18 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
         return
     # From the apex of h: the angles between the way back, to where the path crosses h, and the two sides.
     length, left_length, right_length = s.length[h], s.length[previous_half_edge(h)], s.length[next_half_edge(h)]
-    x = 0.5 * twice_product(length, left_length, right_length) / length
-    y = s.double_area[h // 3] / length
-    norm = sqrt((at - x) * (at - x) + y * y)
+    x: cython.double = 0.5 * twice_product(length, left_length, right_length) / length
+    y: cython.double = s.double_area[h // 3] / length
+    norm: cython.double = sqrt((at - x) * (at - x) + y * y)
     left.cosine, left.sine = (x * (x - at) + y * y) / (norm * left_length), y * at / (norm * left_length)
     right.cosine = 0.5 * twice_product(length, right_length, left_length) / length
     right.cosine = (right.cosine * (at - x) + y * y) / (norm * right_length)
     right.sine = y * (length - at) / (norm * right_length)
-    margin = sqrt(ROUNDING * s.distance[v] / norm)
+    margin: cython.double = sqrt(ROUNDING * s.distance[v] / norm)
     if margin > WIDEST:
         margin = WIDEST
-    has_left = _straighten(s, h, previous_half_edge(h), cython.address(left), margin)
-    has_right = _straighten(s, h, next_half_edge(h), cython.address(right), margin)
+    has_left: cython.bint = _straighten(s, h, previous_half_edge(h), cython.address(left), margin)
+    has_right: cython.bint = _straighten(s, h, next_half_edge(h), cython.address(right), margin)
     # Around a closed fan both rays bound one shadow; in an open one there are two, each up to the boundary.
     if s.kind[v] == BENDS:
         if has_left and has_right:

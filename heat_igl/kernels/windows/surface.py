@@ -52,24 +52,22 @@ def shapes(tables) -> bool:
     f: cython.int
     h: cython.int
     c: cython.int
-    v: cython.int
     a: cython.double
     b: cython.double
     d: cython.double
-    twice: cython.double
     is_delaunay: cython.bint = True
     with cython.nogil:
         for f in range(m):
             h = 3 * f
             a, b, d = length[h], length[h + 1], length[h + 2]
             # A needle without height would have no circle.
-            twice = max(2.0 * area(a, b, d), 1e-20 * a * a)
+            twice: cython.double = max(2.0 * area(a, b, d), 1e-20 * a * a)
             double_area[f] = twice
             bulge[h] = a * twice_product(b, d, a) / (2.0 * twice)
             bulge[h + 1] = b * twice_product(a, d, b) / (2.0 * twice)
             bulge[h + 2] = d * twice_product(a, b, d) / (2.0 * twice)
             for c in range(3):
-                v = vertex[h + c]
+                v: cython.int = vertex[h + c]
                 next_corner[h + c] = corner_of_vertex[v]
                 corner_of_vertex[v] = h + c
                 n_corners[v] += 1
@@ -113,16 +111,14 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
     start: cython.int = s.corner_of_vertex[v]
     k: cython.int = start
     side: cython.int = previous_half_edge(start)
-    ahead: cython.int
     n_corners: cython.int = s.n_corners[v]
     n_seen: cython.int = 0
     n_half_turns: cython.int = 0
-    was_below: cython.bint
     ray: Direction
     ray.cosine, ray.sine = 1.0, 0.0
     while n_seen < n_corners:
         n_seen += 1
-        was_below = ray.sine < 0.0
+        was_below: cython.bint = ray.sine < 0.0
         turn(s, k, side, cython.address(ray))
         n_half_turns += was_below != (ray.sine < 0.0)
         if side == previous_half_edge(k) and s.aligned[next_half_edge(k)]:
@@ -133,7 +129,7 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
             k = next_half_edge(side)
         else:
             side = third(k, side)
-            ahead = beyond(s, k, side)
+            ahead: cython.int = beyond(s, k, side)
             if ahead < 0:
                 break
             k = ahead

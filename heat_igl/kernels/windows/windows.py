@@ -187,10 +187,9 @@ def _write_within(
 ) -> cython.int:
     """Store the vertices within the cutoff and their distances; returns their number."""
     i: cython.int
-    v: cython.int
     n: cython.int = 0
     for i in range(s.n_touched):
-        v = s.touched[i]
+        v: cython.int = s.touched[i]
         if s.distance[v] <= s.cutoff:
             to[n] = name[v]
             value[n] = s.distance[v]
@@ -208,10 +207,9 @@ def _write_ways(s: cython.pointer(Search), way: cython.p_int, line: cython.p_dou
     and the direction out of the corner and the crossing of the half-edge.
     """
     i: cython.int
-    v: cython.int
     n: cython.int = 0
     for i in range(s.n_touched):
-        v = s.touched[i]
+        v: cython.int = s.touched[i]
         if s.distance[v] <= s.cutoff:
             way[3 * n] = s.root[v]
             way[3 * n + 1] = s.corner[v]
@@ -230,20 +228,17 @@ def _write_nearest(
 ) -> cython.int:
     """Store the nearest vertices in order, equally near ones by ascending name; returns their number."""
     i: cython.int
-    j: cython.int
-    v: cython.int
     n: cython.int = 0
-    d: cython.double
     for i in range(s.n_touched):
-        v = s.touched[i]
-        d = s.distance[v]
+        v: cython.int = s.touched[i]
+        d: cython.double = s.distance[v]
         if d > s.cutoff:
             continue
         if n < s.n_nearest:
             n += 1
         elif d > value[n - 1] or (d == value[n - 1] and name[v] > to[n - 1]):
             continue
-        j = n - 1
+        j: cython.int = n - 1
         while j > 0 and (d < value[j - 1] or (d == value[j - 1] and name[v] < to[j - 1])):
             value[j] = value[j - 1]
             to[j] = to[j - 1]
@@ -396,10 +391,9 @@ def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
 def part(first: Front, second: Front) -> bool:
     """Free what `pair` allocated; false if one thread must search again to get the bits of a search on one thread."""
     one: Front
-    s: cython.pointer(Search)
     i: cython.int
     for one in (first, second):
-        s = cython.address(one.state)
+        s: cython.pointer(Search) = cython.address(one.state)
         s.other = cython.NULL
         for i in range(2):
             free(s.news[i])
