@@ -308,13 +308,13 @@ def test_nothing_overlaps_and_nothing_is_cut_off() -> None:
 
 def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_path: Path) -> None:
     mesh, x = flat_grid(4)
+    drawn = plot(mesh, x)
     for suffix, start in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
-        path = tmp_path / f"a{suffix}"
+        path, again = tmp_path / f"a{suffix}", tmp_path / f"b{suffix}"
         picture(path, mesh, x)
         assert path.read_bytes().startswith(start)
-    drawn = plot(mesh, x)
-    drawn.save(tmp_path / "b.png")
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+        drawn.save(again)
+        assert path.read_bytes() == again.read_bytes()
     assert drawn._repr_png_().startswith(b"\x89PNG")
 
 

@@ -50,10 +50,13 @@ class Picture:
             temporary.write_bytes(self._rendered(suffix[1:]))
 
     def _rendered(self, form: str, dpi: float = DPI) -> bytes:
+        import matplotlib
+
         buffer = io.BytesIO()
-        # Without a date, the same input gives the same bytes.
+        # Without a date and random names, the same input gives the same bytes.
         metadata = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[form]
-        self.figure.savefig(buffer, format=form, dpi=dpi, metadata=metadata)
+        with matplotlib.rc_context({"svg.hashsalt": "heat_igl"}):
+            self.figure.savefig(buffer, format=form, dpi=dpi, metadata=metadata)
         return buffer.getvalue()
 
     def _repr_png_(self) -> bytes:
