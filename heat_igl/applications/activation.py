@@ -11,8 +11,6 @@ from heat_igl.operators import metric_operators
 from heat_igl.sources import OffsetSources, Sources
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["activation_times"]
-
 
 def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayLike = 0) -> FloatArray:
     """When a wave that starts at the sites arrives at each vertex: sqrt(grad T . D grad T) = 1.

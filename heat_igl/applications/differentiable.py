@@ -9,8 +9,6 @@ import numpy as np
 from heat_igl.geodesic import Solver, SolverChoice
 from heat_igl.mesh import Mesh
 
-__all__ = ["Solver", "check_positions", "solver_on"]
-
 
 def check_positions(shape: tuple[int, ...], is_floating: bool, kind: str) -> None:
     """Raise an error if positions cannot be differentiated: a TypeError by their type, a ValueError by their shape."""

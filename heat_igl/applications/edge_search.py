@@ -20,8 +20,6 @@ from heat_igl.errors import SourceError
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = ["EdgePath", "EdgeSearch"]
-
 # Relative allowance for rounding in the difference of two distances.
 _ROUNDING = 1e-9
 

@@ -10,8 +10,6 @@ from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray
 from heat_igl.windows import pair_distances
 
-__all__ = ["geodesic_errors"]
-
 
 def geodesic_errors(mesh: MeshLike, matches: Sources, truth: Sources) -> FloatArray:
     """Errors of matches by the Princeton protocol: exact distance from the right vertex, over the root of the area.

@@ -17,8 +17,6 @@ from heat_igl.mesh import ImageDomain, image_domain
 from heat_igl.sampling import diameter
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
 
-__all__ = ["particle_length", "reconstruct", "skeleton", "zones_of_influence"]
-
 # Diagonally adjacent pixels are connected, as in `image_domain`.
 _CONNECTED = np.ones((3, 3), bool)
 

@@ -16,8 +16,6 @@ from heat_igl.sampling import as_solver
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import pair_distances
 
-__all__ = ["Statistic", "parcel_distances", "smooth"]
-
 Statistic = Literal["mean", "min", "centre"]
 
 # Pairs of vertices in memory at a time.

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.applications.differentiable import Solver, check_positions, solver_on
+from heat_igl.applications.differentiable import check_positions, solver_on
 from heat_igl.errors import MissingExtraError
+from heat_igl.geodesic import Solver
 
 with MissingExtraError.guard("heat_igl.applications.torch", "torch", "torch"):
     import torch

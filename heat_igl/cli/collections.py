@@ -24,8 +24,6 @@ from heat_igl.runtime import n_threads
 if TYPE_CHECKING:
     from heat_igl.cluster import BatchReport
 
-__all__ = ["batch", "dataset"]
-
 # Meshes of a data set on which queries are timed for the estimate.
 _SAMPLE = 8
 

@@ -19,8 +19,6 @@ from heat_igl.io import read_mesh_or_cloud
 from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.validation import METHODS, ValidationReport, ValidationRow, draw_sources
 
-__all__ = ["info", "validate"]
-
 _DEFAULT_METHODS = "heat,sweep,windows,meshlab,igl"
 
 

@@ -18,8 +18,6 @@ from heat_igl.heat import Level, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh_or_cloud, read_polylines, write_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, as_simplices, closest_points, curve_on
 
-__all__ = ["cut", "path", "projected", "signed", "trace"]
-
 CurvesOption = Annotated[
     Path, typer.Option(metavar="OBJ", help="Polylines (records l), as `isolines` and `path` write them; projected.")
 ]

@@ -23,8 +23,6 @@ from heat_igl.mesh import Mesh, PointCloud, as_simplices, closest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import BoolArray, FloatArray
 
-__all__ = ["distance", "isolines"]
-
 # Positions and cells of small meshes, on which a first distance loads what every distance needs.
 _PYRAMID = np.vstack([np.eye(3), -np.eye(3)[:2]]), [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2]]
 _CORNER = np.vstack([np.eye(3), np.zeros(3)]), [[0, 1, 2, 3]]

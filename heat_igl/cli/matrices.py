@@ -21,8 +21,6 @@ from heat_igl.mesh import Mesh
 from heat_igl.runtime import n_threads
 from heat_igl.typing import AnyArray, BoolArray, IntArray
 
-__all__ = ["estimated_seconds", "matrix", "write_matrix"]
-
 _DENSE, _SPARSE = (".npy", ".csv", ".mat"), (".npz", ".mat")
 # Queries that are timed for the estimate.
 _SAMPLE = 5

@@ -16,26 +16,6 @@ from heat_igl.heat import Boundary
 from heat_igl.io import MAP_SUFFIXES, read_attributes
 from heat_igl.typing import AnyArray, BoolArray
 
-__all__ = [
-    "BoundaryOption",
-    "CurveOutput",
-    "JsonOption",
-    "MeshArgument",
-    "MethodOption",
-    "PictureOption",
-    "PointsOption",
-    "RegionOption",
-    "SourcesOption",
-    "TimeStepOption",
-    "ToleranceOption",
-    "choice",
-    "one_of",
-    "position",
-    "positive",
-    "region_mask",
-    "values_of",
-]
-
 MeshArgument = Annotated[
     Path,
     typer.Argument(

@@ -22,24 +22,6 @@ from heat_igl.typing import FloatArray
 if TYPE_CHECKING:
     from heat_igl.drawing import Picture
 
-__all__ = [
-    "Row",
-    "check_curves",
-    "check_json",
-    "check_output",
-    "check_page",
-    "check_picture",
-    "check_writable",
-    "described",
-    "plan_row",
-    "print_json",
-    "print_rows",
-    "prints_json",
-    "say",
-    "write_results",
-    "wrote",
-]
-
 # For distances alone: an array of numpy, and text with a line per vertex.
 ARRAY_SUFFIXES = (".npy", ".csv")
 _STANDARD_OUTPUT = Path("-")

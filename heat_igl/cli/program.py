@@ -22,8 +22,6 @@ from heat_igl.errors import (
     ReferenceSolverError,
 )
 
-__all__ = ["EXAMPLES", "application", "run_program"]
-
 # Errors that a user can cause. Any other exception is a fault of the package and shows a traceback.
 _EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)
 

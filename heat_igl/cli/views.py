@@ -23,8 +23,6 @@ from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import as_simplices
 from heat_igl.sources import vertex_sources
 
-__all__ = ["demo", "view"]
-
 
 def view(
     mesh: opt.MeshArgument,

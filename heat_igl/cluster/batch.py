@@ -22,8 +22,6 @@ from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.mesh import MeshLike
 from heat_igl.sources import Sources
 
-__all__ = ["DTYPES", "distances"]
-
 DTYPES = ("float16", "float32", "float64")
 
 _CLUSTER_LOST = "the cluster is lost; what is finished stays in the store: run the same again to go on"

@@ -19,8 +19,6 @@ from heat_igl.sources import Sources, vertex_sources
 # Names that a zarr group cannot have: they stand for the store itself, the folder above it, or its metadata.
 _RESERVED_NAMES = ("", ".", "..", "zarr.json")
 
-__all__ = ["Item", "SourcePlan", "folder", "items", "read_source_sets"]
-
 
 @dataclass(frozen=True, eq=False)
 class Item:

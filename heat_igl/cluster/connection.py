@@ -12,8 +12,6 @@ from typing import Any
 from heat_igl.errors import BatchError, MissingExtraError
 from heat_igl.runtime import n_threads
 
-__all__ = ["connected", "dask_modules"]
-
 # - A task carries a whole mesh, about which Dask would warn.
 # - Dask's watch over its event loop wakes every process 50 times a second, and the profiler 100 times.
 # - A nanny gives a worker the environment "pre-spawn-environ". Dask's own value of it has malloc return every large

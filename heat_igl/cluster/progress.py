@@ -11,8 +11,6 @@ from typing import Any
 from heat_igl.cluster.worker import TOPIC
 from heat_igl.runtime import rich_progress
 
-__all__ = ["Watch", "watched"]
-
 _LOG = logging.getLogger("heat_igl.cluster")
 
 

@@ -11,8 +11,6 @@ from heat_igl.cluster.store import Store
 from heat_igl.errors import shown
 from heat_igl.typing import AnyArray
 
-__all__ = ["BatchReport", "BatchRow", "read_distances", "report"]
-
 
 @dataclass(frozen=True)
 class BatchRow:

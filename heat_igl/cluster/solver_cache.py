@@ -14,8 +14,6 @@ from heat_igl.linear.factor_memory import factor_bytes
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.runtime import release_free_memory
 
-__all__ = ["PROCESS_MEMORY", "SolverCache", "memory_for_solvers", "solver_memory"]
-
 # A worker without a solver: Python, numpy, scipy, libigl, zarr and Dask. Measured 108 MiB.
 PROCESS_MEMORY = 130 * 2**20
 # The mesh, the operators and one block of right-hand sides, measured on spheres of 10k to 164k vertices.

@@ -29,8 +29,6 @@ from heat_igl.io.chunks import (
 )
 from heat_igl.typing import AnyArray, IntArray
 
-__all__ = ["MeshGroup", "Store", "locked", "rows_per_block"]
-
 # Rows of a block: a multiple of the solver's blocks of right-hand sides, so that a row's bits depend on no other block.
 _ROWS = 8
 _MOST_ROWS = 64

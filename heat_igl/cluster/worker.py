@@ -31,8 +31,6 @@ from heat_igl.sampling import farthest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import IntArray
 
-__all__ = ["Outcome", "Task", "begin", "release", "resume"]
-
 # A task solves about this many values, and at least this many rows: factoring takes as long as 50 to 100 rows, so that
 # spreading a mesh over workers pays from a few hundred rows each.
 _VALUES_PER_TASK = 5e7

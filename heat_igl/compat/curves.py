@@ -17,12 +17,6 @@ from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.sources import OffsetSources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = [
-    "CurveReader", "EdgeFlipGeodesicSolver", "GeodesicTracer", "MeshFastMarchingDistanceSolver",
-    "MeshMarchingTrianglesSolver", "MeshSignedHeatSolver", "marching_triangles", "proper", "signed_distance",
-    "t_coef_here",
-]  # fmt: skip
-
 # Curves, each a list of points: a face, and the barycentric coordinates in it.
 Curves = list[list[tuple[int, list[float]]]]
 

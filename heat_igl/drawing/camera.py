@@ -7,8 +7,6 @@ import numpy as np
 from heat_igl.drawing.raster import rasterize, visible
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["default_rotation", "rotation", "to_pixels"]
-
 
 def rotation(azimuth: float, elevation: float) -> FloatArray:
     """Rotation to viewer coordinates, (3, 3): the rows point right, up and towards the viewer.

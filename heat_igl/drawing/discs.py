@@ -8,8 +8,6 @@ import numpy as np
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.typing import FloatArray
 
-__all__ = ["discs"]
-
 _CORNERS, _FEW_CORNERS = 8, 4
 # Above this number of points a disc is a few pixels wide, and is drawn as a square.
 _MANY = 20_000

@@ -16,8 +16,6 @@ from heat_igl.typing import BoolArray, FloatArray
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["lay_out"]
-
 _WIDTH = 3.15  # inches, one column of a journal
 
 _FONT = 7.0  # points

@@ -38,8 +38,6 @@ from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
 
-__all__ = ["Page", "page"]
-
 _AS_GIVEN = "Distance as given."
 _LOG_MAP = "log map"
 _SIGNED_COLOURS = "RdBu_r"

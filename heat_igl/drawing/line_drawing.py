@@ -17,8 +17,6 @@ from heat_igl.io import complete_file, write_svg
 from heat_igl.mesh import MeshLike, as_simplices, flat_curves
 from heat_igl.typing import FloatArray
 
-__all__ = ["Hidden", "write_line_drawing"]
-
 Hidden = Literal["dotted", "omitted"]
 
 # Width of the depth buffer in pixels: visible parts of lines end within about a thousandth of the picture.

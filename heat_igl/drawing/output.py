@@ -13,8 +13,6 @@ from heat_igl.io import complete_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["DPI", "PAGE_SUFFIXES", "PICTURE_SUFFIXES", "Picture"]
-
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 PAGE_SUFFIXES = (".html", ".htm")
 DPI = 400  # resolution of raster output: 1260 pixels for 8 cm

@@ -14,8 +14,6 @@ import numpy as np
 
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Pixels", "rasterize", "visible", "visible_runs"]
-
 # Candidate pixels per chunk, which bounds temporary arrays to about 200 MB.
 _CHUNK = 2_000_000
 

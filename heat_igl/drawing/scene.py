@@ -15,19 +15,6 @@ from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = [
-    "DISTANCE_COLOURS",
-    "DISTANCE_LABEL",
-    "LINE_INK",
-    "STRIPE_INK",
-    "UNREACHABLE",
-    "Scene",
-    "Style",
-    "check_style",
-    "colours",
-    "scene",
-]
-
 Style = Literal["lines", "stripes", "plain"]
 
 #: Near is light, far is dark: in pictures, pages and windows.

@@ -7,8 +7,6 @@ import numpy as np
 from heat_igl.drawing.raster import Pixels
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["colour_numbers", "isoline_coverage", "isoline_spacing", "screen_gradient", "shading", "stripe_coverage"]
-
 
 def colour_numbers(labels: IntArray, edges: IntArray, n_colours: int) -> IntArray:
     """A colour (n,) for the label (n,) of each vertex: the first that none of its earlier neighbours has."""

@@ -11,8 +11,6 @@ from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, UNREACHABLE, Scene, Sty
 from heat_igl.drawing.shading import isoline_coverage, screen_gradient, shading, stripe_coverage
 from heat_igl.typing import BoolArray, FloatArray
 
-__all__ = ["LINE", "OVERSAMPLING", "SOURCE", "fitted", "mark_dots", "surface_image"]
-
 OVERSAMPLING = 2
 LINE = 2.2  # width of an isoline in pixels
 SOURCE = "#e8000b"

@@ -11,8 +11,6 @@ from pathlib import Path
 
 from heat_igl.errors import MeshError
 
-__all__ = ["complete_file", "replacing"]
-
 
 @contextlib.contextmanager
 def complete_file(path: Path) -> Iterator[Path]:

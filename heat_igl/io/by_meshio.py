@@ -23,8 +23,6 @@ from heat_igl.io.packed import form_suffix
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 
-__all__ = ["read", "write"]
-
 _FACET = re.compile(
     rb"\s*facet\s+normal(?:[ \t]+\S+){3}\s+outer\s+loop(?:\s+vertex(?:[ \t]+\S+){3}[ \t\r]*\n){3}\s*endloop\s+endfacet"
 )

@@ -17,8 +17,6 @@ from heat_igl.io.packed import form_suffix
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray
 
-__all__ = ["FREESURFER_SUFFIXES", "MAP_SUFFIXES", "read", "read_maps", "write", "write_maps"]
-
 # FreeSurfer's files have no extension; these names of surfaces stand in its place.
 FREESURFER_SUFFIXES = (".white", ".pial", ".inflated", ".sphere", ".smoothwm", ".midthickness")
 

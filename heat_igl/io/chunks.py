@@ -20,17 +20,6 @@ import numpy as np
 from heat_igl.errors import MissingExtraError
 from heat_igl.typing import AnyArray
 
-__all__ = [
-    "checksum",
-    "chunk_checksums",
-    "chunk_files",
-    "checked_layout",
-    "damaged_chunk",
-    "file_checksum",
-    "read_rows",
-    "zarr_module",
-]
-
 # The codec crc32c appends this many bytes to a chunk (zarr specification, version 3).
 _CHECKSUM_BYTES = 4
 

@@ -13,8 +13,6 @@ from heat_igl.mesh import Mesh, which_repeat_a_vertex
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Cells", "Contents", "check", "integers", "select", "warn_if_cut"]
-
 
 class Cells(NamedTuple):
     """Polygons or tetrahedra: vertex indices from 0, cell after cell, and the number of corners of each cell (m,)."""

@@ -15,8 +15,6 @@ from heat_igl.io.text import format_rows
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, as_simplices, flat_curves
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = ["CURVE_SUFFIXES", "Polyline", "is_flat", "read_polylines", "write_curves", "write_svg"]
-
 # A mesh is flat if all vertices are at most this far from a plane, as a fraction of the extent.
 _FLAT = 1e-9
 # Width of a line in an SVG file, as a fraction of the larger side of the drawing.

@@ -23,19 +23,6 @@ from heat_igl.io.packed import form_suffix, is_packed, pack, unpacked
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices, warn_of_seams
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = [
-    "MESH_SUFFIXES",
-    "POINT_SUFFIXES",
-    "checked_attributes",
-    "checked_path",
-    "file_bytes",
-    "is_mesh_path",
-    "read_attributes",
-    "read_mesh",
-    "read_polygon_mesh",
-    "write_mesh",
-]
-
 
 class _Format(NamedTuple):
     read: Callable[[Path, bytes], Contents]

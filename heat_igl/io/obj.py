@@ -16,8 +16,6 @@ from heat_igl.mesh import Mesh
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["read", "write"]
-
 # Records that are ignored. Any other word is an error: ignoring a damaged "v" would shift all indices after it.
 _PASSED_OVER = (
     b"vt vn vp vc l p g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech "

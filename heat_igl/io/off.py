@@ -16,8 +16,6 @@ from heat_igl.io.text import Text, format_rows, ragged
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["read", "write"]
-
 # Texture coordinates (ST), colours (C) and normals (N) follow the position and are ignored. Some collections lack the
 # space between the keyword and the first count.
 _KEYWORD = re.compile(rb"(ST)?C?N?OFF(\d*)|(off)(\d*)")

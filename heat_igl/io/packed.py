@@ -8,8 +8,6 @@ from pathlib import Path
 
 from heat_igl.errors import MeshError
 
-__all__ = ["form_suffix", "is_packed", "pack", "unpacked"]
-
 _SUFFIX = ".gz"
 
 

@@ -18,8 +18,6 @@ from heat_igl.io.contents import Cells, Contents, check, integers, warn_if_cut
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray
 
-__all__ = ["read", "read_vertices", "write", "write_vertices"]
-
 
 def read(path: Path, data: bytes) -> Contents:
     """Parse a PLY file."""

@@ -26,14 +26,6 @@ from heat_igl.io.text import Text, format_rows
 from heat_igl.mesh import Mesh, PointCloud, usable_normals
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = [
-    "POINT_CLOUD_SUFFIXES",
-    "is_mesh_or_cloud_path",
-    "read_mesh_or_cloud",
-    "read_point_cloud",
-    "write_point_cloud",
-]
-
 # Largest value of a colour, and the smallest difference from length 1 of what is no normal.
 _BRIGHTEST = 255
 _NOT_OF_LENGTH_1 = 0.01

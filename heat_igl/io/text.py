@@ -14,8 +14,6 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Text", "format_rows", "ragged"]
-
 _NUMBER = re.compile(rb"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 _SPACE, _SLASH = 32, 47
 

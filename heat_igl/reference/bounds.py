@@ -8,8 +8,6 @@ from heat_igl.mesh import MeshLike, as_simplices, connectivity
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray
 
-__all__ = ["edge_paths", "straight_lines"]
-
 
 def straight_lines(mesh: MeshLike, sources: Sources) -> FloatArray:
     """Length (n,) of the straight line from each vertex to the nearest source, never above the geodesic distance."""

@@ -26,8 +26,6 @@ from heat_igl.errors import ReferenceSolverError
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import AnyArray
 
-__all__ = ["MEMORY", "TIMEOUT", "Reply", "answer", "call"]
-
 #: Seconds that a call may take, and bytes by which it may let the child's address space grow, unless told otherwise.
 TIMEOUT = 600.0
 MEMORY = 8 * 2**30

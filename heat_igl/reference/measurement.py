@@ -24,8 +24,6 @@ from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import exact_distance
 
-__all__ = ["EXACT_SOLVERS", "WINDOWS", "Measured", "measured"]
-
 #: The exact solver of this package, which `exact` takes unless told otherwise.
 WINDOWS = "windows"
 #: The exact solvers of other packages, for a second opinion; the last one needs no extra.

@@ -9,8 +9,6 @@ from heat_igl.reference.measurement import EXACT_SOLVERS, WINDOWS, measured
 from heat_igl.sources import Sources
 from heat_igl.typing import FloatArray
 
-__all__ = ["exact", "igl_heat", "meshlab", "meshlab_border", "meshlab_heat", "potpourri3d_heat"]
-
 
 def exact(
     mesh: Mesh, sources: Sources, *, solver: str = WINDOWS, timeout: float = TIMEOUT, memory: float = MEMORY

@@ -22,11 +22,9 @@ from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.validation import metrics
-from heat_igl.validation.methods import METHODS, Method, Progress, Run, Solver, resolved, run
+from heat_igl.validation.methods import METHODS, Method, Progress, Run, resolved, run
 from heat_igl.validation.metrics import BoundViolations
 from heat_igl.validation.report import ValidationReport, ValidationRow
-
-__all__ = ["METHODS", "Method", "Progress", "Solver", "draw_sources", "validate"]
 
 
 @names_guessed

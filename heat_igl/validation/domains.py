@@ -14,11 +14,6 @@ from heat_igl.sources import Sources
 from heat_igl.typing import BoolArray, FloatArray
 from heat_igl.validation import shapes
 
-__all__ = [
-    "CASES", "DomainCase", "Problem", "around_the_edge", "around_the_wall", "by_fermat", "delaunay", "moved_inside",
-    "straight", "without",
-]  # fmt: skip
-
 # Volume of a tetrahedron in the unit cube below which it is left out: its corners lie in a plane up to rounding.
 _LEAST_VOLUME = 1e-12
 

@@ -17,8 +17,6 @@ from heat_igl.mesh import Mesh, PointCloud, PolygonMesh, as_simplices
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["METHODS", "Method", "Prepare", "Progress", "Run", "Solver", "resolved", "run"]
-
 
 class Solver(Protocol):
     """The interface of a method; `GeodesicSolver` has it."""

@@ -19,8 +19,6 @@ from heat_igl.validation.metrics import relative_error
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["error_figure"]
-
 # Errors from 0.001 % to 10 %, the range in which methods differ. All panels share it, so that they can be compared.
 _LOWEST, _HIGHEST = 1e-5, 1e-1
 _ACROSS, _ROW_INCHES = 3, 3.2

@@ -15,8 +15,6 @@ from heat_igl.validation.plots import error_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["ValidationReport", "ValidationRow", "plain"]
-
 
 # The columns of a table: a field of the row, or of one of its records, and the factor to the unit of the column.
 _COLUMNS = {

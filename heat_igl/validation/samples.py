@@ -8,8 +8,6 @@ from pathlib import Path
 from heat_igl.mesh import Mesh, as_simplices
 from heat_igl.validation import shapes
 
-__all__ = ["bunny_path", "sample_mesh"]
-
 
 def bunny_path() -> Path | None:
     """Path of the bunny in the pymeshlab wheel, or None without pymeshlab. pymeshlab is not imported."""

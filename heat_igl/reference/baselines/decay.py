@@ -11,8 +11,6 @@ from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, warn_caller
 from heat_igl.steps import HeatFlow
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["domain_of", "fallen_from_sources", "log_step", "logarithm", "reached_from", "time_step"]
-
 
 def domain_of(mesh: MeshLike | Operators) -> Operators:
     """The operators of a mesh on the intrinsic Delaunay triangulation; given operators are returned unchanged."""

@@ -17,8 +17,6 @@ from heat_igl.reference.measurement import measured
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["fast_marching", "fast_marching_grid", "fast_sweeping"]
-
 
 def fast_marching(mesh: MeshLike, sources: Sources) -> FloatArray:
     """Fast marching on a triangle mesh (Kimmel and Sethian 1998), by potpourri3d.

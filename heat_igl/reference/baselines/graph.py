@@ -10,8 +10,6 @@ from heat_igl.mesh import MeshLike, as_simplices, connectivity
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray
 
-__all__ = ["graph_distance", "graph_limit"]
-
 # Entries of A below this fraction of the largest are rounding errors, not edges of the graph. For example, the two
 # right angles opposite the diagonal of a square have cotangents of 1e-17.
 _ROUNDING = 1e-12

@@ -7,8 +7,6 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 
-__all__ = ["grid_domain", "grid_sources", "grid_spacing"]
-
 
 def grid_sources(sources: ArrayLike) -> BoolArray:
     """`sources` as a boolean array; raises `SourceError` if it is not boolean or marks no point."""

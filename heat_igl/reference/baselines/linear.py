@@ -27,8 +27,6 @@ from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import HeatFlow, smallest_time_step
 from heat_igl.typing import BoolArray, FloatArray
 
-__all__ = ["boundary_problem", "log_heat_kernel", "varadhan"]
-
 # Largest number of matrix-vector products for the heat kernel. Clean meshes need 1000 to 30 000; one sliver can
 # require 1e9.
 _MOST_PRODUCTS = 1e5

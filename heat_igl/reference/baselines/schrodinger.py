@@ -20,8 +20,6 @@ from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import smallest_time_step
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["schrodinger", "schrodinger_grid"]
-
 # Default hbar on meshes, in edge lengths. For smaller hbar the discretization error h^2 / (24 hbar^2) grows, for larger
 # hbar the error at the cut locus. Geometric mean of the mean errors over the square, disk, sphere, cylinder, cow and
 # bunny: 2.6, 1.8 and 2.0 % for 1, 1.5 and 2.

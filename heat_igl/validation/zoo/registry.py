@@ -13,11 +13,6 @@ import numpy as np
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = [
-    "FAMILIES", "SHAPES", "Shape", "boxes", "caps", "compact", "corridors", "delaunay", "extruded", "family", "hull",
-    "joined", "merged", "raised", "revolved", "ring", "seeded", "shape", "tube", "walls",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Shape:
