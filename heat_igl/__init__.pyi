@@ -7,6 +7,7 @@ from heat_igl.applications import geodesic_errors as geodesic_errors
 from heat_igl.applications import parcel_distances as parcel_distances
 from heat_igl.applications import smooth as smooth
 from heat_igl.curves import centroidal_voronoi as centroidal_voronoi
+from heat_igl.curves import curve_on as curve_on
 from heat_igl.curves import curve_through as curve_through
 from heat_igl.curves import cut as cut
 from heat_igl.curves import exp_map as exp_map
@@ -48,7 +49,6 @@ from heat_igl.mesh import SurfaceCurve as SurfaceCurve
 from heat_igl.mesh import SurfacePoints as SurfacePoints
 from heat_igl.mesh import as_mesh as as_mesh
 from heat_igl.mesh import closest_points as closest_points
-from heat_igl.mesh import curve_on as curve_on
 from heat_igl.mesh import edge_curve as edge_curve
 from heat_igl.mesh import image_domain as image_domain
 from heat_igl.mesh import terrain as terrain

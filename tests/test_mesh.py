@@ -638,6 +638,22 @@ def test_a_jump_between_two_sheets_is_refused():
     sheets = Mesh(np.concatenate([sheet.V, sheet.V + np.array([0, 0, 0.2])]), np.concatenate([sheet.F, sheet.F + 25]))
     with pytest.raises(SourceError, match=r"line from positions\[0\] jumps from face .* draw it closer"):
         curve_on(sheets, [[0.2, 0.2, 0.05], [0.7, 0.2, 0.15]])
+    # The same on one sheet that is folded: the way around the fold leaves the polyline.
+    flat = shapes.grid(8)
+    x, y, _ = flat.V.T
+    folded = Mesh(np.stack([np.minimum(x, 1 - x), y, 0.02 * (x > 0.5)], axis=1), flat.F)
+    with pytest.raises(SourceError, match=r"jumps from face"):
+        curve_on(folded, [[0.1, 0.3, 0], [0.1, 0.7, 0.02]])
+    assert curve_on(folded, [[0.1, 0.5, 0], [0.5, 0.5, 0], [0.1, 0.5, 0.02]]).length > 0.75
+
+
+def test_a_polyline_over_a_valley_is_led_through_it():
+    """The closest points jump from wall to wall, and the curve between them keeps within the tolerance."""
+    flat = shapes.grid(8)
+    valley = Mesh(np.stack([flat.V[:, 0] - 0.5, flat.V[:, 1], abs(flat.V[:, 0] - 0.5)], axis=1), flat.F)
+    curve = curve_on(valley, [[-0.4, 0.3, 0.45], [0.0, 0.4, 0.1], [0.4, 0.5, 0.45]], tolerance=0.12)
+    assert_connected(valley, curve)
+    assert curve.points[:, 2].min() == pytest.approx(0, abs=1e-12)
 
 
 @pytest.mark.parametrize(

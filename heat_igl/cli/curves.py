@@ -16,7 +16,7 @@ from heat_igl.cli.output import Row, check_output, check_writable, print_rows, w
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.heat import Level, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh_or_cloud, read_polylines, write_mesh
-from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, as_simplices, closest_points, curve_on
+from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, as_simplices, closest_points
 
 CurvesOption = Annotated[
     Path, typer.Option(metavar="OBJ", help="Polylines (records l), as `isolines` and `path` write them; projected.")
@@ -173,7 +173,7 @@ def projected(mesh: Mesh, path: Path) -> list[SurfaceCurve]:
     curves = []
     for i, line in enumerate(read_polylines(path)):
         try:
-            curves.append(curve_on(mesh, line.positions, closed=line.is_closed))
+            curves.append(heat_igl.curve_on(mesh, line.positions, closed=line.is_closed))
         except SourceError as error:
             raise SourceError(f"{path}, polyline {i}: {error}") from None
     return curves

@@ -2,6 +2,7 @@ from heat_igl.curves.bezier import geodesic_bezier as geodesic_bezier
 from heat_igl.curves.cut_mesh import CutMesh as CutMesh
 from heat_igl.curves.cut_mesh import MeshPiece as MeshPiece
 from heat_igl.curves.cutting import cut as cut
+from heat_igl.curves.drawn_curves import curve_on as curve_on
 from heat_igl.curves.drawn_curves import curve_through as curve_through
 from heat_igl.curves.drawn_curves import signed_distance as signed_distance
 from heat_igl.curves.geodesics import GeodesicPathSolver as GeodesicPathSolver

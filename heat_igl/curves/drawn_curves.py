@@ -1,18 +1,21 @@
-"""Curves drawn through places on a mesh, and the signed distance from a curve, each in one call."""
+"""Curves drawn through places on a mesh or along polylines in space, and the signed distance from a curve."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from heat_igl.curves.geodesics import GeodesicPathSolver
-from heat_igl.curves.places import Waypoints, mixed_places
-from heat_igl.errors import SourceError, names_guessed, truth
+from heat_igl.curves.places import Waypoints, mixed_places, snapped
+from heat_igl.curves.shortening import as_curve
+from heat_igl.errors import SourceError, names_guessed, positive, truth
 from heat_igl.heat import SignedHeatSolver
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, closest_points
+from heat_igl.mesh.grouping import enumerate_runs
+from heat_igl.mesh.projection import checked_points
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["curve_through", "signed_distance"]
+__all__ = ["curve_on", "curve_through", "signed_distance"]
 
 
 @names_guessed
@@ -72,6 +75,93 @@ def _placed(mesh: Mesh, points: Waypoints | ArrayLike) -> Waypoints:
             f"farther than {nearness:.3g}, the mean length of an edge): pass closest_points(mesh, points).points"
         )
     return found.points
+
+
+def curve_on(
+    mesh: MeshLike, positions: ArrayLike, *, closed: bool = False, tolerance: float | None = None
+) -> SurfaceCurve:
+    """Project a polyline in space onto a triangle mesh.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles.
+    positions : (k, 3) array_like
+        Corners of the polyline, in the mesh's unit. Each straight line between two corners is sampled at steps of at
+        most half a mean edge length; the closest points to the samples are joined by geodesics.
+    closed : bool
+        Whether a last line leads back to the first corner.
+    tolerance : float, optional
+        Largest distance of polyline and curve from each other, at the corners and between them; a mean edge length if
+        not given.
+
+    Returns
+    -------
+    SurfaceCurve
+        With a segment for each piece inside a face.
+
+    Raises
+    ------
+    SourceError
+        If the polyline is farther from the surface than `tolerance`, or the curve from the polyline, as where the
+        closest points jump from one part of the surface to another; if there are fewer than two different corners, or a
+        position is not finite.
+    MeshError
+        If the mesh is tetrahedral.
+    ValueError
+        If `tolerance` is not a positive number, or `closed` is no truth value.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(4)
+    >>> curve = heat_igl.curve_on(mesh, [[0.1, 0.2, 0.01], [0.4, 0.6, 0.01]])
+    >>> round(float(curve.lengths(mesh).sum()), 6)
+    0.5
+    """
+    mesh, closed = as_simplices(mesh), truth("closed", closed)
+    corners = checked_points(positions)
+    if len(corners) < 2:
+        raise SourceError(f"positions must be two corners of a curve or more, not {len(corners)}")
+    solver = GeodesicPathSolver(mesh)
+    h = float(mesh.edge_lengths.mean())
+    tolerance = h if tolerance is None else positive("tolerance", tolerance)
+    ends = np.concatenate([corners, corners[:1]]) if closed else corners
+    lengths = np.linalg.norm(np.diff(ends, axis=0), axis=1)
+    if not lengths.any():
+        raise SourceError("positions are all in one place: a curve needs two different ones")
+    line, step = enumerate_runs(np.maximum(np.ceil(lengths / (h / 2)).astype(int), 1))
+    share = step / np.bincount(line)[line]
+    samples = np.append(ends[line] + share[:, None] * (ends[line + 1] - ends[line]), ends[-1:], axis=0)
+    found = closest_points(mesh, samples)
+    far = int(found.gap.argmax())
+    if found.gap[far] > tolerance:
+        raise SourceError(
+            f"the polyline leaves the surface by {found.gap[far]:.6g} on the line from "
+            f"positions[{line[min(far, len(line) - 1)]}], at {samples[far].tolist()}; tolerance is {tolerance:.6g}"
+        )
+    faces, barycentric = found.points.faces, snapped(found.points.barycentric)
+    component = mesh.components[mesh.F[faces, 0]]
+    jumps = component[1:] != component[:-1]
+    if not jumps.any():
+        curve = as_curve(legs := solver.geodesics(faces, barycentric), is_closed=closed).on(mesh)
+        # Each corner of the curve lies near the straight line between the two samples of its leg.
+        leg = np.repeat(np.arange(len(legs)), [len(part.faces) for part in legs])
+        begin, along = samples[leg], samples[leg + 1] - samples[leg]
+        place = curve.points[1:] - begin
+        squared = np.maximum(np.einsum("kx,kx->k", along, along), np.finfo(float).tiny)
+        nearest = np.clip(np.einsum("kx,kx->k", place, along) / squared, 0, 1)[:, None] * along
+        jumps[leg[np.linalg.norm(place - nearest, axis=1) > tolerance * (1 + 1e-9)]] = True
+    if jumps.any():
+        i = int(np.argmax(jumps))
+        raise SourceError(
+            f"the line from positions[{line[i]}] jumps from face {faces[i]} to face {faces[i + 1]} at "
+            f"{samples[i].tolist()}, where another part of the surface is closer: draw it closer to the surface"
+        )
+    moves = (curve.start != curve.end).any(axis=1)
+    if not moves.any():
+        raise SourceError("all positions are closest to one point of the surface: a curve needs two different ones")
+    return unchecked_curve(curve.faces[moves], curve.start[moves], curve.end[moves], closed, mesh)
 
 
 def signed_distance(mesh: MeshLike, curve: NestedCurves) -> FloatArray:

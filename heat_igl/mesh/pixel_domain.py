@@ -9,12 +9,12 @@ import numpy as np
 
 from heat_igl.errors import MeshError, SourceError, as_array, real_numbers, shown
 from heat_igl.mesh.mesh import Mesh
-from heat_igl.mesh.voxels import TETRAHEDRA_PER_VOXEL, voxel_tetrahedra
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
 
 __all__ = ["ImageDomain", "checked_spacing", "image_domain"]
 
-_FACES_PER_PIXEL = 4
+# Triangles around the centre of a pixel, tetrahedra around that of a voxel.
+_FACES_PER_CELL = {2: 4, 3: 12}
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +125,7 @@ class ImageDomain:
         ValueError
             If `image` has another shape.
         """
-        n_faces = TETRAHEDRA_PER_VOXEL if self.index.ndim == 3 else _FACES_PER_PIXEL
-        return np.repeat(self._of_pixels(image), n_faces, axis=0)
+        return np.repeat(self._of_pixels(image), _FACES_PER_CELL[self.index.ndim], axis=0)
 
     def _of_pixels(self, image: ArrayLike) -> AnyArray:
         """Values of the pixels of the domain, in the order of their vertices."""
@@ -175,27 +174,45 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
     (2, 3)
     """
     inside = _mask(mask)
-    steps = checked_spacing(spacing, inside.ndim)
-    if inside.ndim == 3:
-        V, tetrahedra, index = voxel_tetrahedra(inside, steps)
-        return ImageDomain(Mesh(V, tetrahedra), index)
-    down, across = steps
-    row, column = np.nonzero(inside)
-    n = len(row)
+    steps, dimension = checked_spacing(spacing, inside.ndim), inside.ndim
+    cells = np.argwhere(inside)
+    n = len(cells)
     index = np.full(inside.shape, -1)
     index[inside] = np.arange(n)
-    # Corner (r, c) is the upper left one of pixel (r, c).
-    wide = inside.shape[1] + 1
-    upper_left = row * wide + column
-    rim = np.stack([upper_left, upper_left + 1, upper_left + wide + 1, upper_left + wide], axis=1)
-    used, corner = np.unique(rim, return_inverse=True)
-    corner = n + corner.reshape(n, 4)
-    centre = np.broadcast_to(np.arange(n)[:, None], (n, 4))
-    F = np.stack([centre, corner, np.roll(corner, -1, axis=1)], axis=2).reshape(-1, 3)
-    corner_row, corner_column = np.divmod(used, wide)
-    y = np.concatenate([row, corner_row - 0.5]) * down
-    x = np.concatenate([column, corner_column - 0.5]) * across
-    return ImageDomain(Mesh(np.stack([x, y, np.zeros(len(x))], axis=1), F), index)
+    # Corner (i, j, ...) is the first one of cell (i, j, ...).
+    shape = tuple(size + 1 for size in inside.shape)
+    offsets = np.indices((2,) * dimension).reshape(dimension, -1).T
+    corners = np.ravel_multi_index(tuple(np.moveaxis(cells[:, None] + offsets, 2, 0)), shape)
+    used, corners = np.unique(corners, return_inverse=True)
+    corners = n + corners.reshape(n, -1)
+    sides = _sides(dimension)[cells.sum(axis=1) % 2]
+    rim = np.take_along_axis(corners, sides.reshape(n, -1), axis=1).reshape(sides.shape)
+    centre = np.broadcast_to(np.arange(n)[:, None, None], (*sides.shape[:2], 1))
+    F = np.concatenate([centre, rim], axis=2).reshape(-1, dimension + 1)
+    V = np.concatenate([cells, np.stack(np.unravel_index(used, shape), axis=1) - 0.5]) * np.asarray(steps)
+    return ImageDomain(Mesh(V[:, ::-1], F), index)
+
+
+def _sides(dimension: int) -> IntArray:
+    """Corners (2, k, dimension) of the sides of an even and an odd cell; those of a voxel are cut into triangles.
+
+    Corner 4 i + 2 j + k lies at (i, j, k). Diagonals join the two corners of a side whose coordinates in the image have
+    an even sum, so that voxels on both sides of it agree.
+    """
+    if dimension == 2:
+        return np.tile([[0, 1], [1, 3], [3, 2], [2, 0]], (2, 1, 1))
+    cut = np.empty((2, _FACES_PER_CELL[3], 3), np.int64)
+    for odd in range(2):
+        triangles = []
+        for axis in range(3):
+            one, other = (4 >> (axis + step) % 3 for step in (1, 2))
+            for level in (0, 4 >> axis):
+                square = [level, level + one, level + one + other, level + other]
+                if (bin(level).count("1") + odd) % 2:
+                    square = square[1:] + square[:1]
+                triangles += [[square[0], square[1], square[2]], [square[0], square[2], square[3]]]
+        cut[odd] = triangles
+    return cut
 
 
 def _mask(mask: ArrayLike) -> BoolArray:
