@@ -3,11 +3,10 @@
     python scripts/derivatives_table.py [--directions 20]      # generated shapes, in so many random directions
     python scripts/derivatives_table.py bunny.obj cow.obj --docs docs/derivatives.md
 
-All vertices are moved by 0.01 edges first: in flat parts paths are equally long, and in flat squares any motion flips
-faces. Vertices at kinks are left out (k), which show by a second difference, and those that `inexact` lists (i). A kink
-of a path is the cut locus; one of the heat method is a face that begins to be damped there. Directions in which a flip
-falls between the two ends of a difference are left out for the heat method (f). Differences and identities are the
-largest relative ones. Costs are processor time in queries, and the bytes per vertex that a `pull_back` takes at most.
+All vertices are moved by 0.01 edges first: in flat parts paths are equally long. Vertices at the cut locus are left
+out (k), which show by a second difference, and those that `inexact` lists (i).
+Differences and identities are the largest relative ones. Costs are processor time in queries, and the bytes per vertex
+that a `pull_back` takes at most.
 """
 
 from __future__ import annotations
@@ -15,18 +14,15 @@ from __future__ import annotations
 import sys
 import tracemalloc
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
-from heat_igl import Mesh, shapes
-from heat_igl.geodesic import Solver, SolverChoice
-from heat_igl.heat.derivatives import DistanceDerivative
+from heat_igl import GeodesicSolver, Mesh, shapes
+from heat_igl.geodesic.derivatives import DistanceDerivative
 from heat_igl.typing import FloatArray
 
 from harness import Row, Table, collected, drawn, named, paired, parsed, publish
 
-METHODS: dict[str, dict[str, Any]] = {"exact": {"method": "exact"}, "heat": {"laplacian": "intrinsic-delaunay"}}
 SHAPES: dict[str, Callable[[], Mesh]] = {
     "sphere": lambda: shapes.icosphere(4),
     "torus": lambda: shapes.torus(60, 30),
@@ -34,10 +30,10 @@ SHAPES: dict[str, Callable[[], Mesh]] = {
     "book of 3 pages": lambda: shapes.book(3, 24),
     "square": lambda: shapes.grid(40),
 }
-# Step of the differences in mean edge lengths: few kinks lie within it, and rounding is 1e-6 for heat.
+# Step of the differences in mean edge lengths: few kinks lie within it.
 STEP = 1e-7
 # A second difference above this share of a step is a kink, and not the curvature of a smooth function.
-KINK = {"exact": 1e-5, "heat": 1e-4}
+KINK = 1e-5
 
 
 def moved(mesh: Mesh, edges: float, seed: int) -> Mesh:
@@ -49,42 +45,35 @@ def moved(mesh: Mesh, edges: float, seed: int) -> Mesh:
 def measured(name: str, mesh: Mesh, n_directions: int, seed: int) -> Row:
     mesh, rng = moved(mesh, 0.01, seed), np.random.default_rng(seed)
     source = drawn(mesh, 1, seed)[0]
-    row: Row = {"mesh": name, "n": mesh.n_vertices}
-    for method, options in METHODS.items():
-        solver = SolverChoice.of(**options).on(mesh)
-        distance, pull_back = solver.distance_vjp(source)
-        directions = np.random.default_rng(seed + 1).standard_normal((n_directions, *mesh.V.shape))
-        row[method] = {
-            **compared(solver, mesh, source, pull_back, directions, method),
-            **identities(mesh, distance, pull_back, rng.standard_normal(mesh.n_vertices)),
-            **costs(solver, source, pull_back, rng.standard_normal(mesh.n_vertices), directions[0]),
-        }
-    worst = {key: max(row[method][key] for method in METHODS) for key in IDENTITIES}
-    return row | worst | {"bytes": max(row[method]["bytes"] for method in METHODS)}
+    solver = GeodesicSolver(mesh, method="exact")
+    distance, pull_back = solver.distance_vjp(source)
+    directions = np.random.default_rng(seed + 1).standard_normal((n_directions, *mesh.V.shape))
+    return {
+        "mesh": name,
+        "n": mesh.n_vertices,
+        **compared(solver, mesh, source, pull_back, directions),
+        **identities(mesh, distance, pull_back, rng.standard_normal(mesh.n_vertices)),
+        **costs(solver, source, pull_back, rng.standard_normal(mesh.n_vertices), directions[0]),
+    }
 
 
 def compared(
-    solver: Solver, mesh: Mesh, source: int, pull_back: DistanceDerivative, directions: FloatArray, method: str
+    solver: GeodesicSolver, mesh: Mesh, source: int, pull_back: DistanceDerivative, directions: FloatArray
 ) -> Row:
     """Relative difference from central differences in the norm over the vertices, and what was left out."""
     here, step = solver.distance(source), STEP * mesh.edge_lengths.mean()
     exact = np.isfinite(here)
     exact[pull_back.inexact] = False
-    kinks, flipped, norms = np.zeros(len(here), bool), 0, [0.0]
+    kinks, norms = np.zeros(len(here), bool), [0.0]
     for direction in directions:
-        two = [solver.with_vertices(mesh.V + sign * step * direction) for sign in (1, -1)]
-        # A flip changes no path.
-        if method == "heat" and len({one.operators.surface.triangulation.F.tobytes() for one in two}) > 1:
-            flipped += 1
-            continue
-        ahead, behind = (one.distance(source) for one in two)
+        ahead, behind = (solver.with_vertices(mesh.V + sign * step * direction).distance(source) for sign in (1, -1))
         with np.errstate(invalid="ignore"):
-            smooth = exact & (np.abs(ahead - 2 * here + behind) <= KINK[method] * step + 1e-12 * here)
+            smooth = exact & (np.abs(ahead - 2 * here + behind) <= KINK * step + 1e-12 * here)
             expected = np.where(smooth, (ahead - behind) / (2 * step), 0.0)
         kinks |= exact & ~smooth
         change = np.where(smooth, pull_back.push_forward(direction), 0.0)
         norms.append(float(np.linalg.norm(change - expected) / np.linalg.norm(expected)))
-    counts = {"k": int(kinks.sum()), "i": len(pull_back.inexact), "f": flipped}
+    counts = {"k": int(kinks.sum()), "i": len(pull_back.inexact)}
     left_out = ", ".join(f"{count} {letter}" for letter, count in counts.items() if count)
     return {"norm": max(norms), "left out": f" ({left_out})" if left_out else ""}
 
@@ -111,7 +100,9 @@ def identities(mesh: Mesh, distance: FloatArray, pull_back: DistanceDerivative, 
     return dict(zip(IDENTITIES, map(float, found), strict=True))
 
 
-def costs(solver: Solver, source: int, pull_back: DistanceDerivative, g: FloatArray, direction: FloatArray) -> Row:
+def costs(
+    solver: GeodesicSolver, source: int, pull_back: DistanceDerivative, g: FloatArray, direction: FloatArray
+) -> Row:
     """Processor time of both directions in queries, medians of alternating calls; bytes per vertex at most."""
     calls = {"query": lambda: solver.distance(source), "back": lambda: pull_back(g)}
     calls["forth"] = lambda: pull_back.push_forward(direction)
@@ -128,9 +119,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     meshes = named(options.meshes) or {name: moved(shape(), 0.1, 7) for name, shape in SHAPES.items()}
     rows = collected(measured(name, mesh, options.directions, options.seed) for name, mesh in meshes.items())
     mesh = {"mesh": "{mesh}", "vertices": "{n}"}
-    ways = {f"{way}, {method}": f"{{{method}[{way}]:.1f}}" for way in ("back", "forth") for method in METHODS}
+    ways = {way: f"{{{way}:.1f}}" for way in ("back", "forth")}
     tables = {
-        "differences": Table(rows, mesh | {m: f"{{{m}[norm]:.1e}}{{{m}[left out]}}" for m in METHODS}),
+        "differences": Table(rows, mesh | {"exact": "{norm:.1e}{left out}"}),
         "identities": Table(rows, mesh | {key: f"{{{key}:.0e}}" for key in IDENTITIES}),
         "costs": Table(rows, mesh | ways | {"bytes": "{bytes:.0f}"}),
     }

@@ -12,15 +12,6 @@ from surfaces import moebius_strip
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, OffsetSources, SurfacePoints, shapes
-from heat_igl.geodesic import SolverChoice
-
-BY_PATHS = [{"method": "exact"}]
-HEAT = [
-    {"magnitude": "unit", "laplacian": "cotan"},
-    {"magnitude": "unit", "laplacian": "intrinsic-delaunay"},
-    {"laplacian": "intrinsic-delaunay"},
-    {"laplacian": "intrinsic-delaunay", "t_coef": 1.0},
-]
 
 
 def moved(mesh: Mesh, amount: float = 0.15) -> Mesh:
@@ -40,7 +31,7 @@ MESHES = {
 
 
 def differences(
-    solver: HeatMethodSolver, V: np.ndarray, sources: Any, direction: np.ndarray, step: float
+    solver: GeodesicSolver, V: np.ndarray, sources: Any, direction: np.ndarray, step: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Central differences (n,) of the distance, and where they cross no kink: a second difference would show it."""
     ahead, behind = (solver.with_vertices(V + sign * step * direction).distance(sources) for sign in (1, -1))
@@ -50,11 +41,10 @@ def differences(
         return np.where(np.isfinite(here), (ahead - behind) / (2 * step), 0.0), smooth
 
 
-@pytest.mark.parametrize("options", BY_PATHS, ids=str)
 @pytest.mark.parametrize("name", MESHES)
-def test_paths_against_central_differences(name: str, options: dict[str, Any]) -> None:
+def test_paths_against_central_differences(name: str) -> None:
     mesh, rng = MESHES[name](), np.random.default_rng(1)
-    solver, sources = SolverChoice.of(**options).on(mesh), [5, mesh.n_vertices // 2]
+    solver, sources = GeodesicSolver(mesh, method="exact"), [5, mesh.n_vertices // 2]
     distance, pull_back = solver.distance_vjp(sources)
     np.testing.assert_array_equal(distance, solver.distance(sources))
     assert len(pull_back.inexact) <= 0.01 * mesh.n_vertices
@@ -75,57 +65,10 @@ def test_paths_against_central_differences(name: str, options: dict[str, Any]) -
         )
 
 
-@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
-@pytest.mark.parametrize("options", HEAT, ids=str)
-@pytest.mark.parametrize("name", ["sphere", "grid", "moebius", "book"])
-def test_heat_against_central_differences(name: str, options: dict[str, Any]) -> None:
-    mesh, rng = MESHES[name](), np.random.default_rng(2)
-    solver, sources = SolverChoice.of(**options).on(mesh), 150
-    distance, pull_back = solver.distance_vjp(sources)
-    np.testing.assert_array_equal(distance, solver.distance(sources))
-    g = rng.standard_normal(mesh.n_vertices)
-    g[pull_back.inexact] = 0
-    for _ in range(5):
-        direction = rng.standard_normal(mesh.V.shape)
-        expected, _ = differences(solver, mesh.V, sources, direction, 1e-6 * mesh.edge_lengths.mean())
-        rate = (g * expected).sum()
-        assert (pull_back(g) * direction).sum() == pytest.approx(rate, rel=1e-4, abs=1e-6 * np.abs(expected).sum())
-
-
-@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
-@pytest.mark.parametrize("sources", [[5, 100, 200], list(range(30))], ids=["three", "a region"])
-@pytest.mark.parametrize("options", HEAT[::2], ids=str)
-def test_heat_from_several_sources(sources: list[int], options: dict[str, Any]) -> None:
-    mesh, rng = MESHES["grid"](), np.random.default_rng(3)
-    solver = SolverChoice.of(**options).on(mesh)
-    _, pull_back = solver.distance_vjp(sources)
-    g = rng.standard_normal(mesh.n_vertices)
-    g[pull_back.inexact] = 0  # raised to straight lines
-    direction = rng.standard_normal(mesh.V.shape)
-    expected, _ = differences(solver, mesh.V, sources, direction, 1e-6 * mesh.edge_lengths.mean())
-    assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-4)
-
-
-@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
-@pytest.mark.parametrize("options", HEAT[1:], ids=str)
-def test_heat_on_components_with_time_steps_of_their_own(options: dict[str, Any]) -> None:
-    one, other = MESHES["grid"](), MESHES["sphere"]()
-    n = one.n_vertices
-    mesh = Mesh(np.concatenate([one.V, 3 + 5 * other.V]), np.concatenate([one.F, n + other.F]))
-    solver, sources, rng = SolverChoice.of(**options).on(mesh), [150, n + 5], np.random.default_rng(11)
-    _, pull_back = solver.distance_vjp(sources)
-    g = rng.standard_normal(mesh.n_vertices)
-    g[pull_back.inexact] = 0
-    for direction in (rng.standard_normal(mesh.V.shape), mesh.V * (np.arange(len(mesh.V)) < n)[:, None]):
-        expected, _ = differences(solver, mesh.V, sources, direction, 1e-6 * one.edge_lengths.mean())
-        assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-4)
-
-
-@pytest.mark.parametrize("options", BY_PATHS + HEAT, ids=str)
 @pytest.mark.parametrize("name", ["sphere", "grid", "moebius"])
-def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str, options: dict[str, Any]) -> None:
+def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str) -> None:
     mesh, rng = MESHES[name](), np.random.default_rng(4)
-    distance, pull_back = SolverChoice.of(**options).on(mesh).distance_vjp(5)
+    distance, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(5)
     g = rng.standard_normal(mesh.n_vertices)
     g[pull_back.inexact] = 0
     dV = pull_back(g)
@@ -135,24 +78,10 @@ def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str, 
     assert (dV * mesh.V).sum() == pytest.approx((g * distance).sum(), abs=1e-10 * scale)
 
 
-def test_with_a_given_time_step_scaling_takes_its_derivative_too() -> None:
-    mesh = MESHES["sphere"]()
-    t = 0.7 * mesh.edge_lengths.mean() ** 2
-    distance, pull_back = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay", t=t).distance_vjp(5)
-    g = np.random.default_rng(5).standard_normal(mesh.n_vertices)
-    by_t = pull_back.by_time_step(g)
-    assert (pull_back(g) * mesh.V).sum() + 2 * t * by_t == pytest.approx((g * distance).sum(), rel=1e-10)
-    ahead, behind = (
-        HeatMethodSolver(mesh, laplacian="intrinsic-delaunay", t=t * (1 + e)).distance(5) for e in (1e-6, -1e-6)
-    )
-    assert by_t == pytest.approx((g * (ahead - behind)).sum() / (2e-6 * t), rel=1e-5)
-
-
-@pytest.mark.parametrize("options", BY_PATHS, ids=str)
-def test_on_a_flat_convex_mesh_the_ends_move_along_the_line(options: dict[str, Any]) -> None:
+def test_on_a_flat_convex_mesh_the_ends_move_along_the_line() -> None:
     flat = perturbed(shapes.grid(20))
     mesh = Mesh(flat.V * [1, 1, 0], flat.F)
-    distance, pull_back = SolverChoice.of(**options).on(mesh).distance_vjp(110)
+    distance, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(110)
     others = [3, 50, 217, 399]
     assert HeatMethodSolver(mesh).diagnostics.n_flips > 0
     rows = pull_back(np.eye(mesh.n_vertices)[others])
@@ -163,15 +92,14 @@ def test_on_a_flat_convex_mesh_the_ends_move_along_the_line(options: dict[str, A
         np.testing.assert_allclose(dV, expected, atol=1e-9)
 
 
-@pytest.mark.parametrize("options", BY_PATHS, ids=str)
-def test_a_bend_moves_with_its_vertex(options: dict[str, Any]) -> None:
+def test_a_bend_moves_with_its_vertex() -> None:
     square = shapes.grid(12)
     centre = square.V[square.F].mean(axis=1)
     mesh = Mesh(square.V, square.F[~((centre[:, 0] > 0.5) & (centre[:, 1] > 0.5))])
     start, end, bend = (
         int(np.argmin(np.linalg.norm(mesh.V - place, axis=1))) for place in ([1, 0.25, 0], [0.25, 1, 0], [0.5, 0.5, 0])
     )
-    solver = SolverChoice.of(**options).on(mesh)
+    solver = GeodesicSolver(mesh, method="exact")
     _, pull_back = solver.distance_vjp(start)
     dV = pull_back(np.eye(mesh.n_vertices)[end])
     to_bend, from_bend = mesh.V[bend] - mesh.V[start], mesh.V[end] - mesh.V[bend]
@@ -180,13 +108,11 @@ def test_a_bend_moves_with_its_vertex(options: dict[str, Any]) -> None:
     np.testing.assert_allclose(dV[start], -to_bend, atol=1e-9)
 
 
-@pytest.mark.parametrize("options", BY_PATHS + HEAT[2:3], ids=str)
-def test_by_edge_lengths_without_positions(options: dict[str, Any]) -> None:
+def test_by_edge_lengths_without_positions() -> None:
     mesh, rng = MESHES["sphere"](), np.random.default_rng(6)
     corners = mesh.V[mesh.F]
     lengths = np.stack([np.linalg.norm(corners[:, (c + 1) % 3] - corners[:, (c + 2) % 3], axis=1) for c in range(3)], 1)
-    cls = GeodesicSolver if "method" in options else HeatMethodSolver
-    made = partial(cls.from_edge_lengths, **options)
+    made = partial(GeodesicSolver.from_edge_lengths, method="exact")
     solver = made(mesh.F, lengths)
     distance, pull_back = solver.distance_vjp(9)
     g = rng.standard_normal(len(distance))
@@ -200,12 +126,11 @@ def test_by_edge_lengths_without_positions(options: dict[str, Any]) -> None:
         pull_back(g)
 
 
-@pytest.mark.parametrize("options", BY_PATHS, ids=str)
-def test_points_in_faces_as_sources(options: dict[str, Any]) -> None:
+def test_points_in_faces_as_sources() -> None:
     mesh, rng = moved(shapes.torus(50, 25), 0.3), np.random.default_rng(8)
     faces, barycentric = rng.integers(mesh.n_faces, size=4), rng.dirichlet([2, 2, 2], 4)
-    solver = SolverChoice.of(**options).on(mesh)
-    triangulation = solver.distance_vjp(0)[1]._answer.triangulation
+    solver = GeodesicSolver(mesh, method="exact")
+    triangulation = solver.distance_vjp(0)[1]._paths.triangulation
     carried = triangulation.locate(faces, barycentric)[1]
     assert (carried != barycentric).any(), "no point lies beside a flipped edge"
 
@@ -250,17 +175,16 @@ def test_sources_that_start_later() -> None:
     assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-5)
 
 
-@pytest.mark.parametrize("options", BY_PATHS + HEAT[2:3], ids=str)
-def test_unreachable_vertices_have_no_derivative(options: dict[str, Any]) -> None:
+def test_unreachable_vertices_have_no_derivative() -> None:
     one = MESHES["grid"]()
     n = one.n_vertices
     mesh = Mesh(np.concatenate([one.V, one.V + 3.0]), np.concatenate([one.F, one.F + n]))
-    distance, pull_back = SolverChoice.of(**options).on(mesh).distance_vjp(5)
+    distance, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(5)
     np.testing.assert_array_equal(pull_back.unreachable, np.arange(n, 2 * n))
     g = np.where(np.isinf(distance), np.nan, 1.0)
     dV = pull_back(g)
     assert not dV[n:].any()
-    np.testing.assert_array_equal(dV[:n], SolverChoice.of(**options).on(mesh).distance_vjp(5)[1](np.ones(2 * n))[:n])
+    np.testing.assert_array_equal(dV[:n], GeodesicSolver(mesh, method="exact").distance_vjp(5)[1](np.ones(2 * n))[:n])
     assert np.abs(dV[:n]).max() > 0.1
 
 
@@ -307,29 +231,78 @@ def test_velocities_that_cannot_be_used() -> None:
     assert of_point.push_forward(mesh.V, np.zeros((1, 3))).shape == (289,)
 
 
-def refused() -> list[Any]:
-    curve = heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]])
-    return [
-        pytest.param({"method": "exact"}, curve, "a curve is among the sources: place points on it", id="curve"),
-        pytest.param({"method": "sweep"}, 0, "derivatives are those of paths, which a sweep does not find", id="sweep"),
-        pytest.param({"laplacian": "cotan", "backend": "iterative"}, 0, "cannot solve the adjoint", id="backend"),
-        pytest.param({"laplacian": "intrinsic-delaunay-refined"}, 0, "more vertices than the mesh", id="refined"),
-    ]
-
-
-@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
-@pytest.mark.parametrize(("options", "sources", "message"), refused())
-def test_what_has_no_derivative_is_refused(options: dict[str, Any], sources: Any, message: str) -> None:
-    mesh = moved(shapes.grid(40)) if options.get("method") == "sweep" else MESHES["grid"]()
-    with pytest.raises(ValueError, match=message):
-        SolverChoice.of(**options).on(mesh).distance_vjp(sources)
-
-
-@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
-def test_tetrahedra_and_clouds_are_refused() -> None:
-    cloud = heat_igl.PointCloud(MESHES["sphere"]().V)
+def test_what_has_no_derivative_is_refused() -> None:
+    mesh, curve = MESHES["grid"](), heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]])
+    with pytest.raises(ValueError, match="a curve is among the sources: place points on it"):
+        GeodesicSolver(mesh).distance_vjp(curve)
+    with pytest.raises(ValueError, match="derivatives are those of paths, which a sweep does not find"):
+        GeodesicSolver(moved(shapes.grid(40)), method="sweep").distance_vjp(0)
     with pytest.raises(ValueError, match="derivatives need a surface of triangles"):
-        HeatMethodSolver(cloud).distance_vjp(0)
-    tetrahedron = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
-    with pytest.raises(ValueError, match="derivatives need a surface of triangles"):
-        HeatMethodSolver(tetrahedron).distance_vjp(0)
+        GeodesicSolver(heat_igl.PointCloud(MESHES["sphere"]().V), method="exact").distance_vjp(0)
+
+
+def metric_of(mesh: Mesh, kind: str) -> np.ndarray:
+    """A speed or a metric that changes slowly from face to face."""
+    x, y, _ = mesh.V[mesh.F].mean(axis=1).T
+    if kind == "speed":
+        return np.asarray(1 + 0.1 * np.sin(2 * x + y))
+    # In planes, of which each has axes of its own, the same in all directions.
+    constant = np.eye(2) if kind == "in planes" else np.diag([1.2, 1.0, 0.8]) + 0.1
+    return np.asarray((1 + 0.1 * x**2)[:, None, None] * constant)
+
+
+def solver_in(mesh: Mesh, kind: str, values: np.ndarray) -> GeodesicSolver:
+    if kind == "speed":
+        return GeodesicSolver(heat_igl.speed_operators(mesh, values), method="exact")
+    return GeodesicSolver(heat_igl.metric_operators(mesh, values, laplacian="intrinsic-delaunay"), method="exact")
+
+
+@pytest.mark.parametrize("kind", ["speed", "in space", "in planes"])
+def test_speeds_and_metrics(kind: str) -> None:
+    mesh, rng = MESHES["grid"](), np.random.default_rng(5)
+    values = metric_of(mesh, kind)
+    solver = solver_in(mesh, kind, values)
+    distance, pull_back = solver.distance_vjp(150)
+    g = rng.standard_normal(mesh.n_vertices)
+    g[pull_back.inexact] = 0
+    change = 0.1 * rng.standard_normal(values.shape)
+    if kind != "speed":
+        change += np.swapaxes(change, 1, 2)
+    step = 1e-6
+    ahead, behind = (solver_in(mesh, kind, values + e * change).distance(150) for e in (step, -step))
+    by_values = pull_back.by_speed(g) if kind == "speed" else pull_back.by_metric(g)
+    assert by_values.shape == values.shape
+    assert (by_values * change).sum() == pytest.approx((g * (ahead - behind)).sum() / (2 * step), rel=1e-5)
+    # Twice as fast, half as long; four times the metric, twice as long.
+    of_scale = (by_values * values).sum() * (-1 if kind == "speed" else 2)
+    assert of_scale == pytest.approx((g * distance).sum(), abs=1e-10 * np.abs(g * distance).sum())
+    if kind == "in planes":
+        with pytest.raises(ValueError, match="turns with the planes of the triangles"):
+            pull_back(g)
+        return
+    direction = rng.standard_normal(mesh.V.shape)
+    ahead, behind = (
+        solver_in(mesh.with_vertices(mesh.V + e * direction), kind, values).distance(150) for e in (1e-7, -1e-7)
+    )
+    rate = (g * (ahead - behind)).sum() / 2e-7
+    assert (pull_back(g) * direction).sum() == pytest.approx(rate, rel=1e-4)
+    assert (pull_back.push_forward(direction) * g).sum() == pytest.approx((pull_back(g) * direction).sum(), rel=1e-10)
+
+
+def test_what_has_no_metric_to_change() -> None:
+    mesh = MESHES["grid"]()
+    _, pull_back = GeodesicSolver(mesh).distance_vjp(0)
+    with pytest.raises(ValueError, match=r"no metric to change: make it on speed_operators"):
+        pull_back.by_speed(np.ones(mesh.n_vertices))
+    with pytest.raises(ValueError, match=r"no metric to change: make it on metric_operators"):
+        pull_back.by_metric(np.ones(mesh.n_vertices))
+
+
+def test_faces_that_are_there_twice_count_once() -> None:
+    mesh = MESHES["grid"]()
+    doubled = Mesh(mesh.V, np.concatenate([mesh.F, mesh.F[40:60, [1, 2, 0]], mesh.F[7:9, [1, 0, 2]]]))
+    g, direction = np.random.default_rng(6).standard_normal((2, mesh.n_vertices, 1)) * [1, 0.5, 0.3]
+    _, once = GeodesicSolver(mesh, method="exact").distance_vjp(150)
+    _, twice = GeodesicSolver(doubled, method="exact").distance_vjp(150)
+    np.testing.assert_allclose(twice(g[:, 0]), once(g[:, 0]), atol=1e-9)
+    np.testing.assert_allclose(twice.push_forward(direction), once.push_forward(direction), atol=1e-9)

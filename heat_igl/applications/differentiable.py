@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.geodesic import Solver, SolverChoice
+from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import Mesh
 
 
@@ -18,11 +18,13 @@ def check_positions(shape: tuple[int, ...], is_floating: bool, kind: str) -> Non
         raise ValueError(f"V must have shape (n, 3), but it has shape {tuple(shape)}")
 
 
-def solver_on(V: Any, F: Any, solver: Solver | None, options: dict[str, Any]) -> Solver:
+def solver_on(V: Any, F: Any, solver: GeodesicSolver | None, options: dict[str, Any]) -> GeodesicSolver:
     """A solver on positions V (n, 3) and faces F, made from `solver` by moving its vertices if it is given."""
     positions = np.asarray(V, np.float64)
     if solver is None:
-        return SolverChoice.of(**options).on(Mesh(positions, F))
+        return GeodesicSolver(Mesh(positions, F), **options)
+    if not isinstance(solver, GeodesicSolver):
+        raise TypeError(f"solver must be a GeodesicSolver, which has derivatives, not {type(solver).__name__}")
     if options:
         raise ValueError(f"{', '.join(options)} cannot be changed: the solver that was passed has its options")
     return solver.with_vertices(positions)

@@ -9,7 +9,7 @@ import numpy as np
 
 from heat_igl.applications.differentiable import check_positions, solver_on
 from heat_igl.errors import MissingExtraError
-from heat_igl.geodesic import Solver
+from heat_igl.geodesic import GeodesicSolver
 
 with MissingExtraError.guard("heat_igl.applications.jax", "jax", "jax"):
     import jax
@@ -23,8 +23,7 @@ def geodesic_distance(
     F: Any,
     sources: Any,
     *,
-    method: str | None = None,
-    solver: Solver | None = None,
+    solver: GeodesicSolver | None = None,
     **options: Any,
 ) -> Any:
     """Distance from `sources`, differentiable by `V` in reverse mode, also under ``jax.jit``.
@@ -33,7 +32,7 @@ def geodesic_distance(
     ----------
     V : (n, 3) array of float32 or float64
         Positions of the vertices; may be traced.
-    F, sources, method, solver, options
+    F, sources, solver, options
         As for `heat_igl.applications.torch.geodesic_distance`; not traced.
 
     Returns
@@ -45,21 +44,19 @@ def geodesic_distance(
     Raises
     ------
     TypeError
-        If V does not hold floating-point numbers.
+        If V does not hold floating-point numbers, or `solver` is no GeodesicSolver.
     ValueError
         If V has another shape, and as `GeodesicSolver.distance_vjp`; under ``jit`` JAX wraps errors of the callback.
     """
     positions = jnp.asarray(V)
     check_positions(positions.shape, bool(jnp.issubdtype(positions.dtype, jnp.floating)), str(positions.dtype))
-    if solver is None:
-        options = {"method": method, **options}
     return _Host(F, sources, solver, options).distance()(positions)
 
 
 class _Host:
     """The calls that run outside of JAX."""
 
-    def __init__(self, F: Any, sources: Any, solver: Solver | None, options: dict[str, Any]) -> None:
+    def __init__(self, F: Any, sources: Any, solver: GeodesicSolver | None, options: dict[str, Any]) -> None:
         self._F = None if F is None else np.asarray(F)
         self._sources, self._solver, self._options = sources, solver, options
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.applications.differentiable import check_positions, solver_on
 from heat_igl.errors import MissingExtraError
-from heat_igl.geodesic import Solver
+from heat_igl.geodesic import GeodesicSolver
 
 with MissingExtraError.guard("heat_igl.applications.torch", "torch", "torch"):
     import torch
@@ -22,8 +22,7 @@ def geodesic_distance(
     F: Any,
     sources: Any,
     *,
-    method: str | None = None,
-    solver: Solver | None = None,
+    solver: GeodesicSolver | None = None,
     **options: Any,
 ) -> torch.Tensor:
     """Distance from `sources`, differentiable by `V`.
@@ -36,13 +35,11 @@ def geodesic_distance(
         Triangles.
     sources : sources
         As for `GeodesicSolver.distance`; a tensor of vertices too.
-    method : {"auto", "windows", "exact", "heat"}, optional
-        As for `heat_igl.geodesic_distance`.
-    solver : GeodesicSolver or HeatMethodSolver, optional
-        A solver on the same faces, with its own options: what the faces alone say is not found again. `F` and `method`
-        are not read then.
+    solver : GeodesicSolver, optional
+        A solver on the same faces, with its own options: what the faces alone say is not found again. `F` is not read
+        then.
     **options
-        `tolerance`, and those of `HeatMethodSolver`.
+        `method` and `tolerance` of `GeodesicSolver`.
 
     Returns
     -------
@@ -52,7 +49,7 @@ def geodesic_distance(
     Raises
     ------
     TypeError
-        If V is no tensor of floating-point numbers.
+        If V is no tensor of floating-point numbers, or `solver` is no GeodesicSolver.
     ValueError
         If V is on another device or has another shape, and as `GeodesicSolver.distance_vjp`.
     """
@@ -61,8 +58,6 @@ def geodesic_distance(
     if V.device.type != "cpu":
         raise ValueError(f"V is on the device {V.device}, and distance is found on the processor: pass V.cpu()")
     check_positions(tuple(V.shape), V.is_floating_point(), str(V.dtype))
-    if solver is None:
-        options = {"method": method, **options}
     result: torch.Tensor = _Distance.apply(V, _as_array(F), _as_array(sources), solver, options)
     return result
 
@@ -76,7 +71,7 @@ class _Distance(torch.autograd.Function):
     """Keeps the derivative of the answer between the two passes."""
 
     @staticmethod
-    def forward(ctx: Any, V: Any, F: Any, sources: Any, solver: Solver | None, options: dict[str, Any]) -> Any:
+    def forward(ctx: Any, V: Any, F: Any, sources: Any, solver: GeodesicSolver | None, options: dict[str, Any]) -> Any:
         on_V = solver_on(V.detach().numpy(), F, solver, options)
         distance, ctx.pull_back = on_V.distance_vjp(sources)
         return torch.from_numpy(distance).to(V.dtype)

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import igl
@@ -15,7 +14,6 @@ import scipy.sparse as sp
 
 from heat_igl.heat.assembly import SourceAssembler
 from heat_igl.heat.checking import Checker, Comparisons
-from heat_igl.heat.element_slopes import ElementSlopes
 from heat_igl.heat.integration import Integration
 from heat_igl.heat.options import SolverOptions
 from heat_igl.heat.solution import Diagnostics
@@ -31,7 +29,7 @@ from heat_igl.operators import (
 from heat_igl.plan import RANDOM_SIDES, T_COEF_EVEN_POINTS, T_COEF_RANDOM_POINTS, Plan, heat_plan
 from heat_igl.runtime import in_order, n_threads, pool
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
 
@@ -56,8 +54,6 @@ class SolverParts:
         Steps 2 and 3.
     time_steps : (n_components,) float64
         Time step of each component.
-    step_raised : (n_components,) bool
-        Whether that is more than was asked for, so that the heat crosses the component.
     t_damping : float, (n_components,) float64 or None
         Time step for `damping`; None for a field of length 1.
     fitted : bool
@@ -79,18 +75,12 @@ class SolverParts:
     heat_flow: HeatFlow
     last_steps: Integration
     time_steps: FloatArray
-    step_raised: BoolArray
     t_damping: float | FloatArray | None
     fitted: bool
     checker: Checker
     comparisons: Comparisons | None
     plan: Plan
     diagnostics: Diagnostics
-
-    @cached_property
-    def slopes(self) -> ElementSlopes:
-        """The derivatives of what is made of the triangles."""
-        return ElementSlopes(self.operators, self.time_steps, self.t_damping, self.fitted)
 
     @property
     def is_default(self) -> bool:
@@ -213,7 +203,6 @@ def prepare(
         heat_flow=heat_flow,
         last_steps=last_steps,
         time_steps=np.broadcast_to(step, domain.n_components),
-        step_raised=np.broadcast_to(np.asarray(step) > requested, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
         checker=Checker(domain.source_surface, domain.referenced[: domain.n_given], V),

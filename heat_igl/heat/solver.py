@@ -10,13 +10,10 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning, names_guessed
 from heat_igl.heat.batches import BatchedSolver, LabelledDistance, checked_cutoff, cut_off
 from heat_igl.heat.checking import AnswerCheck
-from heat_igl.heat.derivatives import DistanceDerivative, differentiable_surface
-from heat_igl.heat.heat_derivative import HeatDerivative
 from heat_igl.heat.integration import damped_field
 from heat_igl.heat.options import Magnitude, SolverOptions
 from heat_igl.heat.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
 from heat_igl.heat.several_sources import drop_overtaken, warmest_sources
-from heat_igl.heat.side_lengths import SideLengths
 from heat_igl.heat.solution import Diagnostics, HeatSolution
 from heat_igl.heat.source_terms import SourceTerm, right_hand_side
 from heat_igl.linear import Backend
@@ -384,21 +381,6 @@ class HeatMethodSolver(BatchedSolver):
         labels = self._with_copies(labels)
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
-
-    def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative]:
-        """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
-
-        Arguments and errors as for `distance`; a ValueError also for what is not differentiated, see
-        `differentiable_surface` and `HeatDerivative`. The derivative is that of the three steps; where bounds moved the
-        answer, `DistanceDerivative.inexact` says so.
-        """
-        chosen = self._source_set(sources)
-        surface = differentiable_surface(self.operators.surface, chosen, self._mesh)
-        if self.operators.fans is not None:
-            raise ValueError("derivatives need a surface of triangles, and this is heat on polygons")
-        sides = SideLengths(self._mesh) if isinstance(self._mesh, Mesh) else self.operators.metric
-        distance, answer = self.distance(sources), HeatDerivative(self._parts, chosen)
-        return distance, DistanceDerivative(distance, chosen, surface, sides, answer)
 
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""

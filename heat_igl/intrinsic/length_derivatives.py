@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.intrinsic.history import BACK_CORNERS, Covered, Flipped, Refined, Turned
+from heat_igl.intrinsic.history import Flipped, Turned
 from heat_igl.intrinsic.layout import apex
 from heat_igl.intrinsic.place_derivatives import PlaceSlopes, carry_place, carry_place_back
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.typing import FloatArray
 
-__all__ = ["carry_lengths", "carry_lengths_back", "check_carried"]
+__all__ = ["carry_lengths", "carry_lengths_back"]
 
 
 def carry_lengths_back(
@@ -29,7 +29,7 @@ def carry_lengths_back(
     Parameters
     ----------
     triangulation : IntrinsicTriangulation
-        m triangles.
+        m triangles, whose faces were turned and edges flipped, with no vertex added and no face doubled.
     by_side : (m, 3) float64
         Derivative by the length opposite each corner; an edge of two faces changes both of its sides. Overwritten.
     n_before : int
@@ -45,12 +45,7 @@ def carry_lengths_back(
     by_place : (p, 3) float64 or None
         The derivative by the points' coordinates in the given faces.
 
-    Raises
-    ------
-    ValueError
-        If vertices were added.
     """
-    check_carried(triangulation)
     visited = [] if places is None else places.visited(triangulation)
     slopes = None if places is None else places.slopes.copy()
     for i in range(len(triangulation.history) - 1, -1, -1):
@@ -60,9 +55,6 @@ def carry_lengths_back(
                 _unflip(change, by_side)
             elif isinstance(change, Turned):
                 by_side[change.turned] = by_side[change.turned, ::-1]
-            elif isinstance(change, Covered):
-                m = change.n_faces
-                by_side = by_side[:m] + by_side[m:, BACK_CORNERS]
         if slopes is not None:
             carry_place_back(change, *visited[i], slopes, by_side)
     return by_side, slopes
@@ -101,18 +93,7 @@ def carry_lengths(
             _flip(change, by_side)
         elif isinstance(change, Turned):
             by_side[change.turned] = by_side[change.turned, ::-1]
-        elif isinstance(change, Covered):
-            by_side = np.concatenate([by_side, by_side[:, BACK_CORNERS]])
     return by_side, slopes
-
-
-def check_carried(triangulation: IntrinsicTriangulation) -> None:
-    """Raise a ValueError if vertices were added, whose places change with the lengths."""
-    if any(isinstance(change, Refined) for change in triangulation.history):
-        raise ValueError(
-            "the triangulation that is solved on has more vertices than the mesh, and no derivative is carried through "
-            "them: take laplacian='intrinsic-delaunay', or a GeodesicSolver"
-        )
 
 
 def _slopes(lengths: FloatArray) -> FloatArray:

@@ -3,8 +3,6 @@ from heat_igl.operators.connection import connection_laplacian as connection_lap
 from heat_igl.operators.connection import edge_rotations as edge_rotations
 from heat_igl.operators.connection import face_rotations as face_rotations
 from heat_igl.operators.connection import with_rotations as with_rotations
-from heat_igl.operators.element_derivatives import ElementChange as ElementChange
-from heat_igl.operators.element_derivatives import Elements as Elements
 from heat_igl.operators.elements import EdgeLengths as EdgeLengths
 from heat_igl.operators.elements import TriangleElements as TriangleElements
 from heat_igl.operators.intrinsic import edge_length_operators as edge_length_operators

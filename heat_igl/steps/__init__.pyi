@@ -4,8 +4,6 @@ from heat_igl.steps.diffusion import check_boundary as check_boundary
 from heat_igl.steps.diffusion import diffuse as diffuse
 from heat_igl.steps.diffusion import mass_unit as mass_unit
 from heat_igl.steps.fitted import fitted_laplacian as fitted_laplacian
-from heat_igl.steps.flow_derivative import FlowDerivative as FlowDerivative
-from heat_igl.steps.flow_derivative import MatrixSlopes as MatrixSlopes
 from heat_igl.steps.integration import PoissonProblem as PoissonProblem
 from heat_igl.steps.integration import integrate as integrate
 from heat_igl.steps.normalization import NormalizedDivergence as NormalizedDivergence

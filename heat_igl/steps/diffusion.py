@@ -101,41 +101,13 @@ class HeatFlow:
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Heat u (n,) or (n, k) after the time step, for initial heat `b` in units of `mean_mass`."""
-        solutions = [self.solve_under(boundary, b) for boundary in self.boundaries]
+        solutions = [] if self._neumann is None else [self._neumann.solve(b)]
+        if self._dirichlet is not None:
+            held = (b[self._on_boundary].T / self._boundary_diagonal).T
+            u = self._dirichlet.solve(b - self._from_boundary @ held if held.any() else b)
+            u[self._on_boundary] = held
+            solutions.append(u)
         return solutions[0] if len(solutions) == 1 else (solutions[0] + solutions[1]) / 2
-
-    @property
-    def boundaries(self) -> list[Boundary]:
-        """The conditions at the boundary, one or two, of which the heat is the mean."""
-        return ["neumann", "dirichlet"] if self.boundary == "average" else [self.boundary]
-
-    def solve_under(self, boundary: Boundary, b: FloatArray) -> FloatArray:
-        """The heat under one of the `boundaries`; initial heat and result as for `solve`."""
-        if boundary == "neumann":
-            return self._factor(self._neumann).solve(b)
-        held = (b[self._on_boundary].T / self._boundary_diagonal).T
-        u = self._factor(self._dirichlet).solve(b - self._from_boundary @ held if held.any() else b)
-        u[self._on_boundary] = held
-        return u
-
-    def solve_transposed(self, boundary: Boundary, by_heat: FloatArray) -> FloatArray:
-        """The derivative (n,) by the initial heat, from that by the heat under one of the `boundaries`.
-
-        Under "neumann" the system is symmetric. Under "dirichlet" the heat held at the boundary counts in all of it.
-        """
-        if boundary == "neumann":
-            return np.asarray(self._factor(self._neumann).solve(by_heat))
-        by_initial = np.asarray(self._factor(self._dirichlet).solve(by_heat))
-        by_initial[self._on_boundary] = 0.0
-        held = by_heat[self._on_boundary] - self._from_boundary.T @ by_initial
-        by_initial[self._on_boundary] = held / self._boundary_diagonal
-        return by_initial
-
-    @staticmethod
-    def _factor(factor: Factorization | None) -> Factorization:
-        if factor is None:
-            raise ValueError("the heat was not solved under this condition at the boundary")
-        return factor
 
 
 def mass_unit(operators: Operators, t: float | FloatArray) -> float | FloatArray:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from heat_igl.operators import Operators
 from heat_igl.typing import FloatArray
 
-__all__ = ["fit", "fit_slope", "fitted_laplacian"]
+__all__ = ["fitted_laplacian"]
 
 
 def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
@@ -51,7 +51,7 @@ def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     if edges is None:
         raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
     i, j, length = edges
-    fitted = fit(length / np.sqrt(t[domain.components[i]] if isinstance(t, np.ndarray) else t))
+    fitted = _fit(length / np.sqrt(t[domain.components[i]] if isinstance(t, np.ndarray) else t))
     # Entry 0 takes the pairs that L does not couple.
     entry = sp.csc_matrix((np.arange(1, L.nnz + 1, dtype=L.indices.dtype), L.indices, L.indptr), shape=L.shape)
     factor = np.zeros(L.nnz + 1)
@@ -76,7 +76,7 @@ def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     return sp.csc_matrix((weight, L.indices, L.indptr), shape=L.shape)
 
 
-def fit(x: FloatArray) -> FloatArray:
+def _fit(x: FloatArray) -> FloatArray:
     """(x^2 / 4) / (I0(x) - 1): the factor of a weight whose edge has length x in units of sqrt(t)."""
     # I0 is the sum of y^k / (k!)^2, and 13 terms give it to 1e-12 up to x = 4; beyond, nothing cancels.
     y = np.minimum(x, 4.0) ** 2 / 4
@@ -90,21 +90,3 @@ def fit(x: FloatArray) -> FloatArray:
     beyond = np.minimum(x[far], 600.0)
     fitted[far] = beyond**2 / 4 / (np.i0(beyond) - 1)
     return np.asarray(fitted)
-
-
-def fit_slope(x: FloatArray) -> FloatArray:
-    """The derivative of `fit`."""
-    from scipy.special import i0e, i1e  # not needed for a distance
-
-    # With y = x^2 / 4 the factor is 1 / S(y), S the sum of y^(k - 1) / (k!)^2.
-    y = np.minimum(x, 4.0) ** 2 / 4
-    total, slope = np.zeros_like(x), np.zeros_like(x)
-    for k in range(13, 0, -1):
-        slope = slope * y + total
-        total = total * y + 1 / factorial(k) ** 2
-    result = -slope / total**2 * (x / 2)
-    far = x > 4
-    beyond = np.minimum(x[far], 600.0)
-    less_one = i0e(beyond) - np.exp(-beyond)
-    result[far] = fit(beyond) * (2 / beyond - i1e(beyond) / less_one)
-    return np.asarray(result)

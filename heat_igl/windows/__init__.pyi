@@ -22,7 +22,6 @@ from heat_igl.windows.local import nearest_vertices as nearest_vertices
 from heat_igl.windows.local import pair_distances as pair_distances
 from heat_igl.windows.path_lengths import Change as Change
 from heat_igl.windows.path_lengths import PathLengths as PathLengths
-from heat_igl.windows.path_lengths import SideChange as SideChange
 from heat_igl.windows.traced_paths import ExactPaths as ExactPaths
 from heat_igl.windows.traced_paths import exact_paths as exact_paths
 from heat_igl.windows.within_store import read_distances_within as read_distances_within

@@ -17,11 +17,11 @@ from heat_igl.sources import SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows.exact import ExactSurface, search, starts_at
 
-__all__ = ["Change", "PathLengths", "SideChange"]
+__all__ = ["Change", "PathLengths"]
 
 
 class Change(NamedTuple):
-    """The derivative of a weighted sum of distances.
+    """The derivative of a weighted sum of distances by what paths are found on, or how that changes.
 
     Attributes
     ----------
@@ -29,38 +29,10 @@ class Change(NamedTuple):
         By the length of the side opposite each corner; an edge of two faces changes both of its sides.
     by_place : (p, 3) float64 or None
         By the coordinates of each source point, up to a constant in each row; None without points.
-    by_given : (m', 3) float64 or None
-        By the sides of the faces before any flip, directly.
-    by_t : float
-        By the time step.
-    by_given_place : (p, 3) float64 or None
-        By the coordinates of source points in the faces before any flip, directly.
     """
 
     by_side: FloatArray
     by_place: FloatArray | None = None
-    by_given: FloatArray | None = None
-    by_t: float = 0.0
-    by_given_place: FloatArray | None = None
-
-
-class SideChange(NamedTuple):
-    """How what an answer was found on changes.
-
-    Attributes
-    ----------
-    by_side : (m, 3) float64
-        The sides of the triangulation.
-    by_place : (p, 3) float64 or None
-        The coordinates of source points in it.
-    by_given, by_given_place : (m', 3), (p, 3) float64, or None
-        The same of the faces before any flip.
-    """
-
-    by_side: FloatArray
-    by_place: FloatArray | None = None
-    by_given: FloatArray | None = None
-    by_given_place: FloatArray | None = None
 
 
 class PathLengths:
@@ -124,7 +96,7 @@ class PathLengths:
         known = [at.any(axis=1) for at in same]
         return [(k, places.point[k], at.argmax(axis=1)[k]) for at, k in zip(same, known, strict=True)]
 
-    def push_forward(self, change: SideChange) -> FloatArray:
+    def push_forward(self, change: Change) -> FloatArray:
         """How the distances (n,) change with the sides and the places of points, those of the triangulation alone."""
         moves = np.zeros((len(self._places.faces), 3)) if change.by_place is None else self._at_places(change.by_place)
         return self._summed(change.by_side, moves, np.zeros(self._tables.n + len(moves)))

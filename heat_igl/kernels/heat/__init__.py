@@ -1,1 +1,1 @@
-"""The normalized field of the heat method on faces, its divergence, and the derivatives of both."""
+"""The normalized field of the heat method on faces and its divergence."""

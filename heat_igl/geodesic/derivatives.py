@@ -1,8 +1,7 @@
-"""Derivatives of an answer by the positions of the vertices, by edge lengths, by the sources and by the time step.
+"""Derivatives of exact distance by the positions of the vertices, by edge lengths, by the sources and by a metric.
 
 All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
-lengths lead paths (`heat_igl.windows.path_lengths`) or the steps of the heat method
-(`heat_igl.heat.heat_derivative`), from there to the edges of the mesh the flips
+lengths lead paths (`heat_igl.windows.path_lengths`), from there to the edges of the mesh the flips
 (`heat_igl.intrinsic.length_derivatives`); the positions follow here.
 docs/derivatives.md derives each step.
 """
@@ -15,38 +14,60 @@ from typing import Protocol
 import numpy as np
 
 from heat_igl.errors import MeshError, real_numbers
-from heat_igl.heat.side_lengths import SidesOfMesh
-from heat_igl.intrinsic import IntrinsicTriangulation, Merged
-from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back, check_carried
+from heat_igl.intrinsic import Merged
+from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back
 from heat_igl.intrinsic.place_derivatives import PlaceSlopes
+from heat_igl.kernels.mesh import side_derivatives as kernels
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import MetricSides, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.windows import Change, SideChange
+from heat_igl.windows import Change, PathLengths
 
-__all__ = ["DistanceDerivative", "SidesDerivative", "differentiable_surface"]
+__all__ = ["DistanceDerivative", "SideLengths", "SidesOfMesh", "differentiable_surface"]
 
 # A distance that differs from the length of the path by more than this fraction is not the length of that path.
 # Rounding is below 1e-14; in flat parts other paths are longer by 1e-13 to 1e-9, with derivatives that differ by 1e-3.
 _SAME = 1e-12
 
 
-class SidesDerivative(Protocol):
-    """The derivative of one answer by the lengths of the sides of a triangulation."""
+class SidesOfMesh(Protocol):
+    """The lengths of the sides of a mesh's faces as functions of the positions of the vertices."""
 
     @property
-    def triangulation(self) -> IntrinsicTriangulation:
-        """The triangles that the answer was found on."""
+    def mesh(self) -> Mesh:
+        """The mesh."""
 
-    def pull_back(self, g: FloatArray) -> Change:
-        """The derivative of the sum of distances times g (n,), finite."""
+    def by_positions(self, by_side: FloatArray) -> FloatArray:
+        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
 
-    def push_forward(self, change: SideChange) -> FloatArray:
-        """How the distances (n,) change with the sides and the places of source points."""
+    def push_positions(self, dV: FloatArray) -> FloatArray:
+        """How the lengths (m, 3) change when the vertices move by dV (n, 3)."""
 
-    def lengths(self) -> FloatArray:
-        """The distances (n,) that are differentiated; any number at unreachable vertices."""
+
+class SideLengths:
+    """Distances of the ends of the sides in space.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        m triangles on n vertices.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+
+    def by_positions(self, by_side: FloatArray) -> FloatArray:
+        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
+        by_position = np.zeros((self.mesh.n_vertices, 3))
+        kernels.pull_to_positions(self.mesh.F, self.mesh.V, by_side, by_position)
+        return by_position
+
+    def push_positions(self, dV: FloatArray) -> FloatArray:
+        """How the lengths (m, 3) change when the vertices move by dV (n, 3); not at all for sides without length."""
+        by_side = np.empty(self.mesh.F.shape)
+        kernels.push_to_sides(self.mesh.F, self.mesh.V, np.ascontiguousarray(dV), by_side)
+        return by_side
 
 
 class DistanceDerivative:
@@ -71,13 +92,12 @@ class DistanceDerivative:
         sources: SourceSet,
         surface: Surface,
         sides: SidesOfMesh | None,
-        answer: SidesDerivative,
+        paths: PathLengths,
     ) -> None:
-        self.distance, self._sources, self._sides, self._answer = distance, sources, sides, answer
+        self.distance, self._sources, self._sides, self._paths = distance, sources, sides, paths
         if surface.faces is None:
             raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
         self._faces = surface.faces
-        check_carried(answer.triangulation)
         self.unreachable: IntArray = np.flatnonzero(np.isinf(distance))
 
     def __call__(self, g: ArrayLike) -> FloatArray:
@@ -141,11 +161,6 @@ class DistanceDerivative:
         _, by_place = self._by_sides(row)
         return np.zeros((0, 3)) if by_place is None else np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
-    def by_time_step(self, g: ArrayLike) -> float:
-        """The derivative by the time step t, all else fixed; 0 of a distance that is not heat's."""
-        (row,) = self._rows(g, 1)
-        return self._answer.pull_back(row).by_t
-
     def by_metric(self, g: ArrayLike) -> FloatArray:
         """The gradient by the metric, (m, 3, 3) or (m, 2, 2) as it was given to `metric_operators`; `g` (n,).
 
@@ -192,20 +207,15 @@ class DistanceDerivative:
         sides, places = self._positions(), self._sources.points
         moved = _velocities("dV", dV, sides.mesh.V.shape, "vertex")
         by_side = self._on_faces(sides.push_positions(moved))
-        n_before, triangulation = len(self._faces.history), self._answer.triangulation
-        if not len(places.faces):
-            on_answer, _ = carry_lengths(triangulation, by_side, n_before)
-            change = SideChange(on_answer, None, by_side)
-        else:
+        given = None
+        if len(places.faces):
             by_place = np.zeros((len(places.faces), 3))
             if points is not None:
                 velocity = _velocities("points", points, by_place.shape, "source point")
                 by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
             given = PlaceSlopes(places.faces, places.barycentric, by_place)
-            _, before = carry_lengths(self._faces, by_side, n_before, given)
-            on_answer, after = carry_lengths(triangulation, by_side, n_before, given)
-            change = SideChange(on_answer, after, by_side, before)
-        result = self._answer.push_forward(change)
+        change = carry_lengths(self._paths.triangulation, by_side, len(self._faces.history), given)
+        result = self._paths.push_forward(Change(*change))
         result[self.unreachable] = 0.0
         return result
 
@@ -224,12 +234,11 @@ class DistanceDerivative:
     def inexact(self) -> IntArray:
         """Vertices whose distance is not the length of the path that is differentiated.
 
-        Bounds set some distances by heat, and a tolerance changes those by windows. The derivative is that of the path
-        as it is.
+        A tolerance changes distances. The derivative is that of the path as it is.
         """
         reached = np.flatnonzero(np.isfinite(self.distance))
         distance = self.distance[reached]
-        return np.asarray(reached[np.abs(self._answer.lengths()[reached] - distance) > _SAME * distance])
+        return np.asarray(reached[np.abs(self._paths.lengths()[reached] - distance) > _SAME * distance])
 
     def _positions(self) -> SidesOfMesh:
         if self._sides is None:
@@ -255,19 +264,9 @@ class DistanceDerivative:
 
     def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """The derivative (m, 3) by the sides of the faces before any flip, and (p, 3) by the points in given faces."""
-        change, points = self._answer.pull_back(row), self._sources.points
+        change, points = self._paths.pull_back(row), self._sources.points
         places = None if change.by_place is None else PlaceSlopes(points.faces, points.barycentric, change.by_place)
-        triangulation, n_before = self._answer.triangulation, len(self._faces.history)
-        by_side, by_place = carry_lengths_back(triangulation, change.by_side, n_before, places)
-        if change.by_given is not None:
-            by_side = by_side + change.by_given
-        if change.by_given_place is not None:
-            direct = PlaceSlopes(points.faces, points.barycentric, change.by_given_place)
-            _, by_given_place = carry_lengths_back(self._faces, np.zeros_like(by_side), n_before, direct)
-            if by_place is None or by_given_place is None:
-                return by_side, by_given_place
-            by_place = by_place + by_given_place
-        return by_side, by_place
+        return carry_lengths_back(self._paths.triangulation, change.by_side, len(self._faces.history), places)
 
     @cached_property
     def _merged(self) -> Merged | None:
