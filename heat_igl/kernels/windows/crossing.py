@@ -746,6 +746,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     apex: Apex
     w: cython.pointer(Window)
     is_best: cython.bint
+    prefetch(s.upper + s.vertex[h])
     _fetch(s, s.twin[previous_half_edge(h)])
     _fetch(s, s.twin[next_half_edge(h)])
     s.slot[h] = -1

@@ -89,7 +89,12 @@ def _first(s: cython.pointer(Search)) -> Entry:
     first: Entry = pop(s)
     h: cython.int = s.heap[0].what
     place: cython.int
-    if s.n_heap > 0 and h < s.n_half_edges:
+    if s.n_heap > 0 and h >= s.n_half_edges:
+        h -= s.n_half_edges
+        prefetch(s.upper + h)
+        prefetch(s.emitted + h)
+        prefetch(s.entered + h)
+    elif s.n_heap > 0:
         prefetch(s.length + h)
         prefetch(s.vertex + h)
         prefetch(s.twin + h)
