@@ -56,7 +56,7 @@ BODIES = {
 PLACES: dict[str, Callable[[np.random.Generator], FloatArray]] = {
     "vertex": lambda rng: np.eye(3)[rng.integers(3)],
     "edge": lambda rng: np.append(rng.dirichlet([1, 1]), 0),
-    "edge, near a vertex": lambda rng: np.array([1 - (share := 10 ** rng.uniform(-6, -3)), share, 0]),
+    "edge, near a vertex": lambda rng: np.array([1 - (share := 10 ** rng.uniform(-12, -3)), share, 0]),
     "face": lambda rng: rng.dirichlet([1, 1, 1]),
 }
 

@@ -111,7 +111,10 @@ def test_the_exponential_map_undoes_the_log_map_along_straight_paths(way, bunny)
 
 
 @pytest.mark.parametrize("seed", [25, 1, 2, 3])
-@pytest.mark.parametrize("place", [(0, 3e-4, 0.9997), (0, 0.4, 0.6), (1, 0, 0), (0.2, 0.5, 0.3)])
+@pytest.mark.parametrize(
+    "place",
+    [(0, 3e-4, 0.9997), (0, 0.4, 0.6), (1, 0, 0), (0.2, 0.5, 0.3), (0, 1e-11, 1 - 1e-11), (3e-12, 7e-12, 1 - 1e-11)],
+)
 def test_exp_map_undoes_the_log_map_from_edges_that_were_flipped(seed, place):
     rng = np.random.default_rng(seed)
     P = rng.normal(size=(100, 3))
@@ -132,6 +135,27 @@ def test_log_maps_of_the_plane_from_points_beside_a_vertex(share):
         along = (mesh.V[mesh.F[face, 1]] - mesh.V[mesh.F[face, 0]])[:2]
         turned = offset @ np.stack([along, [-along[1], along[0]]], axis=1) / np.linalg.norm(along)
         np.testing.assert_allclose(log_map(mesh, point), turned, atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [1e-5, 1e-8, 1e-9, 1e-10, 3e-11])
+@pytest.mark.parametrize("rise", [0.6, -0.6])
+def test_log_maps_from_points_beside_the_apex_of_a_cone(share, rise):
+    rng, n = np.random.default_rng(1), 40
+    turn = np.linspace(0, 2 * np.pi, n, endpoint=False) + rng.uniform(0, 0.1, n)
+    # All on one side of the apex, or on both by turns: angles that sum to less than 2 pi, and to more.
+    height = rng.uniform(0.3, 1, n) * rise * (1 if rise > 0 else (-1.0) ** np.arange(n))
+    rim = np.stack([np.cos(turn), np.sin(turn), height], axis=1)
+    k = np.arange(n)
+    mesh = Mesh(np.concatenate([np.zeros((1, 3)), rim]), np.stack([0 * k, 1 + k, 1 + (k + 1) % n], axis=1))
+    length = np.linalg.norm(rim, axis=1)
+    angle = np.arccos(np.einsum("nx,nx->n", rim, np.roll(rim, -1, axis=0)) / (length * np.roll(length, -1)))
+    before, whole = np.cumsum(angle) - angle, angle.sum()
+    # The point lies on the edge to the first vertex of the rim, around which the cone is laid out.
+    before = np.where(before > whole / 2, before - whole, before)
+    expected = length * np.exp(1j * before) - share * length[0]
+    expected[np.abs(before) > np.pi] = -(length + share * length[0])[np.abs(before) > np.pi]
+    log = log_map(mesh, SurfacePoints([0], [[1 - share, share, 0]]))[1:]
+    np.testing.assert_allclose(log @ [1, 1j], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(

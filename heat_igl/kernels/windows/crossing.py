@@ -10,6 +10,7 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, take
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
+    BESIDE,
     LEFT_OF_APEX,
     NARROW,
     NEAR,
@@ -18,6 +19,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     ROUNDING,
     SAME,
     SLIVER,
+    TURNED,
     U_NEARER,
     U_THEN_W,
     UNDECIDED,
@@ -349,7 +351,13 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
 @cython.nogil
 @cython.exceptval(check=False)
 def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double) -> cython.bint:
-    """Whether w continues u: two halves that passed a flat vertex."""
+    """Whether w continues u: two halves that passed a flat vertex.
+
+    Halves that passed a vertex beside the root, one on either side, may have the same root to rounding while they left
+    it in directions that differ by the curvature of the vertex: then their half-edge is turned against the corner.
+    """
+    if u.corner == w.corner and fabs(u.turn_x - w.turn_x) + fabs(u.turn_y - w.turn_y) > TURNED:
+        return False
     return (
         fabs(u.x - w.x) <= SAME * (fabs(w.x) + w.depth)
         and u.root == w.root
@@ -517,6 +525,17 @@ def _arrive(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _straight(w: cython.pointer(Window), apex: cython.pointer(Apex)) -> cython.double:
+    """Distance of the apex by the straight line of a window."""
+    x: cython.double = apex.x - w.x
+    y: cython.double = apex.y + w.depth
+    return w.offset + (w.x * apex.x + w.depth * apex.y if w.is_plane else sqrt(x * x + y * y))
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _reach_apex(
@@ -559,17 +578,20 @@ def _reach_apex(
             b = w.start
         else:
             w.side = AROUND_APEX
-            distance = w.offset
-            distance += w.x * apex.x + w.depth * apex.y if w.is_plane else sqrt(x * x + m * m)
+            distance = _straight(w, apex)
             if distance < apex.nearest:
                 apex.nearest = distance
                 apex.best = i
             continue
-        # The apex is just beside the window: the path over the end of the window is hardly longer, and comes from the
-        # same direction as a straight one.
-        at = backward(w, apex.x, apex.y)
-        at = 0.0 if at < 0.0 else apex.length if at > apex.length else at
-        _arrive(s, h, w, apex, bent(w, b, apex.x, apex.y), at)
+        # The apex is just beside the window: the path over the end of the window comes from the same direction as a
+        # straight one, unless it is longer. With the root nearby, where directions may differ nevertheless, it gives
+        # way to a straight one that is as long to rounding.
+        distance = bent(w, b, apex.x, apex.y)
+        if distance <= _straight(w, apex) * (1.0 + ROUNDING):
+            at = min(max(backward(w, apex.x, apex.y), 0.0), apex.length)
+            if reach(w, b) < BESIDE * apex.length:
+                distance *= 1.0 + ROUNDING
+            _arrive(s, h, w, apex, distance, at)
     if apex.best >= 0:
         w = windows + apex.best
         apex.best_at = backward(w, apex.x, apex.y)
