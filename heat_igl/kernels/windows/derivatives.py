@@ -12,7 +12,6 @@ the order of distance.
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.mesh.segments import Segments
 from cython.cimports.heat_igl.kernels.windows.paths import AT_SOURCE, LOST, PathTracer
 from cython.cimports.heat_igl.kernels.windows.structures import apart
 
@@ -75,6 +74,37 @@ def _follow(tracer: PathTracer, v: cython.int) -> cython.int:
     return tracer.root[v] if end == AT_SOURCE else -1 if end == LOST else end
 
 
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _along(
+    tracer: PathTracer,
+    weight: cython.double,
+    slope: cython.p_double,
+    tangent: cython.pointer[cython.const[cython.double]],
+    at_end: cython.p_double,
+    end_moves: cython.pointer[cython.const[cython.double]],
+) -> cython.double:
+    """All pieces of the line that was followed; as `_piece`, with the arrays of all sides."""
+    total: cython.double = 0.0
+    j: cython.longlong
+    for j in range(tracer.segments.n):
+        f: cython.int = 3 * tracer.segments.face[j]
+        is_last: cython.bint = j == tracer.segments.n - 1
+        place: cython.p_double = cython.address(tracer.segments.place[j, 0, 0])
+        total += _piece(
+            cython.address(tracer.length[f]),
+            place,
+            place + 3,
+            weight,
+            cython.NULL if slope == cython.NULL else slope + f,
+            cython.NULL if tangent == cython.NULL else tangent + f,
+            at_end if is_last else cython.NULL,
+            end_moves if is_last else cython.NULL,
+        )
+    return total
+
+
 def pull_back(
     tables,
     found,
@@ -98,27 +128,19 @@ def pull_back(
     by_side, by_place : (3 m,), (e, 3)
         Take the derivatives.
     """
-    segments: Segments = Segments()
-    tracer: PathTracer = PathTracer(tables, found, starts, segments)
+    tracer: PathTracer = PathTracer(tables, found, starts)
     n: cython.int = order.shape[0]
     i: cython.Py_ssize_t
-    j: cython.longlong
     with cython.nogil:
         for i in range(n - 1, -1, -1):
             v: cython.int = cython.cast(cython.int, order[i])
             row: cython.int = _follow(tracer, v) if weight[v] != 0.0 else -1
             if row < 0:
                 continue
-            for j in range(segments.n):
-                at_end: cython.p_double = cython.NULL
-                if row >= n and j == segments.n - 1:
-                    at_end = cython.address(by_place[row - n, 0])
-                f: cython.int = 3 * segments.face[j]
-                place: cython.p_double = cython.address(segments.place[j, 0, 0])
-                _piece(
-                    cython.address(tracer.length[f]), place, place + 3, weight[v],
-                    cython.address(by_side[f]), cython.NULL, at_end, cython.NULL,
-                )  # fmt: skip
+            at_end: cython.p_double = cython.NULL
+            if row >= n:
+                at_end = cython.address(by_place[row - n, 0])
+            _along(tracer, weight[v], cython.address(by_side[0]), cython.NULL, at_end, cython.NULL)
             weight[row] += weight[v]
 
 
@@ -136,25 +158,17 @@ def push_forward(
     The coordinates of source points change by `moves` (e, 3). On entry, `change` holds the changes of the offsets of
     sources. Other arguments as for `pull_back`.
     """
-    segments: Segments = Segments()
-    tracer: PathTracer = PathTracer(tables, found, starts, segments)
+    tracer: PathTracer = PathTracer(tables, found, starts)
     n: cython.int = order.shape[0]
     i: cython.Py_ssize_t
-    j: cython.longlong
     with cython.nogil:
         for i in range(n):
             v: cython.int = cython.cast(cython.int, order[i])
             row: cython.int = _follow(tracer, v)
             if row < 0:
                 continue
+            end_moves: cython.pointer[cython.const[cython.double]] = cython.NULL
+            if row >= n:
+                end_moves = cython.address(moves[row - n, 0])
             change[v] = change[row]
-            for j in range(segments.n):
-                end_moves: cython.pointer[cython.const[cython.double]] = cython.NULL
-                if row >= n and j == segments.n - 1:
-                    end_moves = cython.address(moves[row - n, 0])
-                f: cython.int = 3 * segments.face[j]
-                place: cython.p_double = cython.address(segments.place[j, 0, 0])
-                change[v] += _piece(
-                    cython.address(tracer.length[f]), place, place + 3, 1.0,
-                    cython.NULL, cython.address(tangent[f]), cython.NULL, end_moves,
-                )  # fmt: skip
+            change[v] += _along(tracer, 1.0, cython.NULL, cython.address(tangent[0]), cython.NULL, end_moves)

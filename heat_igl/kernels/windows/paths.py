@@ -74,8 +74,8 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
     face, place : (r,) int64, (r, 2, 3) float64
         The segments, path after path: face, and barycentric coordinates of both ends.
     """
-    segments: Segments = Segments()
-    tracer: PathTracer = PathTracer(tables, found, sources, segments)
+    tracer: PathTracer = PathTracer(tables, found, sources)
+    segments: Segments = tracer.segments
     vertex: cython.const[cython.int][::1] = begin.vertex
     from_face: cython.const[cython.int][::1] = begin.face
     from_place: cython.const[cython.double][:, ::1] = begin.barycentric
@@ -113,12 +113,12 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
 class PathTracer:
     """Follows paths back to the sources of a search; `segments` takes what they cross."""
 
-    def __init__(self, tables, found, sources, segments: Segments):
+    def __init__(self, tables, found, sources):
         self.vertex, self.twin, self.ring, self.aligned, self.length = tables.edges
         self.double_area = tables.double_area
         self.distance, self.root = found.distance, found.root
         self.entered, self.crossing = found.entered, found.crossing
-        self.sources, self.segments = InnerSources(tables.n, sources), segments
+        self.sources, self.segments = InnerSources(tables.n, sources), Segments()
 
     def along_bends(self, v: cython.int) -> cython.int:
         """From vertex v to a source; AT_SOURCE or LOST."""

@@ -183,25 +183,14 @@ def _take_targets(s: cython.pointer(Search), targets) -> cython.void:
 @cython.nogil
 @cython.exceptval(check=False)
 def _write_within(
-    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
+    s: cython.pointer(Search),
+    name: cython.p_longlong,
+    to: cython.p_int,
+    value: cython.p_double,
+    way: cython.p_int,
+    line: cython.p_double,
 ) -> cython.int:
-    """Store the vertices within the cutoff and their distances; returns their number."""
-    i: cython.int
-    n: cython.int = 0
-    for i in range(s.n_touched):
-        v: cython.int = s.touched[i]
-        if s.distance[v] <= s.cutoff:
-            to[n] = name[v]
-            value[n] = s.distance[v]
-            n += 1
-    return n
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _write_ways(s: cython.pointer(Search), way: cython.p_int, line: cython.p_double) -> cython.void:
-    """Store how the paths to the vertices within the cutoff come there, in the order of `_write_within`.
+    """Store the vertices within the cutoff and their distances, and unless `way` is NULL, the paths; their number.
 
     Of each path the root, the corner out of which it leaves that and the half-edge by which it enters its last face;
     and the direction out of the corner and the crossing of the half-edge.
@@ -211,13 +200,17 @@ def _write_ways(s: cython.pointer(Search), way: cython.p_int, line: cython.p_dou
     for i in range(s.n_touched):
         v: cython.int = s.touched[i]
         if s.distance[v] <= s.cutoff:
-            way[3 * n] = s.root[v]
-            way[3 * n + 1] = s.corner[v]
-            way[3 * n + 2] = s.entered[v]
-            line[3 * n] = s.leaving[2 * v]
-            line[3 * n + 1] = s.leaving[2 * v + 1]
-            line[3 * n + 2] = s.crossing[v]
+            to[n] = name[v]
+            value[n] = s.distance[v]
+            if way != cython.NULL:
+                way[3 * n] = s.root[v]
+                way[3 * n + 1] = s.corner[v]
+                way[3 * n + 2] = s.entered[v]
+                line[3 * n] = s.leaving[2 * v]
+                line[3 * n + 1] = s.leaving[2 * v + 1]
+                line[3 * n + 2] = s.crossing[v]
             n += 1
+    return n
 
 
 @cython.cfunc
@@ -287,7 +280,7 @@ def search_each(
         Takes the end of the results of each source. With goals each result is one value, and `found` is not used.
     way, line : (r, 3)
         If not empty, on a front that finds in which direction paths leave: take how the path to each vertex within the
-        cutoff runs, see `_write_ways`, by the numbers of the tables.
+        cutoff runs, see `_write_within`, by the numbers of the tables.
     """
     s: cython.pointer(Search) = cython.address(front.state)
     i: cython.int
@@ -322,14 +315,16 @@ def search_each(
             else:
                 if at + (n_nearest if n_nearest > 0 else s.n_touched) > room:
                     break
+                to: cython.p_int = cython.address(found[0]) + at
+                distance: cython.p_double = cython.address(value[0]) + at
                 if n_nearest > 0:
                     if s.n_touched >= n_nearest:
                         narrow(s)
-                    at += _write_nearest(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
+                    at += _write_nearest(s, names, to, distance)
+                elif way.shape[0] > 0:
+                    at += _write_within(s, names, to, distance, cython.address(way[at, 0]), cython.address(line[at, 0]))
                 else:
-                    if way.shape[0] > 0:
-                        _write_ways(s, cython.address(way[at, 0]), cython.address(line[at, 0]))
-                    at += _write_within(s, names, cython.address(found[0]) + at, cython.address(value[0]) + at)
+                    at += _write_within(s, names, to, distance, cython.NULL, cython.NULL)
             end[i] = at
             n_done += 1
             forget(s)
