@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import scipy.spatial
@@ -116,6 +118,16 @@ def dual_of_sphere(subdivisions: int) -> PolygonMesh:
     """Hexagons and twelve pentagons, their vertices on the unit sphere."""
     mesh = dual(shapes.icosphere(subdivisions))
     return PolygonMesh(mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), mesh.polygons)
+
+
+def to_polyline(P: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Distance of points from a polyline in their plane."""
+    nearest = np.full(len(P), np.inf)
+    for start, end in pairwise(corners):
+        along = end - start
+        share = np.clip((P - start) @ along / max(along @ along, 1e-300), 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(P - start - share[:, None] * along, axis=1))
+    return nearest
 
 
 # Places in a face, for points as sources and targets.

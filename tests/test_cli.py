@@ -440,6 +440,8 @@ def test_files_without_curves(tmp_path: Path, text: str, match: str) -> None:
         (["signed", "sphere.ply", "--curves=sphere.ply"], "holds no curve"),
         (["signed", "sphere.ply", "--curves=far.obj"], "far.obj, polyline 1: the polyline leaves the surface by"),
         (["cut", "sphere.ply", "--curves=circle.obj", "--output=cut.png"], "--output cut.png: meshes go to"),
+        (["isolines", "sphere.ply", "--source=5", "--spacing=0.5", "--output=a.png"], "curves go to"),
+        (["isolines", "sphere.ply", "--source=5", "--spacing=1e-9", "--output=a.obj"], "over 10000"),
     ],
 )
 def test_failures_are_one_line(

@@ -118,19 +118,6 @@ def test_paths_bend_at_the_boundary(surface):
     np.testing.assert_array_equal(found.origin.root[strictly], corner)
 
 
-@pytest.mark.parametrize("surface", SURFACES)
-def test_paths_go_on_into_every_page_of_a_book(surface):
-    mesh = shapes.book(4, 6)
-    distance, along = np.hypot(*mesh.V[:, :2].T), mesh.V[:, 2]
-    page = np.rint(np.arctan2(*mesh.V[:, 1::-1].T) / (2 * np.pi / 4)) % 4
-    for source in (0, mesh.n_vertices // 2, mesh.n_vertices - 1):
-        same = (page == page[source]) | (distance < 1e-12) | (distance[source] < 1e-12)
-        across = np.where(same, distance - distance[source], distance + distance[source])
-        truth = np.hypot(across, along - along[source])
-        d = SURFACES[surface](mesh).solve(np.array([source])).distance
-        np.testing.assert_allclose(d, truth, rtol=1e-12, atol=1e-14)
-
-
 def test_paths_go_through_a_vertex_where_two_fans_meet():
     tie = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
     np.testing.assert_allclose(exact_distance(tie.V, tie.F, 2), [2**0.5, 1, 0, 1 + 2**0.5, 2 * 2**0.5], rtol=1e-15)
@@ -178,13 +165,6 @@ def test_coarse_rough_meshes_against_pygeodesic(make, surface):
             continue  # pygeodesic loses digits at needles
         d = SURFACES[surface](mesh).solve(np.array([3])).distance
         assert relative_error(d, pygeodesic_distance(mesh, 3)).max() < 1e-10, seed
-
-
-def test_moebius_strip_against_pygeodesic():
-    mesh = moebius_strip(30, 4)
-    d = [SURFACES[name](mesh).solve(np.array([7])).distance for name in SURFACES]
-    for one in d:
-        assert relative_error(one, pygeodesic_distance(mesh, 7)).max() < 1e-12
 
 
 def test_scale_of_a_small_component():
@@ -343,9 +323,9 @@ def test_random_coarse_meshes():
     """The script compares thousands; some kinds have a difference, and each has a cause."""
     pytest.importorskip("pygeodesic")
     script = load_script("random_exact")
-    found = [script.compared(seed) for seed in range(100)]
+    found = [script.compared(seed) for seed in range(18)]
     assert sum(bool(one.refused) for one in found) < 5
-    assert sum(one.n_values for one in found) > 10_000
+    assert sum(one.n_values for one in found) > 2000
     causes = sum((one.causes for one in found), Counter())
     assert causes["unexplained"] == 0
     assert 0 < sum(causes.values()) < 50
@@ -365,20 +345,6 @@ def test_compiled_flips_are_those_of_the_triangulation():
     assert flipped.n_flips > 100
     np.testing.assert_allclose(np.sort(edges.length), np.sort(flipped.l.ravel()), rtol=1e-12)
     np.testing.assert_array_equal(edges.length[edges.twin[edges.twin >= 0]], edges.length[edges.twin >= 0])
-
-
-def test_the_order_of_vertices_and_faces_does_not_matter():
-    """Tables of a mesh in a local order keep it; one in a random order is numbered breadth-first."""
-    mesh, rng = bumpy(), np.random.default_rng(4)
-    new = rng.permutation(mesh.n_vertices)
-    V = np.empty_like(mesh.V)
-    V[new] = mesh.V
-    shuffled = Mesh(V, new[mesh.F[rng.permutation(mesh.n_faces)]])
-    number = from_mesh(mesh, 7).number
-    np.testing.assert_array_equal(number, np.arange(mesh.n_vertices))
-    assert (from_mesh(shuffled, 7).number != number).any()
-    distance = exact_distance(shuffled.V, shuffled.F, int(new[7]))
-    np.testing.assert_allclose(distance[new], exact_distance(mesh.V, mesh.F, 7), rtol=1e-14)
 
 
 @pytest.mark.parametrize(

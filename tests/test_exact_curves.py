@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from conftest import flat_perturbed
-from surfaces import cube
+from surfaces import cube, to_polyline
 from test_exact import delaunay
-from test_exact_paths import MESHES
-from test_paths import assert_on_surface, lengths
+from test_paths import MESHES, assert_on_surface, lengths
 
 from heat_igl import (
     GeodesicSolver,
@@ -27,18 +24,7 @@ from heat_igl import (
 from heat_igl.geodesic import SolverChoice
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.sources import source_set
-from heat_igl.typing import FloatArray
 from heat_igl.windows import ExactSurface
-
-
-def to_polyline(P: FloatArray, corners: FloatArray) -> FloatArray:
-    """Distance of points from a polyline in their plane."""
-    nearest = np.full(len(P), np.inf)
-    for start, end in pairwise(corners):
-        along = end - start
-        share = np.clip((P - start) @ along / max(along @ along, 1e-300), 0, 1)
-        nearest = np.minimum(nearest, np.linalg.norm(P - start - share[:, None] * along, axis=1))
-    return nearest
 
 
 @pytest.mark.parametrize("mesh", [shapes.grid(12), flat_perturbed(shapes.grid(40))], ids=["grid", "perturbed"])

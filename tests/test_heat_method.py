@@ -22,20 +22,6 @@ def angle(mesh: Mesh, source: int) -> np.ndarray:
     return np.arccos(np.clip(directions @ directions[source], -1, 1))
 
 
-def test_distance_on_the_sphere(sphere, solver):
-    distance = solver.distance(7)
-    assert distance.shape == (sphere.n_vertices,)
-    assert distance[7] == 0
-    assert (distance >= 0).all()
-    assert np.abs(distance - angle(sphere, 7)).mean() < 0.01 * np.pi
-
-
-def test_forms_of_one_source(sphere, solver):
-    mask = np.zeros(sphere.n_vertices, bool)
-    mask[[3, 90]] = True
-    assert (solver.distance(mask) == solver.distance([90, 3, 3])).all()
-
-
 def test_several_sources_are_the_nearest_of_each(sphere, solver):
     sources = [3, 4, 5, 6, 7, 800]
     together = solver.distance(sources)
@@ -60,24 +46,6 @@ def test_a_region_as_source(magnitude):
     assert (distance[region] == 0).all()
     exact = np.linalg.norm(mesh.V[:, None, :2] - mesh.V[region][None, :, :2], axis=2).min(axis=1)
     assert np.abs(distance - exact).mean() < 0.02 * exact.max()
-
-
-def test_a_curve_as_source():
-    """Distance from one side of a rectangle is the coordinate across."""
-    mesh = shapes.grid(40)
-    distance = HeatMethodSolver(mesh).distance(mesh.V[:, 0] == 0)
-    np.testing.assert_allclose(distance, mesh.V[:, 0], rtol=0, atol=0.01)
-
-
-def test_unreferenced_vertices_are_unreachable(sphere):
-    mesh = Mesh(np.vstack([[[7, 7, 7]], sphere.V, [[8, 8, 8]]]), sphere.F + 1)
-    solver = HeatMethodSolver(mesh)
-    distance = solver.distance(8)
-    assert np.flatnonzero(np.isinf(distance)).tolist() == [0, mesh.n_vertices - 1]
-    np.testing.assert_allclose(distance[1:-1], HeatMethodSolver(sphere).distance(7), rtol=0, atol=1e-10)
-    alone = solver.distance(0)
-    assert alone[0] == 0
-    assert np.isinf(alone[1:]).all()
 
 
 def test_solution_holds_the_three_steps(sphere):
@@ -258,20 +226,6 @@ def test_options_put_together_before_are_those_of_the_keywords():
     np.testing.assert_array_equal(
         HeatMethodSolver.from_options(mesh, options).distance(5), HeatMethodSolver(mesh, **chosen).distance(5)
     )
-
-
-@pytest.mark.parametrize(
-    ("options", "surface", "volume"),
-    [
-        (SolverOptions(), True, False),
-        (SolverOptions(laplacian="cotan"), False, False),
-        (SolverOptions(magnitude="unit"), False, False),
-        (SolverOptions(laplacian="cotan", magnitude="damped"), True, True),
-    ],
-)
-def test_which_fields_are_damped(options, surface, volume):
-    assert options.damps(operators(shapes.grid(2))) is surface
-    assert options.damps(operators(shapes.box(1))) is volume
 
 
 # --- Large and elongated meshes, where heat in double precision runs out of range unless something is done about it

@@ -151,18 +151,6 @@ def test_tetrahedra_fit_together_and_fill_the_voxels():
     np.testing.assert_allclose(centre, np.argwhere(mask)[:, ::-1] * [0.5, 2.0, 3.0])
 
 
-def test_distance_around_a_wall():
-    """A wall with one opening: the way bends at its rim."""
-    mask = np.ones((1, 21, 21), bool)
-    mask[0, 4:, 10] = False
-    domain = image_domain(mask)
-    found = domain.image(GeodesicSolver(domain.mesh).distance(domain.index[0, 20, 0]))
-    # Around the corners (3.5, 9.5) and (3.5, 10.5) of the wall.
-    exact = np.hypot(16.5, 9.5) + 1 + np.hypot(16.5, 9.5)
-    assert found[0, 20, 20] == pytest.approx(exact, rel=1e-9)
-    assert np.isinf(found[0, 10, 10])
-
-
 def test_speeds_of_voxels():
     mask = np.ones((3, 3, 12), bool)
     domain = image_domain(mask)

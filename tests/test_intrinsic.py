@@ -1063,22 +1063,11 @@ def test_unused_vertices_have_the_axes_of_space():
     np.testing.assert_array_equal([frames.x[4], frames.y[4], frames.normal[4]], np.eye(3))
 
 
-def moebius(n: int = 8) -> Mesh:
-    angle = 2 * np.pi * np.arange(n) / n
-    half = np.stack([np.cos(angle / 2) * np.cos(angle), np.cos(angle / 2) * np.sin(angle), np.sin(angle / 2)], axis=1)
-    middle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    V = np.concatenate([middle - 0.3 * half, middle + 0.3 * half])
-    k = np.arange(n - 1)
-    F = np.concatenate([np.stack([k, k + 1, n + k], 1), np.stack([k + 1, n + k + 1, n + k], 1)])
-    last = [[n - 1, n, 2 * n - 1], [n, 0, 2 * n - 1]]
-    return Mesh(V, np.concatenate([F, last]))
-
-
 def test_surfaces_without_tangent_planes_are_named():
     with pytest.raises(heat_igl.MeshError, match="is one of more than two faces"):
         tangent_frames(shapes.book(3, 2))
     with pytest.raises(heat_igl.MeshError, match="has faces that are oriented differently"):
-        tangent_frames(moebius())
+        tangent_frames(moebius_strip(8, 1))
     with pytest.raises(heat_igl.MeshError, match="tetrahedral"):
         tangent_frames(shapes.box(1))
     Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 1], [0, -1, 1]], [[0, 1, 2], [0, 3, 4]])

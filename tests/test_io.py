@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import wheel_path
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -276,24 +277,6 @@ def test_ply_types_orders_and_further_elements(tmp_path: Path, order: str, kind:
     assert attributes["value"].dtype == np.dtype(PLY_TYPES[kind])
 
 
-# --- MESH -------------------------------------------------------------------------------------------------------------
-
-
-# --- MSH --------------------------------------------------------------------------------------------------------------
-
-
-def msh(version: str, number: str) -> str:
-    """Two triangles, with this number for the first vertex."""
-    if version == "2.2":
-        nodes = f"4\n{number} 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n"
-        elements = f"2\n1 2 0 {number} 2 3\n2 2 0 {number} 2 4\n"
-    else:
-        nodes = f"1 4 1 4\n2 1 0 4\n{number}\n2\n3\n4\n{VERTICES}"
-        elements = f"1 2 1 2\n2 1 2 2\n1 {number} 2 3\n2 {number} 2 4\n"
-    form = f"$MeshFormat\n{version} 0 8\n$EndMeshFormat\n"
-    return f"{form}$Nodes\n{nodes}$EndNodes\n$Elements\n{elements}$EndElements\n"
-
-
 # --- VTU and meshio ---------------------------------------------------------------------------------------------------
 
 
@@ -455,18 +438,10 @@ REAL = {
 }
 
 
-def real(name: str) -> Path:
-    spec = importlib.util.find_spec("pymeshlab")
-    path = Path(spec.origin).parent / "tests" / "sample_meshes" / name if spec and spec.origin else Path("absent")
-    if not path.exists():
-        pytest.skip("needs the meshes of the pymeshlab wheel")
-    return path
-
-
 @pytest.mark.filterwarnings("ignore:.*no face uses")
 @pytest.mark.parametrize("name", REAL)
 def test_real_meshes_are_read_whole_and_written_back(tmp_path: Path, name: str) -> None:
-    mesh = read_mesh(real(name))
+    mesh = read_mesh(wheel_path(name))
     assert (mesh.n_vertices, mesh.n_faces) == REAL[name]
     for extension in (".off", ".obj", ".ply"):
         write_mesh(tmp_path / f"a{extension}", mesh)
@@ -474,11 +449,11 @@ def test_real_meshes_are_read_whole_and_written_back(tmp_path: Path, name: str) 
 
 
 def test_real_attributes() -> None:
-    bone = read_attributes(real("bone.ply"))
+    bone = read_attributes(wheel_path("bone.ply"))
     assert {name: values.dtype.str for name, values in bone.items()} == {
         "flags": "<i4", "red": "|u1", "green": "|u1", "blue": "|u1", "alpha": "|u1",
     }  # fmt: skip
     assert (bone["red"] == 255).all()
-    airplane = read_attributes(real("colored_airplane.ply"))["quality"]
+    airplane = read_attributes(wheel_path("colored_airplane.ply"))["quality"]
     assert airplane.dtype == np.float64
     assert airplane.max() == pytest.approx(1.543193660475573, rel=1e-15)

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -311,29 +307,3 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         write_curves(tmp_path / "nowhere" / "lines.obj", mesh, groups)
     assert target.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["lines.obj"]
-
-
-def test_the_command_line_writes_the_same_lines(tmp_path):
-    pytest.importorskip("typer")
-    mesh = shapes.icosphere(3)
-    heat_igl.write_mesh(tmp_path / "sphere.off", mesh)
-    command = [sys.executable, "-m", "heat_igl", "isolines", "sphere.off", "--source", "5", "--spacing"]
-    environment = {**os.environ, "PYTHONPATH": str(Path(heat_igl.__file__).parents[1])}
-    run = {"cwd": tmp_path, "env": environment, "capture_output": True, "text": True, "check": False}
-    done = subprocess.run([*command, "0.5", "--output", "lines.obj"], **run)
-    assert (done.returncode, done.stderr) == (0, "")
-    phi = heat_igl.geodesic_distance(mesh, 5)
-    levels = np.arange(0.5, phi.max(), 0.5)
-    assert re.search(rf"lines +{len(levels)} at {len(levels)} distances", done.stdout)
-    curves = dict(zip([f"{level:g}" for level in levels], isolines(mesh, phi, levels), strict=True))
-    write_curves(tmp_path / "expected.obj", mesh, curves)
-    assert (tmp_path / "lines.obj").read_text() == (tmp_path / "expected.obj").read_text()
-    for wrong, message in (
-        (["0.5", "--output", "a.png"], "curves go to"),
-        (["1e-9", "--output", "a.obj"], "over 10000"),
-    ):
-        done = subprocess.run([*command, *wrong], **run)
-        assert done.returncode == 1
-        assert done.stderr.count("\n") == 1
-        assert message in done.stderr
-    assert not (tmp_path / "a.obj").exists()

@@ -10,8 +10,6 @@ import pytest
 from conftest import perturbed
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 import heat_igl
 from heat_igl import (
@@ -89,19 +87,6 @@ def test_mesh_keeps_a_copy_that_nobody_can_write_to() -> None:
             array[0] = 0
     with pytest.raises(AttributeError, match="cannot assign to field 'V'"):
         mesh.V = V  # type: ignore[misc]
-
-
-def test_error_counts_the_offenders() -> None:
-    V = np.where(np.arange(12).reshape(4, 3) % 7 == 5, np.nan, 1.0)
-    with pytest.raises(MeshError, match=r"V\[1, 2\] is nan \(1 of 4 vertices are not finite\)"):
-        Mesh(V, TETRAHEDRON_F)
-    with pytest.raises(
-        MeshError, match=r"F\[1, 2\] = 3 is no vertex \(3 of 4 faces are affected\): there are 3 vertices"
-    ):
-        Mesh(TETRAHEDRON_V[:3], TETRAHEDRON_F)
-    with pytest.raises(MeshError, match=r"F\[0, 2\] = 4 is no vertex .* look 1-based, subtract 1"):
-        Mesh(TETRAHEDRON_V, [[1, 2, 4], [1, 2, 3]])
-    assert Mesh(TETRAHEDRON_V, np.array([[1, 2, 4], [1, 2, 3]]) - 1).n_faces == 2
 
 
 @pytest.mark.parametrize("mesh", [sheet(2, 3), two_tetrahedra()], ids=["surface", "solid"])
@@ -370,21 +355,6 @@ def test_without_duplicate_faces_keeps_the_first_of_each():
     assert kept.tolist() == [0, 1]
     assert reduced.F.tolist() == [[0, 1, 2], [2, 1, 3]]
     assert reduced.without_duplicate_faces()[0] is reduced
-
-
-def test_edges_and_components_of_random_triangles():
-    rng = np.random.default_rng(3)
-    for _ in range(100):
-        n = int(rng.integers(3, 40))
-        F = np.array([rng.choice(n, 3, replace=False) for _ in range(rng.integers(1, 30))])
-        sides = np.sort(F[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-        vertices, of_face, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
-        found = connectivity.facets(F, n)
-        assert found.vertices.tolist() == vertices.tolist()
-        assert found.of_face.ravel().tolist() == of_face.ravel().tolist()
-        assert found.n_faces.tolist() == counts.tolist()
-        graph = sp.coo_array((np.ones(len(sides)), tuple(sides.T)), shape=(n, n))
-        assert connectivity.connected_components(F, n).tolist() == connected_components(graph)[1].tolist()
 
 
 # --- Arrays (m, 4): quadrilaterals are refused where tetrahedra are expected, and no tetrahedra are

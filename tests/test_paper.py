@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spl
@@ -177,28 +173,3 @@ def test_a_power_law_is_recovered_and_noise_is_measured() -> None:
 
 
 # The scripts.
-
-
-def test_figures_from_one_command(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
-    paper_figures.main(["--quick", "--data", "--out", str(tmp_path)])
-    tables = {}
-    for name in ("1_heat", "1_distance", "2", "3", "4", "5", "5_jump"):
-        assert (tmp_path / f"paper_{name}.png").read_bytes().startswith(b"\x89PNG")
-        with (tmp_path / f"paper_{name}.csv").open(encoding="utf8") as file:
-            tables[name] = list(csv.DictReader(file))
-    fourth = np.array([[float(row["distance"]), float(row["truth"])] for row in tables["4"]])
-    assert np.abs(fourth[:, 0] - fourth[:, 1]).max() < 0.08
-    heat = np.array([float(row["heat"]) for row in tables["5"]])
-    assert (np.diff(heat) < 0).all()
-
-
-def test_claims_from_one_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    paper_claims.main(["--quick", "--output", str(tmp_path)])
-    (result,) = tmp_path.glob("*.json")
-    tables = json.loads(result.read_text(encoding="utf8"))
-    text = capsys.readouterr().out
-    assert all(f"## {title}" in text for title in tables if title[0].isupper())
-    suspects = {row["suspect"]: row["upward from"] for row in tables["The jump at i = 56"]}
-    assert suspects["double precision"] == "-"
-    assert suspects["single precision"] == "54"

@@ -1,17 +1,13 @@
-"""Shortest paths: as long as exact distances, on the faces, and from anywhere to a source."""
+"""Shortest paths: as long as exact distances, on the faces, between all kinds of places and sources."""
 
 from __future__ import annotations
 
-import os
-import re
-import subprocess
-import sys
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, perturbed, wheel_path
+from conftest import flat_perturbed, perturbed, wheel_path, zoo
+from surfaces import moebius_strip, rough_field, rough_star, two_arms
 
 import heat_igl
 from heat_igl import (
@@ -26,6 +22,9 @@ from heat_igl import (
     shapes,
     shortest_paths,
 )
+from heat_igl.intrinsic import intrinsic_triangulation
+from heat_igl.typing import FloatArray
+from heat_igl.windows import ExactSurface
 
 
 def lengths(mesh, paths):
@@ -86,58 +85,6 @@ def test_lengths_agree_with_exact(name):
     assert max(np.abs(turns(mesh, path)).max(initial=0) for path in paths) < 1e-5
 
 
-def test_paths_on_a_plane_are_straight_lines():
-    mesh = flat_perturbed(shapes.disk(12))
-    distance = np.linalg.norm(mesh.V - mesh.V[7], axis=1)
-    paths = shortest_paths(mesh, np.arange(mesh.n_vertices), 7)
-    np.testing.assert_allclose(lengths(mesh, paths), distance, rtol=1e-12)
-
-
-@pytest.mark.parametrize("place", ["inside", "on a side", "at a corner"])
-def test_points_in_faces_at_both_ends(place):
-    mesh = flat_perturbed(shapes.disk(8))
-    rng = np.random.default_rng(1)
-    weights = rng.dirichlet([1, 1, 1], 60)
-    weights[0::3, 1] = 0
-    weights[1::6, :2] = 0
-    targets = SurfacePoints(rng.integers(mesh.n_faces, size=60), weights / weights.sum(axis=1, keepdims=True))
-    for seed in range(5):
-        weight = {"inside": [0.2, 0.5, 0.3], "on a side": [0.6, 0, 0.4], "at a corner": [0, 1, 0]}[place]
-        source = SurfacePoints([17 * seed], [weight])
-        at = source.positions(mesh)[0]
-        paths = shortest_paths(mesh, targets, source)
-        expected = np.linalg.norm(targets.positions(mesh) - at, axis=1)
-        np.testing.assert_allclose(lengths(mesh, paths), expected, atol=1e-12)
-        first, last = ends(mesh, paths)
-        np.testing.assert_allclose(first, targets.positions(mesh), atol=1e-12)
-        np.testing.assert_allclose(last, np.broadcast_to(at, last.shape), atol=1e-12)
-
-
-def test_of_two_points_in_faces_the_nearer_is_reached():
-    mesh = flat_perturbed(shapes.grid(10))
-    sources = SurfacePoints([20, 150], [[0.3, 0.3, 0.4], [0.3, 0.3, 0.4]])
-    apart = np.linalg.norm(mesh.V[:, None] - sources.positions(mesh), axis=2)
-    paths = shortest_paths(mesh, np.arange(mesh.n_vertices), sources)
-    found = lengths(mesh, paths)
-    away = np.abs(apart[:, 0] - apart[:, 1]) > 0.1
-    np.testing.assert_allclose(found[away], apart.min(axis=1)[away], rtol=1e-12)
-    last = ends(mesh, paths)[1]
-    assert (np.linalg.norm(last[:, None] - sources.positions(mesh), axis=2).min(axis=1) < 1e-12).all()
-
-
-@pytest.mark.parametrize(("offset", "n_reached"), [(0.1, 2), (0.4, 1)])
-def test_an_offset_decides_which_source_is_reached(offset, n_reached):
-    mesh = flat_perturbed(shapes.grid(10))
-    points = SurfacePoints([90, 93], [[0.3, 0.3, 0.4], [0.3, 0.3, 0.4]])
-    begins = np.array([0.0, offset])  # 0.3 apart: with 0.4, the second is nowhere the nearest
-    distance = np.linalg.norm(mesh.V[:, None] - points.positions(mesh), axis=2) + begins
-    targets = np.flatnonzero(np.abs(distance[:, 0] - distance[:, 1]) > 0.05)
-    paths = shortest_paths(mesh, targets, OffsetSources(points, begins))
-    reached = points.positions(mesh)[distance[targets].argmin(axis=1)]
-    assert len(np.unique(reached[:, 0])) == n_reached
-    np.testing.assert_allclose(ends(mesh, paths)[1], reached, atol=1e-12)
-
-
 def test_a_path_to_a_curve_ends_on_it():
     mesh = flat_perturbed(shapes.grid(16))
     x = mesh.V[:, 0]
@@ -146,26 +93,6 @@ def test_a_path_to_a_curve_ends_on_it():
     paths = shortest_paths(mesh, targets, curve)
     np.testing.assert_allclose(ends(mesh, paths)[1][:, 0], 0.43, rtol=1e-12)
     np.testing.assert_allclose(lengths(mesh, paths), np.abs(x - 0.43)[targets], rtol=1e-12)
-
-
-def test_paths_along_edges_and_through_vertices():
-    mesh = shapes.grid(6)
-    distance = np.hypot(mesh.V[:, 0], mesh.V[:, 1])
-    corners = [6, 42, 48]  # at the end of two sides of the square, and of its diagonal
-    assert set(np.round(distance[corners], 12)) <= {1.0, np.round(np.sqrt(2), 12)}
-    paths = shortest_paths(mesh, corners, 0)
-    np.testing.assert_allclose(lengths(mesh, paths), distance[corners], rtol=1e-14)
-
-
-def test_around_a_reentrant_corner():
-    square = shapes.grid(8)
-    centre = square.V[square.F].mean(axis=1)
-    L = Mesh(square.V, square.F[(centre[:, 0] < 0.5) | (centre[:, 1] < 0.5)])
-    source, target = (int(np.argmin(np.linalg.norm(L.V - p, axis=1))) for p in ([1, 0.25, 0], [0.25, 1, 0]))
-    expected = 2 * np.hypot(0.5, 0.25)
-    (path,) = shortest_paths(L, target, source)
-    assert path.lengths(L).sum() == pytest.approx(expected, rel=1e-12)
-    assert np.abs(path.positions(L) - [0.5, 0.5, 0]).sum(axis=1).min() < 1e-12
 
 
 def test_faces_need_not_agree_about_the_outside():
@@ -181,25 +108,6 @@ def over_a_line(start, end):
     r, s = np.hypot(start[..., 0], start[..., 1]), np.hypot(end[..., 0], end[..., 1])
     z = np.clip(start[..., 2] + (end[..., 2] - start[..., 2]) * r / (r + s), 0, 1)
     return np.hypot(r, start[..., 2] - z) + np.hypot(s, end[..., 2] - z)
-
-
-def test_pages_unfold_two_by_two():
-    # Any two are a flat convex domain.
-    regular = shapes.book(5, 6)
-    rng = np.random.default_rng(0)
-    r = np.hypot(*regular.V[:, :2].T)
-    inner = ~regular.boundary
-    page = np.where(r > 0, np.round(np.arctan2(regular.V[:, 1], regular.V[:, 0]) / (0.4 * np.pi)) % 5, -1)
-    V = regular.V * np.where(inner, rng.uniform(0.98, 1.02, len(r)), 1)[:, None] ** [1, 1, 0]
-    V[inner, 2] += rng.uniform(-0.05, 0.05, inner.sum())
-    book = Mesh(V, regular.F)
-    r, z = np.hypot(*V[:, :2].T), V[:, 2]
-    for source in (3, 10, 20, 100, 200):
-        paths = shortest_paths(book, np.arange(len(V)), source)
-        same = (page == page[source]) | (page < 0) | (page[source] < 0)
-        expected = np.where(same, np.hypot(r - r[source], z - z[source]), np.hypot(r + r[source], z - z[source]))
-        np.testing.assert_allclose(lengths(book, paths), expected, rtol=1e-12, atol=1e-15)
-        assert max(np.abs(turns(book, path)).max(initial=0) for path in paths) < 1e-6
 
 
 def test_a_fan_of_triangles_on_one_edge():
@@ -249,14 +157,6 @@ def test_vertices_in_one_place_are_passed():
     np.testing.assert_array_equal(ends(collapsed, paths)[1], 0)
 
 
-def test_the_path_of_a_source_has_length_zero():
-    mesh = shapes.icosphere(2)
-    paths = shortest_paths(mesh, [40, 3, 40], [3, 40])
-    assert [len(path) for path in paths] == [1, 1, 1]
-    np.testing.assert_array_equal(lengths(mesh, paths), 0)
-    np.testing.assert_array_equal(ends(mesh, paths)[0], mesh.V[[40, 3, 40]])
-
-
 def two_spheres():
     one = shapes.icosphere(1)
     return Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
@@ -302,21 +202,94 @@ def test_paths_lead_through_vertices_in_one_place_and_needles(seed):
     np.testing.assert_allclose(lengths(broken, paths), distance, rtol=1e-5, atol=1e-9)
 
 
-def test_the_command_line_writes_a_path(tmp_path):
-    pytest.importorskip("typer")
-    mesh = shapes.grid(6)
-    heat_igl.write_mesh(tmp_path / "square.off", mesh)
-    command = [sys.executable, "-m", "heat_igl", "path", "square.off"]
-    environment = {**os.environ, "PYTHONPATH": str(Path(heat_igl.__file__).parents[1])}
-    run = {"cwd": tmp_path, "env": environment, "capture_output": True, "text": True, "check": False}
-    done = subprocess.run([*command, "--from", "0", "--to", "40", "--output", "path.obj"], **run)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert re.search(f"length +{np.linalg.norm(mesh.V[40] - mesh.V[0]):.6g}", done.stdout)
-    lines = (tmp_path / "path.obj").read_text().splitlines()
-    V = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
-    np.testing.assert_allclose(V[[0, -1]], mesh.V[[0, 40]])
-    done = subprocess.run([*command, "--from", "0", "--to", "49", "--output", "other.obj"], **run)
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert "49" in done.stderr
-    assert not (tmp_path / "other.obj").exists()
+# --- All kinds of surfaces, places and sources
+
+
+def terrain(n: int) -> Mesh:
+    """A square of heights that are random from vertex to vertex, most of them steep."""
+    mesh = shapes.grid(n)
+    heights = np.random.default_rng(2).normal(size=mesh.n_vertices) * 4 / n
+    return Mesh(np.column_stack([mesh.V[:, :2], heights]), mesh.F)
+
+
+MESHES = {
+    "terrain": lambda: terrain(25),
+    "rough sphere": lambda: perturbed(shapes.icosphere(4), 0.8, 1),
+    "rough grid": lambda: perturbed(shapes.grid(30), 0.8, 2),
+    "flat grid": lambda: shapes.grid(20),
+    "torus": lambda: shapes.torus(30, 20),
+    "two arms": lambda: two_arms(8),
+    "moebius": lambda: moebius_strip(30, 4),
+    "book": lambda: shapes.book(4, 6),
+    **{f"star {seed}": lambda seed=seed: rough_star(seed) for seed in range(4)},
+    **{f"field {seed}": lambda seed=seed: rough_field(seed) for seed in range(4)},
+}
+
+
+def places(mesh: Mesh, k: int) -> SurfacePoints:
+    """Points inside faces, on sides and at corners."""
+    rng = np.random.default_rng(4)
+    weights = rng.dirichlet([1, 1, 1], 3 * k)
+    weights[:k, 1] = 0
+    weights[k : k + k // 2, :2] = 0
+    return SurfacePoints(rng.integers(mesh.n_faces, size=3 * k), weights / weights.sum(axis=1, keepdims=True))
+
+
+def assert_exact(mesh: Mesh, targets, sources, distance: FloatArray) -> None:
+    paths = shortest_paths(mesh, targets, sources)
+    np.testing.assert_allclose(lengths(mesh, paths), distance, rtol=1e-12, atol=1e-14)
+    assert_on_surface(mesh, paths)
+    for path in paths:
+        assert min(path.start.min(), path.end.min()) >= 0
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_paths_are_as_long_as_the_exact_distance(name):
+    mesh = MESHES[name]()
+    surface = ExactSurface(intrinsic_triangulation(mesh))
+    used = np.unique(mesh.F)
+    targets = places(mesh, 40)
+    for source in np.random.default_rng(0).choice(used, 2, replace=False):
+        found = surface.solve(np.array([source]), targets=targets)
+        assert_exact(mesh, used, int(source), found.distance[used])
+        assert_exact(mesh, targets, int(source), found.target_distance)
+
+
+@pytest.mark.parametrize("name", ["rough sphere", "two arms", "book", "star 1"])
+def test_paths_to_many_sources_end_at_the_nearest(name):
+    mesh = MESHES[name]()
+    used = np.unique(mesh.F)
+    vertices, points = (
+        used[[3, len(used) // 2]],
+        SurfacePoints([0, mesh.n_faces // 3], [[0.2, 0.5, 0.3], [0.5, 0, 0.5]]),
+    )
+    begins, targets = np.array([0.0, 0.05, 0.1, 0.02]), places(mesh, 20)
+    surface = ExactSurface(intrinsic_triangulation(mesh))
+    found = surface.solve(vertices, begins[:2], points, begins[2:], targets=targets)
+    positions = np.concatenate([mesh.V[vertices], points.positions(mesh)])
+    sources = [OffsetSources(vertices.tolist(), begins[:2]), OffsetSources(points, begins[2:])]
+    for to, distance, label in (
+        (used, found.distance[used], found.origin.label[used]),
+        (targets, found.target_distance, found.target_origin.label),
+    ):
+        paths = shortest_paths(mesh, to, sources)
+        np.testing.assert_allclose(lengths(mesh, paths), distance - begins[label], rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(ends(mesh, paths)[1], positions[label], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["voxel blob", "book", "slotted plate", "dust"])
+def test_edges_of_many_faces_flat_parts_and_pieces(name):
+    mesh = zoo(name)
+    source = int(mesh.F[0, 0])
+    distance = ExactSurface(intrinsic_triangulation(mesh)).solve(np.array([source])).distance
+    targets = np.flatnonzero(np.isfinite(distance))[::5]
+    assert_exact(mesh, targets, source, distance[targets])
+
+
+def test_a_path_from_a_source_stays_there():
+    mesh = flat_perturbed(shapes.grid(6))
+    inside = SurfacePoints([20], [[0.2, 0.5, 0.3]])
+    for source in (7, inside):
+        (path,) = shortest_paths(mesh, source, source)
+        assert len(path) == 1
+        assert path.lengths(mesh)[0] == 0

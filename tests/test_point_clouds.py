@@ -26,13 +26,12 @@ from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.local_fits import tangent_planes
 from heat_igl.mesh.cloud_orientation import oriented
 from heat_igl.mesh.cloud_triangles import (
-    cloud_triangles,
     pinched_vertices,
     with_fans_joined,
     with_loops_filled,
     with_one_fan,
 )
-from heat_igl.mesh.neighbourhoods import neighbourhoods, one_sheet, point_tree, without_noise
+from heat_igl.mesh.neighbourhoods import one_sheet, point_tree, without_noise
 
 HEAT = {"magnitude": "damped"}
 
@@ -405,12 +404,6 @@ def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined() ->
     assert (np.abs(P[doubtful, 0] - 0.5) < 0.12).all()
 
 
-def test_sheets_further_apart_than_the_spacing_need_no_normals() -> None:
-    P, _ = two_sheets(2000, 0.2)
-    cloud = PointCloud(P)
-    assert not np.isin(cloud.components[2000:], cloud.components[:2000]).any()
-
-
 # The solver's other questions need no special case.
 
 
@@ -587,19 +580,6 @@ def test_the_command_line_takes_clouds(tmp_path, kind: str, capsys) -> None:
         assert "--points" in capsys.readouterr().err
 
 
-def test_the_command_line_takes_clouds_with_copies(tmp_path) -> None:
-    pytest.importorskip("typer")
-    pytest.importorskip("matplotlib")
-    P = sphere(300)
-    path, out, picture = tmp_path / "scan.npy", tmp_path / "out.npy", tmp_path / "out.png"
-    np.save(path, np.concatenate([P, P[::2]]))
-    assert cli.run(["distance", str(path), "--source=3", f"--output={out}", f"--picture={picture}"]) == 0
-    found = np.load(out)
-    np.testing.assert_array_equal(found[300:], found[:300:2])
-    np.testing.assert_allclose(found[:300], heat_igl.geodesic_distance(PointCloud(P), 3), atol=1e-5)
-    assert picture.stat().st_size > 1000
-
-
 def test_a_file_with_faces_is_a_mesh(tmp_path, capsys) -> None:
     pytest.importorskip("typer")
     for name in ("mesh.ply", "mesh.obj"):
@@ -635,24 +615,6 @@ def test_discs_lie_in_the_tangent_planes_and_continue_the_values() -> None:
 
 
 # The kernel.
-
-
-def test_a_star_is_the_delaunay_star() -> None:
-    """In a plane no triangle of a star holds another point in its circle."""
-    tree = point_tree(plane(400))
-    P = tree.P
-    F = cloud_triangles(P, neighbourhoods(tree), np.zeros(len(P), bool))
-    a, b, c = (P[F[:, i], :2] for i in range(3))
-    # Circumcentre relative to a.
-    u, v = b - a, c - a
-    d = 2 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-    uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
-    centre = a + np.stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu], axis=1) / d[:, None]
-    radius = np.linalg.norm(centre - a, axis=1)
-    distance = np.linalg.norm(centre[:, None] - P[None, :, :2], axis=2)
-    inner = (np.abs(P[F][:, :, :2] - 0.5) < 0.35).all(axis=(1, 2))
-    assert inner.sum() > 100
-    assert (distance[inner] > radius[inner, None] * (1 - 1e-9)).all()
 
 
 @pytest.mark.parametrize("side", [1, -1])

@@ -152,16 +152,6 @@ def test_exact_takes_small_examples_of_the_same() -> None:
     np.testing.assert_allclose(reference.exact(bow(), 1), np.sqrt(2) * np.array([1, 0, np.sqrt(2), 2, 2]), rtol=1e-14)
 
 
-@pytest.mark.parametrize("name", ["voxel blob", "pinched", "crossed sheets"])
-def test_exact_on_meshes_that_are_not_manifold_is_below_paths_through_edge_points(name: str) -> None:
-    mesh = zoo(name)
-    source = source_on_largest_component(mesh, 0)
-    exact, above = reference.exact(mesh, source), graph_distance(mesh, source, 8)[0]
-    assert np.array_equal(np.isfinite(exact), mesh.components == mesh.components[source])
-    assert (above >= exact * (1 - 1e-7)).all()
-    assert relative(above, exact).mean() < 0.01
-
-
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_exact_accepts_a_good_component_of_a_bad_mesh(solver: str) -> None:
     good = rectangle(5, 5, 1, 1)

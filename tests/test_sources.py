@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import pickle
 import re
 
@@ -10,6 +9,7 @@ import igl
 import numpy as np
 import pytest
 from conftest import perturbed
+from surfaces import to_polyline
 
 from heat_igl import (
     GeodesicSolver,
@@ -54,30 +54,6 @@ def test_accepted_forms(sources, expected):
     found = vertex_sources(sources, 5)
     assert found.dtype == np.int64
     assert found.tolist() == expected
-
-
-@pytest.mark.parametrize(
-    ("sources", "message"),
-    [
-        (5, r"sources\[0\] = 5 is no vertex: the mesh has 5 vertices.* from 0 to 4"),
-        ([0, -1, 9], r"sources\[1\] = -1 is no vertex \(2 of 3"),
-        ([], "sources is empty"),
-        (np.zeros(5, bool), "selects no vertex"),
-        (np.ones(4, bool), "4 entries, but the mesh has 5"),
-        (1.0, "floats such as 1.0"),
-        ([0, np.nan], "floats"),
-        ("0", "sources must be a vertex index"),
-        (None, "sources must be a vertex index"),
-        ([[0, 1]], r"shape \(1, 2\)"),
-        ([[0], [1, 2]], "ragged"),
-        ({0}, "sources must be a vertex index"),
-    ],
-)
-def test_sources_that_name_no_vertices_are_refused(sources, message):
-    with pytest.raises(SourceError, match=message):
-        vertex_sources(sources, 5)
-    with pytest.raises(SourceError, match=message):
-        source_set(sources, 5, F)
 
 
 F = np.array([[0, 1, 2], [2, 1, 3], [3, 4, 2]])
@@ -199,15 +175,6 @@ def sheared_grid() -> Mesh:
     V[:, 0] += 1.7 * V[:, 1]
     turned = np.random.default_rng(0).random(mesh.n_faces) < 0.5
     return Mesh(V, np.where(turned[:, None], mesh.F[:, ::-1], mesh.F))
-
-
-def to_polyline(V: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    distance = np.full(len(V), np.inf)
-    for a, b in itertools.pairwise(corners):
-        along = b - a
-        share = np.clip((V - a) @ along / (along @ along), 0, 1)
-        distance = np.minimum(distance, np.linalg.norm(V - a - share[:, None] * along, axis=1))
-    return distance
 
 
 @pytest.mark.parametrize("barycentric", [(0.2, 0.5, 0.3), (0.3, 0.0, 0.7), (1e-9, 0.4, 0.6 - 1e-9)])
@@ -367,30 +334,6 @@ def test_a_circle_around_the_sphere(method):
     assert np.log2(errors[0] / errors[2]) > (0.9 if method != "exact" else 3)
 
 
-def test_a_ring_and_a_generator_of_the_cylinder(method):
-    for along in (True, False):
-        errors = []
-        for around in (24, 48, 96):
-            mesh = shapes.cylinder(around, around)
-            angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
-            low, high = mesh.V[:, 2].min(), mesh.V[:, 2].max()
-            if along:
-                step = 2.5 * 2 * np.pi / around
-                across = mesh.V[np.abs((angle - step + np.pi) % (2 * np.pi) - np.pi) < 0.6 * 2 * np.pi / around]
-                middle = across[:, :2][across[:, 2] == low].mean(axis=0)
-                curve = curve_on(mesh, [[*middle, low], [*middle, high]])
-                truth = np.abs((angle - step + np.pi) % (2 * np.pi) - np.pi)
-            else:
-                height = 0.43 * low + 0.57 * high
-                ring = mesh.V[mesh.V[:, 2] == low] * [1, 1, 0] + [0, 0, height]
-                curve = curve_on(mesh, ring[np.argsort(np.arctan2(ring[:, 1], ring[:, 0]))], closed=True)
-                truth = np.abs(mesh.V[:, 2] - height)
-            distance = SolverChoice(method).on(mesh).distance(curve)
-            errors.append(np.abs(distance - truth).mean())
-        assert errors[2] < (0.003 if method != "heat" else 0.03)
-        assert max(errors) < 1e-12 or np.log2(errors[0] / errors[2]) > 0.9
-
-
 @pytest.mark.parametrize("n_edges", [4, 16, 24])
 def test_refined_distance_from_a_curve_of_any_length(n_edges):
     """In the plane: straight fronts beside the curve, round ones beyond its ends, and neither grows into the other."""
@@ -535,17 +478,6 @@ def test_the_dirac_of_a_curve_is_its_length():
     centre = lengths @ (corners[1:] + corners[:-1]) / 2 / lengths.sum()
     assert initial.sum() == pytest.approx(lengths.sum() / (4 * solver.diagnostics.mean_edge_length), rel=1e-9)
     np.testing.assert_allclose(initial @ mesh.V / initial.sum(), centre, atol=1e-9)
-
-
-def test_points_on_faces_that_are_there_twice(method):
-    mesh = plane(10)
-    twice = Mesh(mesh.V, np.concatenate([mesh.F, mesh.F[[50, 60]][:, [1, 0, 2]]]))
-    solver = SolverChoice(method).on(twice)
-    copy = SurfacePoints([len(mesh.F) + 1], [[0.2, 0.5, 0.3]])
-    original = SurfacePoints([60], [[0.5, 0.2, 0.3]])
-    expected = SolverChoice(method).on(mesh).distance(original)
-    np.testing.assert_allclose(solver.distance(copy)[mesh.F[60]], expected[mesh.F[60]], rtol=1e-12)
-    np.testing.assert_allclose(solver.distance(copy), expected, rtol=1e-9)
 
 
 def test_points_on_pages_of_a_book(method):

@@ -75,13 +75,14 @@ def test_vector_heat_solves_the_complex_system(name):
     np.testing.assert_allclose(flow.solve(b[:, 0]), Y[:, 0], rtol=1e-9, atol=1e-12 * abs(Y).max())
 
 
+@pytest.mark.parametrize(("method", "off"), [("heat", 1e-10), ("windows", 1e-8)])
 @pytest.mark.parametrize("mesh", [shapes.strip(1500, 3), flat_perturbed(shapes.grid(15))])
-def test_transport_in_the_plane_changes_nothing(mesh):
-    solver = VectorHeatSolver(mesh)
+def test_transport_in_the_plane_changes_nothing(mesh, method, off):
+    solver = VectorHeatSolver(mesh, method=method)
     frames = solver.frames
     source = mesh.n_vertices // 3
     transported = frames.to_world(solver.transport(source, frames.from_world([[0.6, -0.8, 0]], [source])))
-    np.testing.assert_allclose(transported, np.broadcast_to([0.6, -0.8, 0], transported.shape), atol=1e-10)
+    np.testing.assert_allclose(transported, np.broadcast_to([0.6, -0.8, 0], transported.shape), atol=off)
 
 
 def test_transport_on_a_cylinder_keeps_its_axis():
@@ -255,14 +256,6 @@ def test_transport_around_the_corner_of_a_box_turns_by_a_right_angle():
     np.testing.assert_allclose(
         [abs(around), abs(np.angle(around)), abs(np.angle(beside))], [1, np.pi / 2, 0], atol=1e-9
     )
-
-
-@pytest.mark.parametrize("mesh", [shapes.strip(1500, 3), flat_perturbed(shapes.grid(15))])
-def test_transport_along_paths_in_the_plane_changes_nothing(mesh):
-    solver = VectorHeatSolver(mesh, method="windows")
-    frames, source = solver.frames, mesh.n_vertices // 3
-    transported = frames.to_world(solver.transport(source, frames.from_world([[0.6, -0.8, 0]], [source])))
-    np.testing.assert_allclose(transported, np.broadcast_to([0.6, -0.8, 0], transported.shape), atol=1e-8)
 
 
 def test_transport_along_paths_converges_on_the_sphere():

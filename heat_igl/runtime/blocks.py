@@ -83,11 +83,13 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: i
         while True:
             while failure is None and len(pending) < n_threads:
                 try:
-                    pending.append(workers.submit(work, next(iterator)))
+                    item = next(iterator)
                 except StopIteration:
                     break
                 except Exception as error:
                     failure = error
+                else:  # what a handler of signals raises here ends all at once
+                    pending.append(workers.submit(work, item))
             if not pending:
                 break
             yield pending.popleft().result()
