@@ -5,6 +5,7 @@
     python scripts/metrics_table.py walls [octopus.mesh ...]   # bodies with concave walls, or these files
     python scripts/metrics_table.py layers [--border 24]       # layers of metrics
     python scripts/metrics_table.py faces [--edge 20]          # a metric per face
+    python scripts/metrics_table.py grids [--rows 48]          # pixels and voxels, beside fast marching
 
 metrics and bodies: the mean of |d - exact| / exact over vertices and ``--sources`` in percent, "-" where a method does
 not apply; "heat" is the paper's method. For bodies also how much too long the worst value is, by how much it is below
@@ -15,7 +16,10 @@ paths bend; the mean of |d - finer| / finer, and by how much d is longer and sho
 below the straight line; milliseconds for a query, and their ratio to those of heat.
 layers and faces: Delaunay triangles of random points in the unit square, rotated; sources in the first layer. The
 reference is the shortest way through points on the borders, ``--border`` for each edge, or on all edges. Mean and
-largest of |d - reference| / reference, and those of the reference with half as many points. docs/metrics.md has the
+largest of |d - reference| / reference, and those of the reference with half as many points.
+grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels as rows, at their centres, from one of
+them. Beside the default: scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal if it is
+installed. Mean and largest error in percent, and seconds of one query with its preparation. docs/metrics.md has the
 tables.
 """
 
@@ -39,6 +43,7 @@ from heat_igl import (
     Mesh,
     fibre_metric,
     geodesic_distance,
+    image_domain,
     metric_operators,
     shapes,
     speed_operators,
@@ -404,6 +409,90 @@ def on_faces(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         yield {"case": name} | summary(samples(make))
 
 
+# Grids, beside fast marching.
+
+
+def grids(rows: int) -> Iterator[tuple[str, BoolArray, FloatArray, Callable[[FloatArray, int], FloatArray]]]:
+    """Names, masks, speeds at the centres, and exact distances from a centre, in the unit square and cube."""
+    for shape in ((4 * rows,) * 2, (rows // 2,) * 3):
+        *_, y, x = places = centres(shape)
+        name, full, even = "pixels" if len(shape) == 2 else "voxels", np.ones(shape, bool), np.ones(shape)
+        yield f"{name}, one speed", full, even, straight
+        yield f"{name}, without a quarter", (x < 0.5) | (y < 0.5), even, around_the_edge
+        yield f"{name}, speed growing linearly, 1 : 20", full, 1 + 19 * places[0], hyperbolic
+
+
+def centres(shape: tuple[int, ...]) -> list[FloatArray]:
+    return list(np.meshgrid(*((np.arange(k) + 0.5) / k for k in shape), indexing="ij"))
+
+
+def hyperbolic(V: FloatArray, source: int) -> FloatArray:
+    """Travel time (n,) at a speed that grows from 1 to 20 along the last axis but x and y, if there is one."""
+    speed = 1 + 19 * V[:, 2 if np.ptp(V[:, 2]) > 0 else 1]
+    apart = ((V - V[source]) ** 2).sum(axis=1)
+    return np.asarray(np.arccosh(1 + 19**2 * apart / (2 * speed * speed[source])) / 19)
+
+
+def on_simplices(mask: BoolArray, speed: FloatArray, source: tuple[int, ...]) -> FloatArray:
+    domain = image_domain(mask, [1 / k for k in mask.shape])
+    made: Mesh | Operators = domain.mesh
+    if np.ptp(speed) > 0:
+        height = domain.mesh.V[:, mask.ndim - 1] - domain.mesh.V[domain.index.flat[0], mask.ndim - 1]
+        at_vertices = speed.flat[0] + 19 * height
+        made = metric_operators(domain.mesh, np.eye(3) / np.maximum(at_vertices, 1)[:, None, None] ** 2)
+    return np.asarray(domain.image(GeodesicSolver(made).distance(int(domain.index[source]))))
+
+
+def by_fmm(mask: BoolArray, speed: FloatArray, source: tuple[int, ...]) -> FloatArray:
+    import skfmm
+
+    dx, place = 1 / mask.shape[0], centres(mask.shape)
+    away = np.sqrt(sum((x - x[source]) ** 2 for x in place))
+    # The exact circle of two and a half pixels: from the source alone, errors are larger.
+    radius = 2.5 * dx
+    found = skfmm.travel_time(np.ma.MaskedArray(away - radius, ~mask), speed, dx) + radius / speed[source]
+    return np.where(away < radius, away / speed[source], np.where(mask, np.asarray(found), np.inf))
+
+
+def by_pykonal(mask: BoolArray, speed: FloatArray, source: tuple[int, ...]) -> FloatArray:
+    import pykonal
+
+    solver = pykonal.EikonalSolver(coord_sys="cartesian")
+    shape = mask.shape + (1,) * (3 - mask.ndim)
+    solver.velocity.min_coords, solver.velocity.npts = (0, 0, 0), shape
+    solver.velocity.node_intervals = (1 / mask.shape[0],) * 3
+    solver.velocity.values = np.where(mask, speed, 0).reshape(shape)
+    node = (*source, 0)[:3]
+    solver.traveltime.values[node] = 0
+    solver.unknown[node] = False
+    solver.trial.push(*node)
+    solver.solve()
+    return np.asarray(solver.traveltime.values).reshape(mask.shape)
+
+
+GRIDS = {"default": on_simplices, "fmm": by_fmm, "konal": by_pykonal}
+
+
+def on_grids(options: argparse.Namespace, _: Random) -> Iterator[Row]:
+    for name, mask, speed, exact in grids(options.rows):
+        source = tuple(k // 3 for k in mask.shape)
+        V = np.stack(
+            [x.ravel() for x in reversed(centres(mask.shape))] + [np.zeros(mask.size)] * (3 - mask.ndim), axis=1
+        )
+        truth = exact(V, int(np.ravel_multi_index(source, mask.shape)))[mask.ravel()]
+        row: Row = {"grid": f"{name}, {' x '.join(map(str, mask.shape))}"}
+        for method, query in GRIDS.items():
+            row[method] = dict.fromkeys(("mean", "largest", "s"), np.nan)
+            try:
+                start = time.process_time()
+                found = query(mask, speed, source)[mask]
+            except ImportError:
+                continue
+            took, off = time.process_time() - start, np.abs(excess(found, truth))
+            row[method] = {"mean": off.mean(), "largest": off.max(), "s": took}
+        yield row
+
+
 def summary(samples: Samples) -> Row:
     """Mean and largest, by column."""
     columns: dict[str, list[FloatArray]] = {}
@@ -437,8 +526,20 @@ COLUMNS = {
     "layers": {"layers": "{case}"}
     | mean_and_largest(border="source on the border", beside="1.5 edges away", middle="in the middle", **HALF),
     "faces": {"metric per face": "{case}"} | mean_and_largest(default="default", **HALF),
+    "grids": {"grid": "{grid}"}
+    | {
+        f"{head}, % and s": f"{{{key}[mean]:.2g}} and {{{key}[largest]:.2g}}, {{{key}[s]:.2g}}"
+        for key, head in {"default": "default", "fmm": "scikit-fmm", "konal": "pykonal"}.items()
+    },
 }  # fmt: skip
-ROWS = {"metrics": on_metrics, "bodies": in_bodies, "walls": in_walls, "layers": on_layers, "faces": on_faces}
+ROWS = {
+    "metrics": on_metrics,
+    "bodies": in_bodies,
+    "walls": in_walls,
+    "layers": on_layers,
+    "faces": on_faces,
+    "grids": on_grids,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> None:

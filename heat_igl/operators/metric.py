@@ -213,11 +213,12 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto"
     # Relative to the first corner: digits would be lost far from the origin.
     corners = (corners - corners[:, :1]) @ factor
     lengths = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3)
-    sides, fit_together = _smoothed(mesh, lengths[:, [1, 2, 0], [2, 0, 1]])
-    if fit_together:
+    own = lengths[:, [1, 2, 0], [2, 0, 1]]
+    sides = _common_lengths(mesh, own)
+    if sides is not None:
         domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
         return replace(domain, contrast=_contrast(g))
-    return _refracting(mesh, sides, g, laplacian)
+    return _refracting(mesh, own, g, laplacian)
 
 
 def _contrast(g: FloatArray) -> float:
@@ -242,24 +243,17 @@ def _of_smooth_metric(mesh: Mesh, corners: FloatArray, laplacian: Laplacian) -> 
     return replace(domain, surface=None, simplices=simplices)
 
 
-def _smoothed(mesh: Mesh, sides: FloatArray) -> tuple[FloatArray, bool]:
-    """Lengths (m, 3), the mean where faces see an edge at nearly the same, and whether now all see all at the same.
-
-    A triangle that the means would leave without area keeps its own.
-    """
+def _common_lengths(mesh: Mesh, own: FloatArray) -> FloatArray | None:
+    """The mean lengths (m, 3) of edges that faces see at lengths `own` (m, 3), if these nearly agree; else None."""
     of_side = mesh.facets.of_face
     shortest, longest = np.full(len(mesh.edges), np.inf), np.zeros(len(mesh.edges))
-    np.minimum.at(shortest, of_side, sides)
-    np.maximum.at(longest, of_side, sides)
-    is_one = longest - shortest <= _ONE_LENGTH * longest
-    mean = np.bincount(of_side.ravel(), sides.ravel()) / np.bincount(of_side.ravel())
-    smoothed = np.where(is_one[of_side], mean[of_side], sides)
-    slack = smoothed.sum(axis=1) - 2 * longest_sides(smoothed)
-    was_slack = sides.sum(axis=1) - 2 * longest_sides(sides)
-    too_thin = slack < _SLACK * was_slack
-    smoothed[too_thin] = sides[too_thin]
-    differs = too_thin[:, None] & (longest - shortest > _ROUNDING * longest)[of_side]
-    return smoothed, bool(is_one.all() and not differs.any())
+    np.minimum.at(shortest, of_side, own)
+    np.maximum.at(longest, of_side, own)
+    if (longest - shortest > _ONE_LENGTH * longest).any():
+        return None
+    mean = (np.bincount(of_side.ravel(), own.ravel()) / np.bincount(of_side.ravel()))[of_side]
+    slack, was_slack = (sides.sum(axis=1) - 2 * longest_sides(sides) for sides in (mean, own))
+    return None if (slack < _SLACK * was_slack).any() else np.asarray(mean)
 
 
 def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, laplacian: Laplacian) -> Operators:

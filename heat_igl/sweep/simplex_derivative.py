@@ -65,16 +65,16 @@ class _FacetUpdate:
 
     Parameters
     ----------
-    is_sloped : (k, p) bool
-        Whether the slope at a corner is known.
+    is_sloped, is_new : (k, p) bool
+        Whether the slope at a corner is known, and was not found through the vertex itself.
     same : (k, p, p) bool
         Whether two corners have their distance from one source.
     share : (k, p) float64
         The place on the facet; corners of share 0 keep it.
     """
 
-    def __init__(self, is_sloped: BoolArray, same: BoolArray, share: FloatArray) -> None:
-        self._is_sloped, self._same = is_sloped, same & is_sloped[:, :, None] & is_sloped[:, None]
+    def __init__(self, is_sloped: BoolArray, is_new: BoolArray, same: BoolArray, share: FloatArray) -> None:
+        self._is_trusted, self._same = is_sloped & is_new, same & is_sloped[:, :, None] & is_sloped[:, None]
         self.share = share.copy()
 
     def place(self, at: _Inputs) -> None:
@@ -91,12 +91,12 @@ class _FacetUpdate:
             # The shares sum to 1.
             M[:, p, :p] = M[:, :p, p] = 1
             M[:, :p] = np.where(stays[:, :, None], np.eye(p, p + 1), M[:, :p])
-            self._moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -np.linalg.inv(M)[:, :p, :p])
-            step = np.einsum("kij,kj->ki", self._moves, self._gradient(at, self.share))
+            self.moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -np.linalg.inv(M)[:, :p, :p])
+            step = np.einsum("kij,kj->ki", self.moves, self._gradient(at, self.share))
             # Not beyond an edge of the facet.
             room = np.min(np.where(step < 0, -self.share / np.minimum(step, -1e-300), 1.0), axis=1)
-            self.share += np.minimum(room, 1.0)[:, None] * step
-            if np.abs(step).max() < _SETTLED:
+            self.share += np.where(np.isfinite(step), np.minimum(room, 1.0)[:, None] * step, 0.0)
+            if np.nanmax(np.abs(step)) < _SETTLED:
                 break
 
     def values(self, at: _Inputs) -> AnyArray:
@@ -104,7 +104,7 @@ class _FacetUpdate:
         share = self.share
         change = np.imag(self._gradient(at, share))
         if change.any():
-            share = share + 1j * np.einsum("kij,kj->ki", self._moves, change)
+            share = share + 1j * np.einsum("kij,kj->ki", self.moves, change)
         T, length, _, lean = self._value(at, share)
         e = at.X[:, 1:] - at.X[:, :1]
         slope = np.einsum("kpx,kpq,kq->kx", e, np.linalg.inv(e @ np.swapaxes(e, 1, 2)), lean)
@@ -147,7 +147,7 @@ class _FacetUpdate:
         metric = product if product.shape[1] == 1 else product[:, 1:]
         w = np.einsum("kix,kjx->kij", at.slope, e)
         square = np.einsum("kij,kijl,kil->ki", w, np.linalg.inv(np.broadcast_to(metric, (k, p, p, p))), w)
-        is_known = self._is_sloped & (np.real(square) > 0)
+        is_known = self._is_trusted & (np.real(square) > 0)
         trust = _larger(1 - np.log(np.where(is_known, square, 1.0)) ** 2, 0.0) * is_known
         flat = np.zeros(k, bool)
         if p == 3:
@@ -318,7 +318,9 @@ class FixedPointDerivative(SimplexDerivative):
         labels = label[self._vertices[:, 1:]]
         self._first = np.take_along_axis(labels, sources.vertex_offset[labels].argmin(axis=1)[:, None], axis=1)[:, 0]
         same = labels[:, :, None] == labels[:, None]
-        self._update = _FacetUpdate(is_sloped[self._vertices[:, 1:]].astype(bool), same, place[v])
+        through = simplices.corners[facet // size] * (facet >= 0)[:, None] - (facet < 0)[:, None]
+        is_new = (through[self._vertices[:, 1:]] != v[:, None, None]).all(axis=2)
+        self._update = _FacetUpdate(is_sloped[self._vertices[:, 1:]].astype(bool), is_new, same, place[v])
         self._rank = np.empty(n, np.int64)
         self._rank[np.argsort(distance, kind="stable")] = np.arange(n)
         self._state = np.concatenate([distance[:, None], slope], axis=1)
@@ -333,17 +335,22 @@ class FixedPointDerivative(SimplexDerivative):
             if off.any():
                 self._state = found
                 off = np.abs(self._linearized()[:, 0]) > _SAME * distance
+            off[self._vertices[~self._is_known, 0]] = True
             self.distance = self._state[:, 0].copy()
             self.inexact = np.flatnonzero(off | (np.abs(self.distance - answer) > _SAME * answer))
 
     def _linearized(self) -> FloatArray:
         """Derive the updates at the state, and return the step of Newton's method (n, 4) to the fixed point."""
-        self._at = self._inputs()
-        self._update.place(self._at)
-        self._factor = self._factored()
-        rest = np.zeros_like(self._state)
-        rest[self._vertices[:, 0]] = self._update.values(self._at) - self._state[self._vertices[:, 0]]
-        return self._solved(rest)
+        self._at, v = self._inputs(), self._vertices[:, 0]
+        # On the way to the fixed point the square of T may have no root on a facet: then the vertex keeps its distance.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            self._update.place(self._at)
+            rest = self._update.values(self._at) - self._state[v]
+            self._is_known = np.isfinite(rest).all(axis=1) & np.isfinite(self._update.moves).all(axis=(1, 2))
+            self._factor = self._factored()
+        result = np.zeros_like(self._state)
+        result[v] = np.where(self._is_known[:, None], rest, 0.0)
+        return self._solved(result)
 
     def _by_positions(self, rows: FloatArray) -> FloatArray:
         adjoint = np.stack([self._adjoint(row) for row in rows])
@@ -410,7 +417,8 @@ class FixedPointDerivative(SimplexDerivative):
         for entry in np.ndindex(given.shape[1:]):
             moved = given.astype(complex)
             moved[(slice(None), *entry)] += 1j * _STEP
-            yield entry, np.imag(self._update.values(self._at._replace(**{name: moved}))) / _STEP
+            by = np.imag(self._update.values(self._at._replace(**{name: moved}))) / _STEP
+            yield entry, np.where(self._is_known[:, None], by, 0.0)
 
     def _factored(self) -> Any:
         """The factors of 1 - dF/dy; vertices from near to far, where the matrix is nearly triangular."""
@@ -421,7 +429,13 @@ class FixedPointDerivative(SimplexDerivative):
                 column.append(np.repeat(4 * self._rank[self._vertices[:, i + 1]] + (1 + x[0] if x else 0), 4))
                 value.append(-by.ravel())
         A = sp.csc_array((np.concatenate(value), (np.concatenate(row), np.concatenate(column))))
-        return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0)
+        try:
+            return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0)
+        except RuntimeError as error:
+            raise ValueError(
+                "the distance has no derivative: vertices have their distances from each other, as the metric changes "
+                "too much within single triangles or tetrahedra: refine the mesh"
+            ) from error
 
     def _solved(self, right: FloatArray, way: str = "N") -> FloatArray:
         ordered = np.empty_like(right)

@@ -479,10 +479,11 @@ class HopfLax(Facet):
     def trust(self, s: cython.int, c: cython.int, i: cython.int) -> cython.double:
         """How far the slope at a corner i of `side` has length 1 in simplex s, as unless metrics jump: from 0 to 1.
 
-        With the square of the logarithm, distances have a derivative where metrics begin to differ.
+        With the square of the logarithm, distances have a derivative where metrics begin to differ. A slope that was
+        found through the vertex for which it is asked says nothing new: two such vertices would lower each other.
         """
         v: cython.int = self.corners[s, self.side[i]]
-        if not self.is_sloped[v]:
+        if not self.is_sloped[v] or self.rests_on(v, self.corners[s, c]):
             return 0.0
         e: cython.double[3]
         j: cython.int
