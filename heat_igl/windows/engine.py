@@ -24,8 +24,7 @@ from heat_igl.windows.tables import MARGIN, Tables, from_mesh, from_triangulatio
 if TYPE_CHECKING:
     from heat_igl.intrinsic import IntrinsicTriangulation
     from heat_igl.operators import Operators, Surface
-    from heat_igl.windows.curve_directions import CurveDirections
-    from heat_igl.windows.directions import PathAngles, PathDirections
+    from heat_igl.windows.directions import CurveDirections, PathAngles, PathDirections
     from heat_igl.windows.path_lengths import PathLengths
 
 __all__ = [
@@ -211,7 +210,7 @@ class WindowEngine(TriangleEngine):
 
     @cached_property
     def _curve_directions(self) -> CurveDirections:
-        from heat_igl.windows.curve_directions import CurveDirections
+        from heat_igl.windows.directions import CurveDirections
 
         return CurveDirections(self._triangles.surface)
 

@@ -12,6 +12,7 @@ from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.kernels.windows.surface import SEVERAL_FANS
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.windows.directions import first_parts
 from heat_igl.windows.exact import Leaving, Searched, search, starts_at
 from heat_igl.windows.tables import Tables, from_mesh
 
@@ -141,9 +142,6 @@ def _first_parts(done: Searched, leaving: Leaving, source: int) -> tuple[IntArra
     root = done.found.root.astype(np.int64)
     is_first = root == source
     is_first[source] = False
-    top = np.where(is_first | (root < 0), np.arange(len(root)), root)
-    while not ((further := top[top]) == top).all():
-        top = further
     straight = np.flatnonzero(is_first)
     x, y = leaving.direction[straight].T
-    return top, straight, np.arctan2(y, x)
+    return first_parts(root), straight, np.arctan2(y, x)
