@@ -174,7 +174,8 @@ def one_sheet(P: FloatArray, index: IntArray) -> tuple[IntArray, FloatArray, Flo
     axes : (b, 3, 3) float64
         Two tangents and the normal, in rows, orthonormal.
     """
-    directions = np.ascontiguousarray(_directions(_DIRECTIONS).T)
+    # On a spiral, the second half of which is opposite to the first but for a turn.
+    directions = np.ascontiguousarray(_directions(_DIRECTIONS)[: _DIRECTIONS // 2].T)
     number = np.full(len(P), -1, np.int32)
     number[index[:, 0]] = np.arange(len(index))
 

@@ -16,7 +16,8 @@ def roomiest_normals(
     """Normals of points, on the side with most room for balls, and the radii of balls on both sides.
 
     Neighbours on another sheet bend the plane that fits best, but between them and the point there is little room.
-    Balls are tried along `directions`; those on the side of the largest are averaged, with weights r^4 for radius r.
+    Balls are tried along `directions` and opposite to them; those on the side of the largest are averaged, with weights
+    r^4 for radius r.
 
     Parameters
     ----------
@@ -25,7 +26,7 @@ def roomiest_normals(
     index : (b, k) int32
         Neighbours of some points, by distance and each point first.
     directions : (3, m) float64
-        Unit vectors in all directions, in columns.
+        Unit vectors in all directions of a half space, in columns.
 
     Returns
     -------
@@ -42,13 +43,13 @@ def roomiest_normals(
     radius: cython.double[:, ::1] = radii
     free: cython.double[:, ::1] = room
     inverted: cython.double[:, ::1] = np.empty((index.shape[1], 3))
-    least: cython.double[::1] = np.empty(directions.shape[1])
+    shares: cython.double[:, ::1] = np.empty((2, directions.shape[1]))
     row: cython.Py_ssize_t
     with cython.nogil:
         for row in range(index.shape[0]):
             reach: cython.double = _invert(P, index[row], inverted)
-            _shares(inverted, directions, least)
-            _average(directions, least, normal[row], free[row])
+            _shares(inverted, directions, shares)
+            _average(directions, shares, normal[row], free[row])
             radius[row, 0] = reach * _share(inverted, normal[row], 1.0)
             radius[row, 1] = reach * _share(inverted, normal[row], -1.0)
     return normals, radii, room
@@ -82,22 +83,22 @@ def _invert(
 @cython.nogil
 @cython.exceptval(check=False)
 def _shares(
-    inverted: cython.double[:, ::1], directions: cython.const[cython.double][:, ::1], share: cython.double[::1]
+    inverted: cython.double[:, ::1], directions: cython.const[cython.double][:, ::1], share: cython.double[:, ::1]
 ) -> cython.void:
-    """Radii of the largest empty balls along all directions, in shares of the reach, at most 1."""
+    """Radii of the largest empty balls along all directions and opposite to them, in shares of the reach, at most 1."""
     j: cython.Py_ssize_t
     a: cython.Py_ssize_t
-    for a in range(share.shape[0]):
-        share[a] = 1.0
+    share[:, :] = 1.0
     for j in range(inverted.shape[0]):
         x: cython.double = inverted[j, 0]
         y: cython.double = inverted[j, 1]
         z: cython.double = inverted[j, 2]
-        for a in range(share.shape[0]):
+        for a in range(share.shape[1]):
             along: cython.double = x * directions[0, a] + y * directions[1, a] + z * directions[2, a]
-            share[a] = along if along > share[a] else share[a]
-    for a in range(share.shape[0]):
-        share[a] = 1.0 / share[a]
+            share[0, a] = along if along > share[0, a] else share[0, a]
+            share[1, a] = -along if -along > share[1, a] else share[1, a]
+    for a in range(share.shape[1]):
+        share[0, a], share[1, a] = 1.0 / share[0, a], 1.0 / share[1, a]
 
 
 @cython.cfunc
@@ -116,37 +117,40 @@ def _share(inverted: cython.double[:, ::1], u: cython.double[::1], sign: cython.
 @cython.exceptval(check=False)
 def _average(
     directions: cython.const[cython.double][:, ::1],
-    share: cython.double[::1],
+    share: cython.double[:, ::1],
     normal: cython.double[::1],
     room: cython.double[::1],
 ) -> cython.void:
     """The mean direction on the side of the largest ball, and the largest balls on that side and on the other."""
     a: cython.Py_ssize_t
     x: cython.Py_ssize_t
+    side: cython.Py_ssize_t
     best: cython.Py_ssize_t = 0
+    of_best: cython.Py_ssize_t = 0
     mean: cython.double[3]
-    for a in range(share.shape[0]):
-        if share[a] > share[best]:
-            best = a
+    for side in range(2):
+        for a in range(share.shape[1]):
+            if share[side, a] > share[of_best, best]:
+                of_best, best = side, a
     for x in range(3):
-        normal[x] = directions[x, best]
+        normal[x] = directions[x, best] if of_best == 0 else -directions[x, best]
     for _ in range(ROUNDS):
         mean[0] = mean[1] = mean[2] = 0.0
-        for a in range(share.shape[0]):
+        for a in range(share.shape[1]):
             weight: cython.double = _along(directions, a, normal)
-            if weight > 0.0:
-                weight *= share[a] * share[a] * share[a] * share[a]
-                for x in range(3):
-                    mean[x] += weight * directions[x, a]
+            side = 0 if weight > 0.0 else 1
+            weight *= share[side, a] * share[side, a] * share[side, a] * share[side, a]
+            for x in range(3):
+                mean[x] += weight * directions[x, a]
         size: cython.double = sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2])
         for x in range(3):
             normal[x] = mean[x] / size
     room[0] = room[1] = 0.0
-    for a in range(share.shape[0]):
+    for a in range(share.shape[1]):
         along: cython.double = _along(directions, a, normal)
         if fabs(along) > ASIDE:
-            side: cython.Py_ssize_t = 0 if along > 0.0 else 1
-            room[side] = max(room[side], share[a])
+            side = 0 if along > 0.0 else 1
+            room[0], room[1] = max(room[0], share[side, a]), max(room[1], share[1 - side, a])
 
 
 @cython.cfunc
