@@ -99,6 +99,11 @@ def test_nothing_depends_on_where_how_large_or_in_which_order() -> None:
     assert {tuple(sorted(order[list(row)])) for row in triangles(P[order])} == expected
     distance = GeodesicSolver(PointCloud(P)).distance(0)
     np.testing.assert_allclose(GeodesicSolver(PointCloud(P + 1e6)).distance(0), distance, atol=1e-8)
+    # With noise, which triangles fit together depends on the order in which they are taken.
+    P = P + 0.05 * np.random.default_rng(3).standard_normal(P.shape)
+    distance, numbered = GeodesicSolver(PointCloud(P)).distance(0), np.argsort(order)
+    renumbered = GeodesicSolver(PointCloud(P[order])).distance(int(numbered[0]))
+    np.testing.assert_allclose(renumbered[numbered], distance, atol=1e-12)
 
 
 def test_a_grid_of_cocircular_points_has_no_gap() -> None:
@@ -393,15 +398,13 @@ def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined() ->
     assert (found.n_copies, found.noise, found.doubtful_points.tolist()) == (3, 0, [])
     assert found.unreferenced_vertices.tolist() == [403]
     assert set(found.boundary_points) >= set(P[:, 0].argsort()[[0, -1]])
-    # Two sheets at an angle of 30 degrees, with a common edge.
-    P = plane(400, 2)
-    folded = np.where(
-        P[:, :1] < 0.5, [1, 1, 0] * P, np.stack([1 - 0.5 + 0.87 * (0.5 - P[:, 0]), P[:, 1], P[:, 0] / 2 - 0.25], axis=1)
-    )
+    # Two sheets at an angle of 20 degrees, with a common edge: nearer than five spacings nearly everywhere.
+    P, angle = plane(400, 2) - [0.5, 0, 0], np.deg2rad(20)
+    folded = np.stack([np.where(P[:, 0] < 0, 1, -np.cos(angle)) * P[:, 0], P[:, 1], np.sin(angle) * P[:, 0]], axis=1)
+    folded[P[:, 0] < 0, 2] = 0
     with pytest.warns(AccuracyWarning, match=r"do not tell their surface: at \d+ of 400, .* or normals"):
         doubtful = PointCloud(folded).report().doubtful_points
     assert len(doubtful) > 5
-    assert (np.abs(P[doubtful, 0] - 0.5) < 0.12).all()
 
 
 # The solver's other questions need no special case.
@@ -835,7 +838,7 @@ def test_neighbours_on_another_sheet_are_left_out() -> None:
     P, _ = two_sheets(1500, 1.5 / np.sqrt(1500))
     tree = point_tree(P)
     index, _ = tree.nearest(np.arange(len(P)), 31)
-    kept, _, axes = one_sheet(tree.P, index)
+    kept, _, axes = one_sheet(tree.P, index, tangent_planes(tree.P, index)[0])
     inner = (np.abs(tree.P[:, :2] - 0.5) < 0.35).all(axis=1)
     is_other = (tree.P[kept, 2] > 0) != (tree.P[:, None, 2] > 0)
     assert ((tree.P[index, 2] > 0) != (tree.P[:, None, 2] > 0))[inner].sum(axis=1).mean() > 10
@@ -848,7 +851,7 @@ def test_neighbours_across_a_right_angle_stay() -> None:
     P = plane(2000)
     folded = np.where(P[:, :1] < 0.5, P, np.stack([0 * P[:, 0] + 0.5, P[:, 1], P[:, 0] - 0.5], axis=1))
     index, _ = point_tree(folded).nearest(np.arange(2000), 31)
-    kept, _, _ = one_sheet(point_tree(folded).P, index)
+    kept, _, _ = one_sheet(point_tree(folded).P, index, tangent_planes(point_tree(folded).P, index)[0])
     assert (kept[:, :8] >= 0).mean() > 0.99
 
 

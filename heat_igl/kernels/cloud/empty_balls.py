@@ -11,6 +11,7 @@ __all__ = ["on_one_side", "roomiest_normals"]
 def roomiest_normals(
     P: cython.const[cython.double][:, ::1],
     index: cython.const[cython.int][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
     directions: cython.const[cython.double][:, ::1],
 ):
     """Normals of points, on the side with most room for balls, and the radii of balls on both sides.
@@ -25,8 +26,10 @@ def roomiest_normals(
         All points.
     index : (b, k) int32
         Neighbours of some points, by distance and each point first.
+    axes : (b, 3, 3) float64
+        Orthonormal axes of each of these points, in rows.
     directions : (3, m) float64
-        Unit vectors in all directions of a half space, in columns.
+        Unit vectors in all directions of a half space, along these axes, in columns.
 
     Returns
     -------
@@ -44,14 +47,18 @@ def roomiest_normals(
     free: cython.double[:, ::1] = room
     inverted: cython.double[:, ::1] = np.empty((index.shape[1], 3))
     shares: cython.double[:, ::1] = np.empty((2, directions.shape[1]))
+    local: cython.double[::1] = np.empty(3)
     row: cython.Py_ssize_t
+    x: cython.int
     with cython.nogil:
         for row in range(index.shape[0]):
-            reach: cython.double = _invert(P, index[row], inverted)
+            reach: cython.double = _invert(P, index[row], axes[row], inverted)
             _shares(inverted, directions, shares)
-            _average(directions, shares, normal[row], free[row])
-            radius[row, 0] = reach * _share(inverted, normal[row], 1.0)
-            radius[row, 1] = reach * _share(inverted, normal[row], -1.0)
+            _average(directions, shares, local, free[row])
+            radius[row, 0] = reach * _share(inverted, local, 1.0)
+            radius[row, 1] = reach * _share(inverted, local, -1.0)
+            for x in range(3):
+                normal[row, x] = local[0] * axes[row, 0, x] + local[1] * axes[row, 1, x] + local[2] * axes[row, 2, x]
     return normals, radii, room
 
 
@@ -59,9 +66,13 @@ def roomiest_normals(
 @cython.nogil
 @cython.exceptval(check=False)
 def _invert(
-    P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][::1], inverted: cython.double[:, ::1]
+    P: cython.const[cython.double][:, ::1],
+    index: cython.const[cython.int][::1],
+    axes: cython.const[cython.double][:, ::1],
+    inverted: cython.double[:, ::1],
 ) -> cython.double:
     """The neighbours d as 2 R d / |d|^2 (R is returned): the ball of radius R / max(that . u) along u is empty."""
+    way: cython.double[3]
     j: cython.Py_ssize_t
     x: cython.Py_ssize_t
     last: cython.int = index[index.shape[0] - 1]
@@ -72,10 +83,11 @@ def _invert(
     for j in range(index.shape[0]):
         square = 0.0
         for x in range(3):
-            inverted[j, x] = (P[index[j], x] - P[index[0], x]) / reach
-            square += inverted[j, x] * inverted[j, x]
+            way[x] = (P[index[j], x] - P[index[0], x]) / reach
+            square += way[x] * way[x]
+        scale: cython.double = 2.0 / max(square, TINY)
         for x in range(3):
-            inverted[j, x] *= 2.0 / max(square, TINY)
+            inverted[j, x] = scale * (way[0] * axes[x, 0] + way[1] * axes[x, 1] + way[2] * axes[x, 2])
     return reach
 
 
