@@ -28,7 +28,7 @@ _BLOCK = 1 << 12
 _LEAF = 32
 # Ratio of the two smaller variances above which neighbours may be on several sheets.
 _SEVERAL_SHEETS = 0.04
-# Directions in which balls are tried, half of them and their opposites: every 22 degrees. With 60 a tenth of a neighbour
+# Directions in which balls are tried, half and their opposites: every 22 degrees. With 60 a tenth of a neighbour
 # stays on the other of two sheets 1.5 spacings apart; with 120 and 160 errors at thin parts are no smaller.
 _DIRECTIONS = 100
 # Radii of balls on the two sides whose ratio is at most this are those of a thin part or a narrow gap.
