@@ -381,6 +381,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def test_signed_draws_a_mesh_of_which_curves_reach_a_part(two_spheres: Path) -> None:
+    mesh = read_mesh(two_spheres)
+    loops = two_spheres.with_name("loops.obj")
+    write_curves(loops, mesh, heat_igl.isolines(mesh, mesh.V[:, 2], [0.1])[0])
+    drawn = two_spheres.with_name("signed.png")
+    assert cli.run(["signed", str(two_spheres), f"--curves={loops}", f"--picture={drawn}"]) == 0
+    assert drawn.read_bytes().startswith(b"\x89PNG")
+
+
 def test_signed_writes_what_the_library_returns(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["signed", "sphere.ply", "--curves=circle.obj", "--output=out.ply"]
     assert cli.run([*arguments, "--picture=out.png"]) == 0
