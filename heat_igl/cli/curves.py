@@ -121,10 +121,9 @@ def signed(
     drawn_on = projected(loaded, curves)
     check_output(loaded, output)
     phi = SignedHeatSolver(loaded, t_coef=t_coef).distance(drawn_on, level=cast(Level | None, level))
-    shown = np.where(np.isfinite(phi), phi, np.inf)
     written = write_results(
         loaded, phi, output, picture,
-        lambda: drawing.plot_field(loaded, shown, label="signed distance", curves=drawn_on),
+        lambda: drawing.plot_field(loaded, phi, label="signed distance", curves=drawn_on),
     )  # fmt: skip
     finite = phi[np.isfinite(phi)]
     low, high, left, right = float(finite.min()), float(finite.max()), int((finite < 0).sum()), int((finite > 0).sum())
