@@ -1,13 +1,11 @@
 """Run a solver on a mesh: choose it by name, check the distance, measure the cost; native ones in a child process.
 
-A native solver runs on one connected component at a time. So sources in several components work, and a vertex that no
-source reaches is ``inf``, whatever number the solver would write there.
+A vertex that no source reaches is ``inf``, whatever number the solver would write there.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
@@ -102,7 +100,7 @@ def measured(
     Returns
     -------
     Measured
-        Seconds are sums over the components that hold a source; memory is the largest of them.
+        Seconds are sums over the components that hold a source.
 
     Raises
     ------
@@ -130,24 +128,18 @@ def measured(
     if chosen.is_exact:
         _require_manifold(mesh, seeds)
 
-    def run(part: Mesh, part_seeds: IntArray) -> guarded.Reply:
-        arrays = {"V": part.V, "F": part.F}
-        if not to_boundary:
-            arrays["sources"] = part_seeds
-        reply = guarded.call(
-            f"heat_igl.reference.native:{chosen.function}",
-            arrays,
-            options,
-            timeout=timeout,
-            memory=memory,
-        )
-        distance = reply.values["distance"]
-        _require_finite(solver, part, distance)
-        if chosen.is_exact:
-            _require_between_bounds(solver, part, part_seeds, distance)
-        return reply
-
-    return _over_components(mesh, seeds, run)
+    reply = guarded.call(
+        f"heat_igl.reference.native:{chosen.function}",
+        {"V": mesh.V, "F": mesh.F, "sources": seeds, "components": mesh.components},
+        options,
+        timeout=timeout,
+        memory=memory,
+    )
+    found = Measured(**reply.values, peak_memory=reply.peak_memory)
+    _require_finite(solver, mesh, seeds, found.distance)
+    if chosen.is_exact:
+        _require_between_bounds(solver, mesh, seeds, found.distance)
+    return found
 
 
 def _by_windows(mesh: Mesh, seeds: IntArray) -> Measured:
@@ -159,38 +151,11 @@ def _by_windows(mesh: Mesh, seeds: IntArray) -> Measured:
         except MeshError as error:
             raise ReferenceSolverError(f"{WINDOWS}: {error}") from error
     seconds = time.perf_counter() - start
-    there = np.isin(mesh.components, mesh.components[seeds])
-    if not (np.isfinite(distance) == there).all():
-        raise ReferenceSolverError(f"{WINDOWS} did not reach the components of the sources: report this as a bug")
+    _require_finite(WINDOWS, mesh, seeds, distance)
     # Where triangles have hardly any height, edges were rounded or made longer.
     slack = _AT_NEEDLES * float(mesh.edge_lengths.mean())
     _require_between_bounds(WINDOWS, mesh, seeds, distance, tolerance=_AT_NEEDLES, slack=slack)
     return Measured(distance, 0.0, seconds, peak.bytes)
-
-
-def _over_components(mesh: Mesh, seeds: IntArray, run: Callable[[Mesh, IntArray], guarded.Reply]) -> Measured:
-    """Run on each component that holds a seed: solvers fail at vertices without faces and on other components."""
-    distance = np.full(mesh.n_vertices, np.inf)
-    distance[seeds] = 0.0  # also if no face uses the seed
-    costs = np.zeros(2)
-    peaks: list[int | None] = [0]
-    labels = np.unique(mesh.components[seeds])
-    for label in labels:
-        inside = mesh.components == label
-        part, index = mesh, seeds
-        if not inside.all():
-            faces = mesh.F[inside[mesh.F[:, 0]]]
-            if not len(faces):
-                continue
-            renumbered = np.cumsum(inside) - 1
-            part = Mesh(mesh.V[inside], renumbered[faces])
-            index = renumbered[seeds[inside[seeds]]]
-        reply = run(part, index)
-        distance[inside] = reply.values["distance"]
-        costs += reply.values["precompute_seconds"], reply.values["solve_seconds"]
-        peaks.append(reply.peak_memory)
-    known = [peak for peak in peaks if peak is not None]
-    return Measured(distance, float(costs[0]), float(costs[1]), max(known) if len(known) == len(peaks) else None)
 
 
 def _require_manifold(mesh: Mesh, seeds: IntArray) -> None:
@@ -224,17 +189,18 @@ def _require_manifold(mesh: Mesh, seeds: IntArray) -> None:
         )
 
 
-def _require_finite(name: str, mesh: Mesh, distance: FloatArray) -> None:
-    """Refuse a distance that has the wrong shape, or is not finite on a connected mesh."""
+def _require_finite(name: str, mesh: Mesh, seeds: IntArray, distance: FloatArray) -> None:
+    """Refuse a distance that has the wrong shape, or is not finite exactly on the components of the seeds."""
     if distance.shape != (mesh.n_vertices,):
         raise ReferenceSolverError(
             f"{name} returned an array of shape {distance.shape} for {mesh.n_vertices} vertices: report this as a bug"
         )
-    n_bad = int((~np.isfinite(distance)).sum())
+    there = np.isin(mesh.components, mesh.components[seeds])
+    n_bad = int((np.isfinite(distance) != there).sum())
     if n_bad:
         raise ReferenceSolverError(
-            f"{name} returned {n_bad} of {mesh.n_vertices} distances that are not finite on one connected component: "
-            "look for slivers and zero areas with mesh.report()"
+            f"{name} returned {n_bad} of {mesh.n_vertices} distances that are not finite on the components of the "
+            "sources, or finite elsewhere: look for slivers and zero areas with mesh.report()"
         )
 
 

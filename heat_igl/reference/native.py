@@ -1,8 +1,8 @@
 """The native reference solvers, each called in the way that gives the right result. They run in the guarded child.
 
-Every function takes arrays that were validated (one connected component, all vertices referenced) and returns the
-distance with the seconds for the part that could be kept between sources (``precompute_seconds``) and for the rest
-(``solve_seconds``). Loading the library is not counted.
+Every function takes arrays that were validated, and the component (n,) of each vertex. It returns the distance with the
+seconds for the part that could be kept between sources (``precompute_seconds``) and for the rest (``solve_seconds``),
+summed over the components that hold a source. Loading the library is not counted.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from __future__ import annotations
 import contextlib
 import io
 import time
+from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -43,6 +45,34 @@ def _binary_scale(V: FloatArray, F: IntArray, edge: float) -> float:
     return float(2.0 ** np.round(np.log2(edge / mean)))
 
 
+_Solve = Callable[..., dict[str, Any]]
+
+
+def _by_components(solve: _Solve) -> _Solve:
+    """Solve on each component that holds a source: solvers fail at vertices without faces and on other components."""
+
+    @wraps(solve)
+    def whole(
+        V: FloatArray, F: IntArray, sources: IntArray, components: IntArray | None = None, **options: Any
+    ) -> dict[str, Any]:
+        if components is None:
+            return solve(V, F, sources, **options)
+        found: dict[str, Any] = {"distance": np.full(len(V), np.inf), "precompute_seconds": 0.0, "solve_seconds": 0.0}
+        found["distance"][sources] = 0.0  # also if no face uses the source
+        for label in np.unique(components[sources]):
+            inside = components == label
+            faces = F[inside[F[:, 0]]]
+            if len(faces):
+                number = np.cumsum(inside) - 1
+                part = solve(V[inside], number[faces], number[sources[inside[sources]]], **options)
+                found["distance"][inside] = part["distance"]
+                for cost in ("precompute_seconds", "solve_seconds"):
+                    found[cost] += part[cost]
+        return found
+
+    return whole
+
+
 def _outcome(distance: Any, start: float, ready: float, end: float) -> dict[str, Any]:
     return {
         "distance": np.asarray(distance, dtype=np.float64),
@@ -51,6 +81,7 @@ def _outcome(distance: Any, start: float, ready: float, end: float) -> dict[str,
     }
 
 
+@_by_components
 def pygeodesic_exact(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]:
     """Exact distance by pygeodesic (Mitchell, Mount and Papadimitriou 1987, Kirsanov's implementation)."""
     from pygeodesic.geodesic import PyGeodesicAlgorithmExact
@@ -68,6 +99,7 @@ def pygeodesic_exact(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str,
     return _outcome(distance / scale, start, ready, end)
 
 
+@_by_components
 def gdist_exact(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]:
     """Exact distance by tvb-gdist (the same implementation)."""
     import gdist
@@ -80,6 +112,7 @@ def gdist_exact(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]
     return _outcome(distance / scale, start, ready, time.perf_counter())
 
 
+@_by_components
 def igl_exact(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]:
     """Exact distance by libigl: the length of the path that the same implementation traces back from each vertex."""
     import igl
@@ -93,6 +126,7 @@ def igl_exact(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]:
     return _outcome(distance / scale, start, ready, time.perf_counter())
 
 
+@_by_components
 def igl_heat(
     V: FloatArray, F: IntArray, sources: IntArray, t: float | None = None, intrinsic_delaunay: bool = False
 ) -> dict[str, Any]:
@@ -111,6 +145,7 @@ def igl_heat(
     return _outcome(distance, start, ready, time.perf_counter())
 
 
+@_by_components
 def potpourri3d_heat(
     V: FloatArray, F: IntArray, sources: IntArray, t_coef: float = 1.0, use_robust: bool = True
 ) -> dict[str, Any]:
@@ -124,6 +159,7 @@ def potpourri3d_heat(
     return _outcome(distance, start, ready, time.perf_counter())
 
 
+@_by_components
 def potpourri3d_marching(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]:
     """Fast marching of geometry-central through potpourri3d."""
     import potpourri3d
@@ -136,6 +172,7 @@ def potpourri3d_marching(V: FloatArray, F: IntArray, sources: IntArray) -> dict[
     return _outcome(distance, start, ready, time.perf_counter())
 
 
+@_by_components
 def meshlab_front(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, Any]:
     """MeshLab's front from selected vertices, without the cutoff."""
     import pymeshlab
@@ -146,11 +183,13 @@ def meshlab_front(V: FloatArray, F: IntArray, sources: IntArray) -> dict[str, An
     )
 
 
-def meshlab_border(V: FloatArray, F: IntArray) -> dict[str, Any]:
-    """MeshLab's front from all vertices of the border."""
+@_by_components
+def meshlab_border(V: FloatArray, F: IntArray, _: IntArray) -> dict[str, Any]:
+    """MeshLab's front from all vertices of the border, which are the sources."""
     return _filtered(V, F, None, "compute_scalar_by_border_distance_per_vertex", {})
 
 
+@_by_components
 def meshlab_heat(V: FloatArray, F: IntArray, sources: IntArray, m: float = 1.0) -> dict[str, Any]:
     """MeshLab's heat method, in single precision."""
     name = "compute_scalar_by_heat_geodesic_distance_from_selection_per_vertex"
