@@ -21,7 +21,6 @@ from heat_igl import (
     tangent_frames,
 )
 from heat_igl.intrinsic import (
-    Adjacency,
     Flipped,
     IntrinsicTriangulation,
     Refined,
@@ -287,7 +286,7 @@ def test_triangles_laid_out_have_their_lengths(bunny):
 def test_spokes_are_the_edges_at_a_vertex(cow):
     triangulation = intrinsic_triangulation(cow)
     vertices = np.array([11, 5, 700])
-    which, ends, lengths = Adjacency(triangulation).spokes(vertices)
+    which, ends, lengths = triangulation.spokes(vertices)
     for i, v in enumerate(vertices):
         edges = cow.edges[(cow.edges == v).any(axis=1)]
         assert set(ends[which == i].tolist()) == set(edges[edges != v].tolist())

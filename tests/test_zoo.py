@@ -20,8 +20,7 @@ from heat_igl import (
     shapes,
 )
 from heat_igl.geodesic import SolverChoice
-from heat_igl.heat.assembly import SourceAssembler
-from heat_igl.heat.several_sources import drop_overtaken
+from heat_igl.heat.source_terms import SourceAssembler, drop_overtaken
 from heat_igl.intrinsic import mollify
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray

@@ -17,9 +17,11 @@ from heat_igl.cli import options as opt
 from heat_igl.cli.output import Row, check_output, described, plan_row, print_rows, write_results, wrote
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import SolverChoice
-from heat_igl.heat import Backend, HeatMethodSolver, Laplacian, Magnitude
+from heat_igl.heat import HeatMethodSolver, Magnitude
 from heat_igl.io import is_flat, read_mesh_or_cloud
+from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, PointCloud, as_simplices, closest_points
+from heat_igl.operators import Laplacian
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import BoolArray, FloatArray
 

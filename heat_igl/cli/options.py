@@ -12,8 +12,8 @@ import typer
 from heat_igl.cli.output import check_curves, check_json, check_picture
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.geodesic import DistanceMethod
-from heat_igl.heat import Boundary
 from heat_igl.io import MAP_SUFFIXES, read_attributes
+from heat_igl.steps import Boundary
 from heat_igl.typing import AnyArray, BoolArray
 
 MeshArgument = Annotated[

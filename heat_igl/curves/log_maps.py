@@ -10,7 +10,7 @@ from heat_igl.errors import SourceError, names_guessed, require_choice
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.heat import VectorHeatSolver
 from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices
-from heat_igl.sources import Sources, ordered_vertices
+from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray
 from heat_igl.windows import vectors_from
 
@@ -89,7 +89,7 @@ def log_map(
         found = GeodesicSolver(mesh, method="exact").directions(source)
         return _vectors(found.distance, found.departure)
     if not triangles.is_tetrahedral and not isinstance(source, SurfacePoints):
-        vertex = triangles.originals[ordered_vertices(source, triangles.n_vertices, "source")[0]]
+        vertex = triangles.originals[named_vertices(source, triangles.n_vertices, "source")[0]]
         vectors = vectors_from(triangles, int(vertex))
         if vectors is not None:
             return vectors[triangles.originals]
@@ -106,10 +106,10 @@ def _one_vertex(source: Sources, n: int) -> int:
     if isinstance(source, SurfacePoints):
         raise SourceError("the vector heat method starts at vertices: take another method for a point in a face")
     _require_one(source, n)
-    return int(ordered_vertices(source, n, "source")[0])
+    return int(named_vertices(source, n, "source")[0])
 
 
 def _require_one(source: Sources, n: int) -> None:
-    k = len(source) if isinstance(source, SurfacePoints) else len(ordered_vertices(source, n, "source"))
+    k = len(source) if isinstance(source, SurfacePoints) else len(named_vertices(source, n, "source"))
     if k != 1:
         raise SourceError(f"source must be one vertex or point, not {k}")

@@ -13,7 +13,7 @@ from heat_igl.kernels.paths import straightest
 from heat_igl.mesh import ON_SIDE, MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
 from heat_igl.mesh.cloud_orientation import on_one_side
 from heat_igl.runtime import n_threads, side_by_side
-from heat_igl.sources import Sources, ordered_vertices
+from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["Tracer", "exp_map", "trace_geodesic"]
@@ -220,7 +220,7 @@ class Tracer:
             corner = self._surface.F[points.faces, weights.argmax(axis=1)]
             vertices = np.where((weights.max(axis=1) == 1) & in_frame, corner, -1)
             return _Starts(points.faces.copy(), np.ascontiguousarray(weights), vertices)
-        vertices = self._surface.originals[ordered_vertices(points, self._mesh.n_vertices, name)]
+        vertices = self._surface.originals[named_vertices(points, self._mesh.n_vertices, name)]
         corner = self._frames.angles.first[vertices]
         if (corner < 0).any():
             first = int(np.argmax(corner < 0))

@@ -2,11 +2,8 @@ from heat_igl.heat.batches import LabelledDistance as LabelledDistance
 from heat_igl.heat.checking import AnswerCheck as AnswerCheck
 from heat_igl.heat.checking import Comparison as Comparison
 from heat_igl.heat.directions import Directions as Directions
-from heat_igl.heat.options import Backend as Backend
-from heat_igl.heat.options import Boundary as Boundary
-from heat_igl.heat.options import Laplacian as Laplacian
-from heat_igl.heat.options import Magnitude as Magnitude
-from heat_igl.heat.options import SolverOptions as SolverOptions
+from heat_igl.heat.parts import Magnitude as Magnitude
+from heat_igl.heat.parts import SolverOptions as SolverOptions
 from heat_igl.heat.signed_heat import Level as Level
 from heat_igl.heat.signed_heat import SignedHeatSolver as SignedHeatSolver
 from heat_igl.heat.signed_volumes import VoxelBox as VoxelBox

@@ -5,20 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
-from heat_igl.heat.assembly import take_shorter
-from heat_igl.heat.source_terms import Seeds, SourceTerm, right_hand_side
-from heat_igl.intrinsic import Adjacency
+from heat_igl.heat.source_terms import Seeds, SourceTerm, right_hand_side, take_shorter
+from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.operators import Operators
 from heat_igl.runtime import LOWEST_HEAT, warn_caller
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["HEAT_ERROR", "Integration", "damped_field", "imposed_faces"]
+__all__ = ["_HEAT_ERROR", "Integration", "damped_field", "_imposed_faces"]
 
 # A known distance that is longer than the integrated distance by more than this share of it comes from a source that is
 # not the nearest: integrated distance is wrong by less, by 1 to 4 % in the mean. It decides on the far corners of faces
 # much larger than the mean alone; from 0 to 1, errors on the cow, the fandisk and the camel's head are the same.
-HEAT_ERROR = 0.2
+_HEAT_ERROR = 0.2
 
 
 def damped_field(
@@ -38,7 +37,7 @@ def damped_field(
     return X, magnitude
 
 
-def imposed_faces(domain: Operators, term: SourceTerm) -> IntArray:
+def _imposed_faces(domain: Operators, term: SourceTerm) -> IntArray:
     """The faces (k,) near points and curves on which the field is the gradient of the known distances."""
     if not term.seen.any():
         return np.empty(0, np.int64)
@@ -57,7 +56,7 @@ def imposed_faces(domain: Operators, term: SourceTerm) -> IntArray:
 
 def _impose_near_field(domain: Operators, term: SourceTerm, X: FloatArray, magnitude: FloatArray) -> None:
     """Near points and curves, replace the field X (d m,) of length `magnitude` (m,) by the exact gradient."""
-    faces, m = imposed_faces(domain, term), len(magnitude)
+    faces, m = _imposed_faces(domain, term), len(magnitude)
     if not len(faces):
         return
     gradient = (domain.G[:, term.near.vertex] @ term.near.value).reshape(-1, m)[:, faces]
@@ -84,8 +83,8 @@ class Integration:
         theirs is known beforehand, as in the paper.
     fitted : bool
         Whether the heat flow is fitted to the lengths of edges.
-    edges : Adjacency, optional
-        The edges that are solved on; None without triangles.
+    triangulation : IntrinsicTriangulation, optional
+        The triangles that are solved on.
     """
 
     def __init__(
@@ -96,11 +95,11 @@ class Integration:
         poisson: PoissonProblem,
         t: float | FloatArray | None,
         fitted: bool,
-        edges: Adjacency | None,
+        triangulation: IntrinsicTriangulation | None,
     ) -> None:
         self._domain, self._heat_flow, self.poisson = domain, heat_flow, poisson
         self._normalized_divergence = divergence
-        self._t, self._fitted, self._edges = t, fitted, edges
+        self._t, self._fitted, self._triangulation = t, fitted, triangulation
 
     def divergence(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
         """The integrated divergence (n, k) of the normalized field, for heat (n, k) from k terms."""
@@ -144,7 +143,7 @@ class Integration:
         start = domain.expand_to_vertices(lowest)
         distance = phi - domain.expand_to_vertices(level)
         np.maximum(distance, start, out=distance)
-        take_shorter(distance, term.far, HEAT_ERROR, start)
+        take_shorter(distance, term.far, _HEAT_ERROR, start)
         if self._t is not None or not term.sources.on_vertices_alone:
             self._bound_by_edges(term.near, distance)
         distance[term.near.vertex] = term.near.value
@@ -172,9 +171,9 @@ class Integration:
 
     def _bound_by_edges(self, near: Seeds, distance: FloatArray) -> None:
         """Across an edge from a known value, distance changes by no more than the length of the edge."""
-        if self._edges is None:
+        if self._triangulation is None:
             return
-        which, ends, lengths = self._edges.spokes(near.vertex)
+        which, ends, lengths = self._triangulation.spokes(near.vertex)
         value = near.value[which]
         np.maximum.at(distance, ends, value - lengths)
         np.minimum.at(distance, ends, value + lengths)

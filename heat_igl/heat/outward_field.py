@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.intrinsic import Adjacency, carried_angles, polar_angles, transport_angles
+from heat_igl.intrinsic import carried_angles, polar_angles, transport_angles
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.operators import Surface
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -32,7 +32,6 @@ class OutwardField:
         self._triangulation = surface.triangulation
         self._angles = carried_angles(polar_angles(surface.faces), surface.triangulation)
         self._turn = transport_angles(self._triangulation, self._angles)
-        self._adjacency = Adjacency(self._triangulation)
 
     def ring(self, vertex: int) -> tuple[IntArray, FloatArray]:
         """The neighbours (k,) of a vertex, and the directions (k,) at the vertex of the edges to them.
@@ -40,7 +39,7 @@ class OutwardField:
         Those only that one edge joins with the vertex.
         """
         tri = self._triangulation
-        corner, _ = self._adjacency.corners_at(np.array([vertex]))
+        corner, _ = tri.corners_at(np.array([vertex]))
         out = previous_half_edge(corner)
         last = next_half_edge(corner)
         last = last[tri.twin[last] < 0]
@@ -73,7 +72,7 @@ class OutwardField:
             In the frames of these vertices.
         """
         tri, angles = self._triangulation, self._angles
-        corner, _ = self._adjacency.corners_at(np.array([vertex]))
+        corner, _ = tri.corners_at(np.array([vertex]))
         out, back = previous_half_edge(corner), next_half_edge(corner)
         leaving, scale = angles.rigid(tri.tail(np.arange(tri.F.size)))
         wide = scale[vertex] * angles.corners.ravel()[corner]

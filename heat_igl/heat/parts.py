@@ -1,4 +1,4 @@
-"""Preparation of a solver before the first query: operators, options resolved on them, and factors."""
+"""Preparation of a solver before the first query: options, operators, the time step, and factors."""
 
 from __future__ import annotations
 
@@ -6,32 +6,160 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, get_args
 
 import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.heat.assembly import SourceAssembler
+from heat_igl.errors import AccuracyWarning, positive, require_choice
 from heat_igl.heat.checking import Checker, Comparisons
 from heat_igl.heat.integration import Integration
-from heat_igl.heat.options import SolverOptions
 from heat_igl.heat.solution import Diagnostics
-from heat_igl.heat.time_step import check_large_step, time_step
-from heat_igl.linear import Analysis
+from heat_igl.heat.source_terms import SourceAssembler
+from heat_igl.linear import Analysis, Backend
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import (
+    Laplacian,
     Operators,
+    check_laplacian,
     fan_operators,
+    is_rough_or_narrow,
     operators,
     point_cloud_operators,
 )
-from heat_igl.plan import RANDOM_SIDES, T_COEF_EVEN_POINTS, T_COEF_RANDOM_POINTS, Plan, heat_plan
-from heat_igl.runtime import in_order, n_threads, pool
-from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, analysis
+from heat_igl.plan import (
+    FARTHEST_SPREAD,
+    RANDOM_SIDES,
+    T_COEF,
+    T_COEF_EVEN_POINTS,
+    T_COEF_FITTED,
+    T_COEF_RANDOM_POINTS,
+    T_COEF_ROUGH,
+    Plan,
+    heat_plan,
+)
+from heat_igl.runtime import in_order, n_threads, pool, warn_caller
+from heat_igl.steps import (
+    Boundary,
+    HeatFlow,
+    NormalizedDivergence,
+    PoissonProblem,
+    analysis,
+    smallest_time_step,
+    smallest_time_steps,
+)
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["SolverParts", "prepare", "prepare_mesh", "prepare_polygons"]
+Magnitude = Literal["auto", "unit", "damped"]
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """The options of `HeatMethodSolver`, with their meanings and defaults; checked when they are put together.
+
+    Attributes
+    ----------
+    t_coef, t, laplacian, boundary, magnitude, backend
+        As for `HeatMethodSolver`.
+
+    Raises
+    ------
+    ValueError
+        If an option has no meaning.
+    """
+
+    t_coef: float | None = None
+    t: float | None = None
+    laplacian: Laplacian = "auto"
+    boundary: Boundary = "neumann"
+    magnitude: Magnitude = "auto"
+    backend: Backend = "auto"
+
+    def __post_init__(self) -> None:
+        for name in ("t_coef", "t"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, positive(name, value))
+        check_laplacian(self.laplacian)
+        require_choice("boundary", self.boundary, get_args(Boundary))
+        require_choice("magnitude", self.magnitude, get_args(Magnitude))
+        require_choice("backend", self.backend, get_args(Backend))
+
+    @property
+    def default_time_step(self) -> bool:
+        """Whether the time step is left to the solver."""
+        return self.t_coef is None and self.t is None
+
+    @property
+    def holds_to_bounds(self) -> bool:
+        """Whether answers are held to bounds: neither the paper's field, a time step nor a boundary was asked for."""
+        asked_for_unit = self.magnitude == "unit" or (self.magnitude == "auto" and self.laplacian == "cotan")
+        return not asked_for_unit and self.default_time_step and self.boundary == "neumann"
+
+    def damps(self, domain: Operators) -> bool:
+        """Whether the field is damped on faces with heat from several sides: ``magnitude="auto"`` resolved."""
+        if self.magnitude == "auto":
+            return domain.is_surface and self.laplacian != "cotan"
+        return self.magnitude == "damped"
+
+
+def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[float | FloatArray, float | FloatArray]:
+    """The time step for `domain`, and the one that was asked for: ``options.t``, or ``t_coef * h**2``.
+
+    Each is a number, or one (n_components,) for each component if their mean edge lengths h differ.
+
+    Warns
+    -----
+    AccuracyWarning
+        If an explicit t had to be raised for the heat to cross the domain.
+    """
+    if options.t is not None:
+        step = max(options.t, smallest_time_step(domain, fitted))
+        if step > options.t:
+            warn_caller(
+                f"t = {options.t:.4g} is too small for heat to cross the mesh in double precision; using {step:.4g}",
+                AccuracyWarning,
+            )
+        return step, options.t
+    t_coef = options.t_coef
+    if t_coef is None:
+        t_coef = T_COEF
+        if fitted:
+            t_coef = T_COEF_ROUGH if is_rough_or_narrow(domain) else T_COEF_FITTED
+    requested = t_coef * domain.mean_edge_lengths**2
+    steps = np.maximum(requested, smallest_time_steps(domain, fitted))
+    used = np.unique(domain.components[domain.referenced])
+    if len(used) == 1:
+        return float(steps[used[0]]), float(requested[used[0]])
+    return steps, requested
+
+
+def check_large_step(options: SolverOptions, domain: Operators) -> None:
+    """Warn if the step that was asked for is so large that heat is nearly level over the whole domain.
+
+    Raise ValueError if M - t L would be singular in double precision.
+
+    Heat falls like exp(-d / sqrt(t)). With sqrt(t) above the longest distance it falls by less than a factor of e
+    altogether, and distances follow the shape of the domain more than the way to the source.
+    """
+    step = options.t
+    if step is None and options.t_coef is not None:
+        step = options.t_coef * domain.mean_edge_length**2
+    name, value = ("t", options.t) if options.t is not None else ("t_coef", options.t_coef)
+    if step is not None and np.sqrt(step) > FARTHEST_SPREAD * domain.longest_distance:
+        raise ValueError(
+            f"{name} = {value:.4g} is too large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, and the longest "
+            f"distance on the mesh is {domain.longest_distance:.4g}, so heat is level; t is a squared "
+            "length"
+        )
+    if step is not None and np.sqrt(step) > domain.longest_distance:
+        warn_caller(
+            f"{name} = {value:.4g} is very large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, more than the "
+            f"longest distance on the mesh, {domain.longest_distance:.4g}, and distances are smoothed by as much; "
+            "t_coef from 0.5 to 10 is usual, and t is a squared length",
+            AccuracyWarning,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +190,10 @@ class SolverParts:
         Checks answers against bounds that need no reference.
     comparisons : Comparisons or None
         Compares the first answers with those of another engine; None if answers are not held to bounds.
+    is_default : bool
+        Whether answers are held to bounds: neither the paper's field, a time step nor a boundary was asked for.
+    given_faces : (m, 3) int64 or None
+        Vertices of the triangles that points and curves refer to.
     plan : Plan
         For the user.
     diagnostics : Diagnostics
@@ -79,34 +211,10 @@ class SolverParts:
     fitted: bool
     checker: Checker
     comparisons: Comparisons | None
+    is_default: bool
+    given_faces: IntArray | None
     plan: Plan
     diagnostics: Diagnostics
-
-    @property
-    def is_default(self) -> bool:
-        """Whether answers are held to bounds: neither the paper's field, a time step nor a boundary was asked for."""
-        return _is_default(self.options)
-
-    @property
-    def n_vertices(self) -> int:
-        """Length of a distance array."""
-        return self.operators.n_given
-
-    @property
-    def n_faces(self) -> int:
-        """Faces of the domain."""
-        return len(self.operators.weights)
-
-    @property
-    def is_surface(self) -> bool:
-        """Whether the domain has two dimensions."""
-        return self.operators.is_surface
-
-    @property
-    def given_faces(self) -> IntArray | None:
-        """Vertices (m, 3) of the triangles that points and curves refer to."""
-        surface = self.operators.source_surface
-        return None if surface is None else surface.given_faces
 
 
 def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
@@ -176,7 +284,7 @@ def prepare(
     heat_flow, poisson, divergence = _factored(domain, options, step, found, t_damping, fitted)
     factored = time.perf_counter()
     assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped)
-    last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.edges)
+    last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.triangulation)
     triangulation = None if domain.surface is None else domain.surface.triangulation
     factors = [*heat_flow.factors, poisson.factor]
     diagnostics = Diagnostics(
@@ -206,7 +314,9 @@ def prepare(
         t_damping=t_damping,
         fitted=fitted,
         checker=Checker(domain.source_surface, domain.referenced[: domain.n_given], V),
-        comparisons=Comparisons(domain) if is_triangles and _is_default(options) else None,
+        comparisons=Comparisons(domain) if is_triangles and options.holds_to_bounds else None,
+        is_default=options.holds_to_bounds,
+        given_faces=None if domain.source_surface is None else domain.source_surface.given_faces,
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,
     )
@@ -236,11 +346,6 @@ def _factored(
     threads = 1 if found.backend == "scipy" else min(2, n_threads())
     poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
     return heat_flow, poisson, divergence
-
-
-def _is_default(options: SolverOptions) -> bool:
-    asked_for_unit = options.magnitude == "unit" or (options.magnitude == "auto" and options.laplacian == "cotan")
-    return not asked_for_unit and options.default_time_step and options.boundary == "neumann"
 
 
 def _of_largest(step: float | FloatArray, domain: Operators) -> float:

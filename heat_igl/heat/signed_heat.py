@@ -17,8 +17,7 @@ from heat_igl.heat.curve_sides import (
     zero_curve_in_gaps,
 )
 from heat_igl.heat.normal_integration import NormalIntegration
-from heat_igl.heat.options import SolverOptions
-from heat_igl.heat.parts import prepare
+from heat_igl.heat.parts import SolverOptions, prepare
 from heat_igl.heat.solver import HeatMethodSolver
 from heat_igl.intrinsic import IntrinsicTriangulation, oriented
 from heat_igl.linear import Backend

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,11 +12,9 @@ from heat_igl.errors import AccuracyWarning, names_guessed
 from heat_igl.heat.batches import BatchedSolver, LabelledDistance, checked_cutoff, cut_off
 from heat_igl.heat.checking import AnswerCheck
 from heat_igl.heat.integration import damped_field
-from heat_igl.heat.options import Magnitude, SolverOptions
-from heat_igl.heat.parts import SolverParts, prepare, prepare_mesh, prepare_polygons
-from heat_igl.heat.several_sources import drop_overtaken, warmest_sources
+from heat_igl.heat.parts import Magnitude, SolverOptions, SolverParts, prepare, prepare_mesh, prepare_polygons
 from heat_igl.heat.solution import Diagnostics, HeatSolution
-from heat_igl.heat.source_terms import SourceTerm, right_hand_side
+from heat_igl.heat.source_terms import SourceTerm, drop_overtaken, right_hand_side, warmest_sources
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
@@ -265,7 +264,7 @@ class HeatMethodSolver(BatchedSolver):
     @property
     def n_vertices(self) -> int:
         """Length of a distance array: the vertices of the mesh. The operators may have more."""
-        return self._parts.n_vertices
+        return self._parts.operators.n_given
 
     @property
     def referenced(self) -> BoolArray:
@@ -274,7 +273,7 @@ class HeatMethodSolver(BatchedSolver):
 
     @property
     def _n_faces(self) -> int:
-        return self._parts.n_faces
+        return len(self._parts.operators.weights)
 
     @names_guessed
     def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
@@ -313,9 +312,9 @@ class HeatMethodSolver(BatchedSolver):
         terms = self._source_terms(source_sets)
         distances = self._distances_from_heat(terms, self._heat(terms))
         checks = [self._checked(*pair) for pair in zip(distances, source_sets, strict=True)]
-        return self._with_copies(distances), [check.complaint(self._parts.is_surface) for check in checks]
+        return self._with_copies(distances), [check.complaint(self._parts.operators.is_surface) for check in checks]
 
-    @property
+    @cached_property
     def _originals(self) -> IntArray | None:
         """The vertex (n,) whose values each takes, where seams were merged or points are equal."""
         return None if self._mesh is None or not self._mesh.has_copies else self._mesh.originals
@@ -376,7 +375,7 @@ class HeatMethodSolver(BatchedSolver):
         terms = self._source_terms([chosen])
         distance = self._distances_from_heat(terms, self._heat(terms))[0]
         labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
-        _warn(self._checked(distance, chosen).complaint(self._parts.is_surface))
+        _warn(self._checked(distance, chosen).complaint(self._parts.operators.is_surface))
         distance = cut_off(self._with_copies(distance), beyond)
         labels = self._with_copies(labels)
         labels[np.isinf(distance)] = -1

@@ -10,9 +10,8 @@ import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, SourceError, names_guessed, real_numbers, require_choice
 from heat_igl.heat.heat_transport import HeatTransport
-from heat_igl.heat.options import SolverOptions
 from heat_igl.heat.outward_field import OutwardField
-from heat_igl.heat.parts import prepare
+from heat_igl.heat.parts import SolverOptions, prepare
 from heat_igl.heat.path_transport import PathTransport
 from heat_igl.heat.solver import HeatMethodSolver
 from heat_igl.heat.two_sides import TwoSidedTransport
@@ -20,7 +19,7 @@ from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.linear import Backend
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices, tangent_surface
 from heat_igl.operators import Operators, edge_rotations, operators
-from heat_igl.sources import Sources, ordered_vertices
+from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows import MeshTriangles, WindowEngine
 
@@ -291,7 +290,7 @@ class VectorHeatSolver:
         return self._with_copies(self._transport.log_map(int(vertices[0])))
 
     def _vertices(self, sources: Sources) -> IntArray:
-        return self._with_copies(np.arange(self.n_vertices))[ordered_vertices(sources, self.n_vertices)]
+        return self._with_copies(np.arange(self.n_vertices))[named_vertices(sources, self.n_vertices)]
 
     def _with_copies(self, values: AnyArray) -> AnyArray:
         """Values at n vertices, in which copies have those of their originals."""

@@ -1,4 +1,3 @@
-from heat_igl.intrinsic.adjacency import Adjacency as Adjacency
 from heat_igl.intrinsic.delaunay import intrinsic_delaunay as intrinsic_delaunay
 from heat_igl.intrinsic.frame_axes import tangent_frames as tangent_frames
 from heat_igl.intrinsic.frames import TangentFrames as TangentFrames

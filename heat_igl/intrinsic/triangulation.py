@@ -15,6 +15,7 @@ import numpy as np
 
 from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
 from heat_igl.intrinsic.layout import corner_angles
+from heat_igl.mesh import grouping
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 __all__ = [
@@ -133,6 +134,31 @@ class IntrinsicTriangulation:
     def is_cover(self) -> bool:
         """Whether the triangles cover each face of the surface twice."""
         return any(isinstance(change, Covered) for change in self.history)
+
+    @cached_property
+    def _corners(self) -> grouping.Groups:
+        """The corners of faces at each vertex."""
+        return grouping.group_by_label(self.F.ravel(), self.n)
+
+    def corners_at(self, vertices: IntArray) -> tuple[IntArray, IntArray]:
+        """The corners (k,) of faces at the given vertices, and for each the position of the vertex in `vertices`."""
+        return self._corners.of(vertices)
+
+    def spokes(self, vertices: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Edges from the given vertices: position of the vertex in `vertices`, the other end, and the length.
+
+        An edge comes once for each face at it.
+        """
+        corner, which = self.corners_at(vertices)
+        following, preceding = next_half_edge(corner), previous_half_edge(corner)
+        ends = self.F.ravel()[np.concatenate([following, preceding])]
+        lengths = self.l.ravel()[np.concatenate([preceding, following])]
+        return np.concatenate([which, which]), ends, lengths
+
+    def meets_shared_edge(self, vertices: IntArray) -> bool:
+        """Whether a face at one of the vertices has an edge of more than two faces."""
+        corner, _ = self.corners_at(vertices)
+        return bool((self.twin.reshape(-1, 3)[corner // 3] == -2).any())
 
     def locate(self, faces: IntArray, barycentric: FloatArray, on_back: bool = False) -> tuple[IntArray, FloatArray]:
         """Points of the mesh, given in faces of the mesh, in these triangles.

@@ -8,6 +8,7 @@ pivoting, for the reason that `SuperLUFactorization` gives.
 from __future__ import annotations
 
 from importlib import import_module
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,18 +17,16 @@ from heat_igl.errors import FactorizationError
 from heat_igl.kernels import builds
 from heat_igl.kernels.signals import raise_caught
 from heat_igl.linear.dissection import dissect
-from heat_igl.linear.fronts import fronts
+from heat_igl.linear.fronts import Fronts, fronts
 from heat_igl.linear.protocols import check_finite, check_probe
-from heat_igl.linear.substitution import Substitution
-from heat_igl.runtime import n_threads, pool
+from heat_igl.runtime import n_threads, pool, side_by_side
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-
-__all__ = ["MultifrontalAnalysis", "MultifrontalFactorization"]
 
 # A pivot that has shrunk to less than this share of the diagonal is rounding.
 _SINGULAR = 1e-13
 
-_kernel = import_module(builds("linear.multifrontal")[0])
+_elimination = import_module(builds("linear.multifrontal")[0])
+_solves = import_module(builds("linear.substitution")[0])
 
 
 class MultifrontalAnalysis:
@@ -65,7 +64,7 @@ class MultifrontalAnalysis:
         """
         data = A.data.astype(np.float64, copy=False)
         is_free = np.ones(A.shape[0], np.uint8) if free is None else free.astype(np.uint8)
-        failed = _kernel.factor(self._ends, self._neighbours, data, is_free, self.fronts, entries, _SINGULAR)
+        failed = _elimination.factor(self._ends, self._neighbours, data, is_free, self.fronts, entries, _SINGULAR)
         if failed >= 0:
             raise_caught()
             raise FactorizationError(f"the matrix ({A.shape[0]} rows) is singular or not positive definite")
@@ -125,3 +124,51 @@ class MultifrontalFactorization:
         self,
     ) -> tuple[type[MultifrontalFactorization], tuple[MultifrontalAnalysis, sp.csc_matrix, BoolArray | None]]:
         return MultifrontalFactorization, self._arguments
+
+
+class Substitution:
+    """Forward substitution with a factor from the leaves of the tree of fronts to the roots, and back.
+
+    The tree is cut into pieces, which are subtrees, and the few fronts above them. Pieces are independent: each stores
+    its updates of the rows above in an array of its own, and these are summed in the order of the pieces. So pieces run
+    in parallel, and the bits of a solution do not depend on the number of threads.
+
+    Parameters
+    ----------
+    fronts : Fronts
+        Layout of the factor.
+    L : (entries,) float64
+        The factor.
+
+    Attributes
+    ----------
+    width : int
+        Right-hand sides that are solved together.
+    few : int
+        Fewer right-hand sides than this are solved faster one by one.
+    """
+
+    width: int = _solves.width
+    few = 4
+
+    def __init__(self, fronts: Fronts, L: FloatArray) -> None:
+        self._kernel = _solves.Substitution(fronts, L)
+        self._end_entry = fronts.end_entry
+        self._above = np.flatnonzero(fronts.above >= 0)
+
+    def solve(self, x: FloatArray) -> None:
+        """Solve in place for x, (n,) or (n, width), in the order of elimination, on this thread's processors."""
+        kernel = self._kernel
+        forward, back = (
+            (kernel.forward_one, kernel.back_one) if x.ndim == 1 else (kernel.forward_block, kernel.back_block)
+        )
+        last = len(self._end_entry) - 2
+        k = max(1, min(n_threads(), last))
+        shares = np.searchsorted(self._end_entry[:last], np.arange(k + 1) / k * self._end_entry[last])
+        ranges = list(pairwise(shares))
+        sums = np.zeros((last + 1, len(self._above), *x.shape[1:]))
+        side_by_side(lambda pieces: forward(x, *pieces, sums), ranges)
+        x[self._above] -= sums.sum(axis=0)
+        forward(x, last, last + 1, sums)
+        back(x, last, last + 1)
+        side_by_side(lambda pieces: back(x, *pieces), ranges)

@@ -11,7 +11,7 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
 from heat_igl.mesh.projection import rows_in_space
-from heat_igl.sources.specification import on_simplex
+from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = ["Oriented", "OrientedPoints", "OrientedSet", "oriented_set"]

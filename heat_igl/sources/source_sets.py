@@ -1,15 +1,16 @@
-"""A set of sources after it was checked: vertices, points in faces and segments of curves, and the values there."""
+"""What a source is: all that a user may pass, checked once, as one set of vertices, points and segments of curves."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeGuard
 
 import numpy as np
 
-from heat_igl.mesh import MeshPart
-from heat_igl.typing import FloatArray, IntArray
-
-__all__ = ["NO_POINTS", "NO_SEGMENTS", "SourcePoints", "SourceSegments", "SourceSet", "nearest_first"]
+from heat_igl.errors import SourceError, real_numbers, refuse_masked
+from heat_igl.mesh import MeshPart, SurfaceCurve, SurfacePoints
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,3 +120,292 @@ def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntAr
     first = np.ones(len(order), bool)
     first[1:] = ordered[1:] != ordered[:-1]
     return np.asarray(order[first])
+
+
+_ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask with one entry per vertex"
+# Barycentric coordinates below this are 0: the point lies on the edge, or in the vertex.
+_ON_RIM = 1e-12
+# At an offset, doubles may be so far apart in mean edge lengths: all distances beyond it are rounded by half of that.
+_COARSEST = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetSources:
+    """Sources at which distance begins at a value of their own.
+
+    Parameters
+    ----------
+    sources : sources
+        Vertices, `SurfacePoints`, a `SurfaceCurve`, or a list of such.
+    offsets : float or (k,) array_like
+        The value at each: one for all, or one for each vertex, point and curve in the order in which they are given.
+
+    Raises
+    ------
+    SourceError
+        If an offset is negative or not finite. That their number fits, and that distances can be told from them, is
+        checked when the sources are used.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(10, 1)
+    >>> starts = heat_igl.OffsetSources([0, 10], [0.0, 4.0])  # the right one begins at 4
+    >>> heat_igl.geodesic_distance(mesh, starts)[:11].round(6).tolist()
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 6.0, 5.0, 4.0]
+    """
+
+    sources: Sources
+    offsets: FloatArray
+
+    def __repr__(self) -> str:
+        return f"OffsetSources({np.size(self.offsets)} offsets)"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "offsets", _checked_offsets(self.offsets))
+
+
+_PLACES = (SurfacePoints, SurfaceCurve, OffsetSources)
+# A list may hold several kinds.
+Sources = int | np.integer[Any] | Sequence[Any] | AnyArray | SurfacePoints | SurfaceCurve | OffsetSources
+
+
+def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
+    """All that a user may pass as sources, as one checked object.
+
+    Sources are counted as they are given: the i-th vertex of a sequence, the i-th set entry of a mask, the i-th of
+    `SurfacePoints`, a curve as one; over the entries of a list one after another.
+
+    Parameters
+    ----------
+    sources : sources
+        A vertex index, a sequence of them, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`, or
+        a list or tuple of such, also nested, as `isolines` returns curves.
+    n : int
+        Number of vertices of the domain.
+    F : (m, 3) int64 or None
+        The triangles that points and curves refer to; None if there are none.
+
+    Raises
+    ------
+    SourceError
+        If there is no source, or one is not on the domain; the message names the first such.
+    """
+    builder = _Builder(n, F)
+    builder.add(sources)
+    return builder.finish()
+
+
+def require_resolved(sources: SourceSet, mean_edge_length: float) -> SourceSet:
+    """The same sources, if distances can be told from the offsets at which they begin.
+
+    Parameters
+    ----------
+    sources : SourceSet
+        Sources on a domain.
+    mean_edge_length : float
+        Of the domain.
+
+    Raises
+    ------
+    SourceError
+        If doubles as large as an offset are farther apart than a thousandth of the mean edge length.
+    """
+    offsets = sources.offsets
+    wrong = np.spacing(offsets) > _COARSEST * mean_edge_length
+    if wrong.any():
+        offset = float(offsets[np.argmax(wrong)])
+        raise SourceError(
+            f"an offset of {offset:.4g} is too large for a mesh with edges of {mean_edge_length:.4g} in the mean: "
+            f"doubles are {np.spacing(offset):.2g} apart there, and distances would be lost; subtract the least offset "
+            "from all, and leave out sources that begin after all others have arrived"
+        )
+    return sources
+
+
+def vertex_sources(sources: Sources, n: int, name: str = "sources") -> IntArray:
+    """The vertices that `sources` names, ascending, each once.
+
+    Parameters
+    ----------
+    sources : int, sequence of int, or (n,) mask of bool
+        Source vertices; repeated ones count once.
+    n : int
+        Number of vertices of the mesh.
+    name : str
+        Name of the argument, for errors.
+
+    Returns
+    -------
+    (k,) int64
+        At least one vertex index in ``range(n)``.
+
+    Raises
+    ------
+    SourceError
+        If there is no source, an index is not in ``range(n)``, the mask has the wrong length, or `sources` is not
+        made of integers or booleans.
+    """
+    return np.asarray(np.unique(named_vertices(sources, n, name)), dtype=np.int64)
+
+
+def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
+    """The vertices that `sources` names, in the order in which they are named; arguments as for `vertex_sources`."""
+    if isinstance(sources, _PLACES):
+        raise SourceError(f"{name} must be {_ACCEPTED} here, not {type(sources).__name__}")
+    refuse_masked(name, sources, SourceError)
+    try:
+        array = np.atleast_1d(np.asarray(sources))
+    except ValueError:
+        raise SourceError(f"{name} must be {_ACCEPTED}, not a ragged sequence") from None
+    if array.dtype.kind == "f" and array.ndim <= 2 and array.shape[-1] == 3:
+        raise SourceError(
+            f"{name} holds floats of shape {array.shape}: for vertices, convert with astype(int); for positions in "
+            f"space, pass the nearest places of the surface, closest_points(mesh, {name}).points"
+        )
+    if array.ndim != 1:
+        raise SourceError(f"{name} must be {_ACCEPTED}, but it has shape {array.shape}")
+    if not len(array):
+        raise SourceError(f"{name} is empty: name at least one vertex")
+    if array.dtype.kind == "b":
+        if len(array) != n:
+            raise SourceError(f"the mask {name} has {len(array)} entries, but the mesh has {n} vertices")
+        if not array.any():
+            raise SourceError(f"the mask {name} selects no vertex: set at least one entry")
+        return np.flatnonzero(array)
+    if array.dtype.kind not in "iu":
+        raise SourceError(f"{name} must be {_ACCEPTED}, not {_first_of_wrong_type(array)}")
+    outside = (array < 0) | (array >= n)
+    if outside.any():
+        first = int(np.flatnonzero(outside)[0])
+        count = f" ({int(outside.sum())} of {len(array)} are not)" if len(array) > 1 else ""
+        raise SourceError(
+            f"{name}[{first}] = {array[first]} is no vertex{count}: the mesh has {n} vertices, so indices run from 0 "
+            f"to {n - 1}"
+        )
+    return np.asarray(array, dtype=np.int64)
+
+
+def _first_of_wrong_type(array: AnyArray) -> str:
+    if array.dtype.kind == "f":
+        return f"floats such as {array[0]}; convert with int()"
+    return f"{array.dtype} such as {array.ravel()[0]!r}"
+
+
+def _checked_offsets(offsets: ArrayLike) -> FloatArray:
+    array = real_numbers("offsets", offsets, SourceError)
+    if array.ndim > 1:
+        raise SourceError(f"offsets must be one number or one for each source, not of shape {array.shape}")
+    wrong = ~(np.isfinite(array) & (array >= 0))
+    if wrong.any():
+        first = int(np.flatnonzero(np.atleast_1d(wrong))[0])
+        which = f"offsets[{first}]" if array.ndim else "offsets"
+        raise SourceError(f"{which} = {np.atleast_1d(array)[first]} must be finite and not negative")
+    return array
+
+
+def _holds_places(sources: object) -> TypeGuard[Sequence[Any]]:
+    """Whether a list, or one inside of it such as those of `isolines`, holds points or curves."""
+    if not isinstance(sources, Sequence) or isinstance(sources, (str, bytes, range)):
+        return False
+    return any(isinstance(part, _PLACES) or _holds_places(part) for part in sources)
+
+
+class _Builder:
+    """Collects the parts of a set and counts the sources."""
+
+    def __init__(self, n: int, F: IntArray | None) -> None:
+        self._n, self._F = n, F
+        self._offset = np.empty(0)  # of each source so far
+        self._vertices: list[tuple[IntArray, IntArray]] = []
+        self._points: list[tuple[SurfacePoints, IntArray]] = []
+        self._curves: list[tuple[SurfaceCurve, int]] = []
+
+    def add(self, sources: Sources) -> None:
+        start = len(self._offset)
+        if isinstance(sources, OffsetSources):
+            self.add(sources.sources)
+            k = len(self._offset) - start
+            if sources.offsets.ndim and len(sources.offsets) != k:
+                raise SourceError(
+                    f"offsets has {len(sources.offsets)} entries for {k} sources: give one for each, or one number"
+                )
+            self._offset[start:] += sources.offsets
+        elif isinstance(sources, SurfacePoints):
+            self._check_faces(sources.faces)
+            self._points.append((sources, self._counted(len(sources))))
+        elif isinstance(sources, SurfaceCurve):
+            self._check_faces(sources.faces)
+            label = self._counted(1)
+            if (sources.start == sources.end).all():
+                # A curve without length, such as the path from a vertex to itself, gives no heat. It is a point.
+                self._points.append((SurfacePoints(sources.faces[:1], sources.start[:1]), label))
+            else:
+                self._curves.append((sources, int(label[0])))
+        elif _holds_places(sources):
+            for i, part in enumerate(sources):
+                try:
+                    self.add(part)
+                except SourceError as error:
+                    raise SourceError(f"sources[{i}]: {error}") from None
+        else:
+            vertices = named_vertices(sources, self._n)
+            self._vertices.append((vertices, self._counted(len(vertices))))
+
+    def _counted(self, k: int) -> IntArray:
+        start = len(self._offset)
+        self._offset = np.concatenate([self._offset, np.zeros(k)])
+        return np.arange(start, start + k)
+
+    def _check_faces(self, faces: IntArray) -> None:
+        if self._F is None:
+            raise SourceError("points and curves lie on triangles, and this domain has none: name vertices")
+        outside = (faces < 0) | (faces >= len(self._F))
+        if outside.any():
+            first = int(np.flatnonzero(outside)[0])
+            raise SourceError(f"faces[{first}] = {faces[first]} is no face: indices run from 0 to {len(self._F) - 1}")
+
+    def finish(self) -> SourceSet:
+        points = self._points_in_faces() if self._points else NO_POINTS
+        vertices, label = _concatenated(self._vertices, (_NOWHERE, _NOWHERE))
+        # A vertex that is named twice is the one with the smallest offset; of equal ones, the first.
+        kept = nearest_first(vertices, self._offset[label], label)
+        label = label[kept]
+        return SourceSet(
+            vertices=vertices[kept],
+            vertex_label=label,
+            vertex_offset=self._offset[label],
+            points=points,
+            segments=self._all_segments() if self._curves else NO_SEGMENTS,
+            n_labels=len(self._offset),
+        )
+
+    def _points_in_faces(self) -> SourcePoints:
+        """All points but those in a vertex, which are counted among the vertices."""
+        none = (_NOWHERE, np.empty((0, 3)), _NOWHERE)
+        faces, barycentric, label = _concatenated([(p.faces, p.barycentric, label) for p, label in self._points], none)
+        barycentric = on_simplex(barycentric)
+        in_vertex = barycentric.max(axis=1) == 1
+        if self._F is not None and in_vertex.any():
+            corner = barycentric[in_vertex].argmax(axis=1)
+            self._vertices.append((self._F[faces[in_vertex], corner], label[in_vertex]))
+        inside = ~in_vertex
+        label = label[inside]
+        return SourcePoints(faces[inside], barycentric[inside], label, self._offset[label])
+
+    def _all_segments(self) -> SourceSegments:
+        none = (_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWHERE)
+        faces, start, end, label = _concatenated(
+            [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves], none
+        )
+        return SourceSegments(faces, on_simplex(start), on_simplex(end), label, self._offset[label])
+
+
+def on_simplex(barycentric: FloatArray) -> FloatArray:
+    """The same, with places that are as good as an edge or a vertex put there."""
+    kept = np.where(barycentric < _ON_RIM, 0.0, barycentric)
+    return np.asarray(kept / kept.sum(axis=1, keepdims=True))
+
+
+def _concatenated(rows: list[tuple[Any, ...]], none: tuple[AnyArray, ...]) -> tuple[AnyArray, ...]:
+    return rows[0] if len(rows) == 1 else tuple(np.concatenate(column) for column in zip(none, *rows, strict=True))

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from heat_igl.linear import Backend, factorize
 from heat_igl.operators import Operators, with_rotations
 from heat_igl.steps.fitted import fitted_laplacian
-from heat_igl.steps.pattern import shifted
+from heat_igl.steps.three_steps import shifted
 from heat_igl.typing import AnyArray, FloatArray
 
 __all__ = ["VectorHeatFlow"]

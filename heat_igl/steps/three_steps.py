@@ -1,0 +1,463 @@
+"""The three steps of the heat method: diffuse, normalize, integrate (Algorithm 1 of the paper)."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+import scipy.sparse as sp
+
+from heat_igl.errors import require_choice
+from heat_igl.kernels.heat.divergence import divergence_of_descent
+from heat_igl.linear import Analysis, Backend, Factorization, analyse
+from heat_igl.operators import Operators, TriangleElements
+from heat_igl.runtime import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT
+from heat_igl.steps.fitted import fitted_laplacian
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+Boundary = Literal["neumann", "dirichlet", "average"]
+
+# Share of a front's rate of decay from which on a direction is trusted fully; docs/engines.md compares values. Fronts
+# of a fitted flow scatter less.
+_FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
+# At an insulated boundary a front meets the mirror image of itself and falls a little more slowly. A fitted flow is
+# damped there from this share of the rate; without damping a regular grid is 1.84 % wrong instead of 1.68.
+_AT_BOUNDARY = 0.8
+
+
+def analysis(L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:
+    """Order and analyse the pattern that the matrices of the heat flow and of the Poisson problem have in common.
+
+    Of the Laplacian `L` only the pattern matters. An analysis that is `known` is returned as it is if it fits.
+    """
+    pattern = shifted(L, 1.0, np.zeros(L.shape[0]))
+    return known if known is not None and known.fits(pattern) else analyse(pattern, backend)
+
+
+def shifted(L: sp.csc_matrix, factor: float | FloatArray, diagonal: FloatArray) -> sp.csc_matrix:
+    """``L * factor + diag(diagonal)`` with the pattern of L and the whole diagonal, zeros stored.
+
+    `factor` is a number, or one (n,) for each column.
+    """
+    if np.ndim(factor):
+        factor = np.repeat(factor, np.diff(L.indptr))
+    on_diagonal = np.flatnonzero(L.indices == np.repeat(np.arange(len(diagonal)), np.diff(L.indptr)))
+    if len(on_diagonal) == len(diagonal):
+        data = factor * L.data
+        data[on_diagonal] += diagonal
+        return sp.csc_matrix((data, L.indices, L.indptr), shape=L.shape)
+    # Vertices that no face uses have no entry of their own.
+    entries = sp.csc_matrix((factor * L.data, L.indices, L.indptr), shape=L.shape).tocoo()
+    everyone = np.arange(len(diagonal))
+    rows, columns = np.append(entries.row, everyone), np.append(entries.col, everyone)
+    return sp.csc_matrix((np.append(entries.data, diagonal), (rows, columns)), shape=L.shape)
+
+
+class HeatFlow:
+    """One backward Euler step of heat flow, (M - t L) u = mean_mass * b, factored.
+
+    Dividing by the mean vertex mass leaves a matrix without a unit, so that a very large right-hand side `b` overflows
+    in no unit of length. If each component has a time step, it is divided by the mean mass of that component.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    t : float or (n_components,) float64
+        Time step, a squared length; one for all components, or one for each.
+    boundary : {"neumann", "dirichlet", "average"}
+        Insulated boundary, boundary held at zero, or the mean of both solutions. Under "dirichlet" heat that is put on
+        a boundary vertex stays there as a fixed value.
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
+        See `factorize`.
+    analysis : Analysis, optional
+        As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew if it does not fit.
+    fitted : bool
+        Whether to take `fitted_laplacian` for L, with which heat falls by the right factor over long edges too.
+
+    Raises
+    ------
+    FactorizationError
+        If M - t L is not positive definite.
+    ValueError
+        If t is not positive, if `boundary` is unknown, or if it holds the heat of all vertices.
+    """
+
+    def __init__(
+        self,
+        operators: Operators,
+        t: float | FloatArray,
+        boundary: Boundary = "neumann",
+        backend: Backend = "auto",
+        analysis: Analysis | None = None,
+        fitted: bool = False,
+    ) -> None:
+        if not (np.isfinite(t).all() and np.min(t) > 0):
+            raise ValueError(f"t must be a positive number (a squared length), not {t!r}")
+        require_choice("boundary", boundary, get_args(Boundary))
+        if not operators.boundary.any():
+            boundary = "neumann"
+        inner = operators.referenced & ~operators.boundary
+        if boundary != "neumann" and not inner.any():
+            raise ValueError(
+                f"boundary={boundary!r} holds the heat on the boundary, and every vertex lies there: take "
+                "boundary='neumann', or divide the faces"
+            )
+        mass = operators.M.diagonal()
+        self.mean_mass = mass_unit(operators, t)
+        L = fitted_laplacian(operators, t) if fitted else operators.L
+        step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
+        matrix = shifted(L, -step / self.mean_mass, mass / self.mean_mass)
+        del L  # as large as the matrix, and not needed while that is factored
+        if analysis is None or not analysis.fits(matrix):
+            analysis = analyse(matrix, backend)
+        self.t = t
+        self.boundary = boundary
+        self.backend = analysis.backend
+        self._neumann: Factorization | None = None
+        self._dirichlet: Factorization | None = None
+        if boundary in ("neumann", "average"):
+            self._neumann = analysis.factorize(matrix, operators.referenced)
+        if boundary in ("dirichlet", "average"):
+            self._dirichlet = analysis.factorize(matrix, inner)
+            self._from_boundary = matrix[:, operators.boundary]
+            self._boundary_diagonal = matrix.diagonal()[operators.boundary]
+            self._on_boundary = operators.boundary
+
+    @property
+    def factors(self) -> list[Factorization]:
+        """The factored matrices, for their sizes."""
+        return [part for part in (self._neumann, self._dirichlet) if part is not None]
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Heat u (n,) or (n, k) after the time step, for initial heat `b` in units of `mean_mass`."""
+        solutions = [] if self._neumann is None else [self._neumann.solve(b)]
+        if self._dirichlet is not None:
+            held = (b[self._on_boundary].T / self._boundary_diagonal).T
+            u = self._dirichlet.solve(b - self._from_boundary @ held if held.any() else b)
+            u[self._on_boundary] = held
+            solutions.append(u)
+        return solutions[0] if len(solutions) == 1 else (solutions[0] + solutions[1]) / 2
+
+
+def mass_unit(operators: Operators, t: float | FloatArray) -> float | FloatArray:
+    """The mean mass by which `HeatFlow` divides: a number, or one (n,) for each vertex if each component has a t."""
+    return operators.expand_to_vertices(operators.mean_masses) if np.ndim(t) else operators.mean_mass
+
+
+def diffuse(operators: Operators, u0: FloatArray, t: float, boundary: Boundary = "neumann") -> FloatArray:
+    """Step 1: heat after one backward Euler step, (M - t L) u = u0, equation (4).
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    u0 : (n,) or (n, k) float64
+        Initial heat, integrated over each vertex's cell: 1 at a source and 0 elsewhere for a Dirac. Distant values
+        fall like exp(-distance / sqrt(t)) and underflow beyond about 700 sqrt(t); a larger value at the source (1e290)
+        doubles that range and changes no direction.
+    t : float
+        Time step, a squared length; the square of the mean edge length is the paper's choice.
+    boundary : {"neumann", "dirichlet", "average"}
+        See `HeatFlow`.
+
+    Returns
+    -------
+    (n,) or (n, k) float64
+        Heat per area, u. Not negative if `operators.L` has no negative weight; 0 at unreferenced vertices.
+    """
+    flow = HeatFlow(operators, t, boundary)
+    return flow.solve(np.asarray(u0, dtype=np.float64) / flow.mean_mass)
+
+
+def smallest_time_step(domain: Operators, fitted: bool = False) -> float:
+    """The smallest time step whose heat crosses `domain` without underflow in double precision.
+
+    Along a line of edges of length h, one backward Euler step falls by acosh(1 + h^2 / (2 t)) e-foldings per edge, and
+    by h / sqrt(t) if the flow is `fitted`. The result makes that, times the number of edges across, `RANGE_LIMIT`.
+    """
+    return _smallest(domain.longest_distance, domain.mean_edge_length, fitted)
+
+
+def smallest_time_steps(domain: Operators, fitted: bool) -> FloatArray:
+    """`smallest_time_step` (n_components,) of each component."""
+    if domain.longest_distances is None or domain.n_components == 1:
+        return np.full(domain.n_components, smallest_time_step(domain, fitted))
+    of_component = zip(domain.longest_distances, domain.mean_edge_lengths, strict=True)
+    return np.array([_smallest(longest, h, fitted) if longest > 0 else 0.0 for longest, h in of_component])
+
+
+def _smallest(longest: float, h: float, fitted: bool) -> float:
+    """`smallest_time_step` for a longest distance and a mean edge length."""
+    if fitted:
+        return float((longest / RANGE_LIMIT) ** 2)
+    per_edge = RANGE_LIMIT / (longest / h)
+    return float(h**2 / (2 * (float(np.cosh(per_edge)) - 1))) if per_edge < LARGEST_EXPONENT else 0.0
+
+
+def normalize(operators: Operators, u: FloatArray, of_log: bool = False) -> FloatArray:
+    """Step 2: the unit field X = -grad u / |grad u| that points away from the heat.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    u : (n,) or (n, k) float64
+        Heat; only the direction of descent matters.
+    of_log : bool
+        Take the direction of grad log u instead, on faces with u not below 1e-300. Both are the same but for
+        interpolation: log u is nearly linear if u is nearly exponential.
+
+    Returns
+    -------
+    (d m,) or (d m, k) float64
+        Unit vectors; 0 on faces with a gradient of zero or below 1e-300, which have no direction.
+    """
+    gradient = operators.gradient_rows @ u
+    components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
+    # Squares of entries below 1e-154 would vanish, and heat far away is far below that; so each face is divided by its
+    # largest entry before the norm is taken.
+    largest = np.abs(components).max(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        components /= largest
+        components /= -np.sqrt(np.einsum("k...,k...->...", components, components))
+    components[:, largest < LOWEST_HEAT] = 0
+    if of_log:
+        along_log = normalize(operators, np.log(u, out=np.full_like(u, np.nan), where=u >= LOWEST_HEAT))
+        np.copyto(gradient, along_log, where=np.isfinite(along_log))
+    return np.asarray(gradient)
+
+
+def damping(
+    operators: Operators, u: FloatArray, t: float | FloatArray, full_rate: float | None = None, fitted: bool = False
+) -> FloatArray:
+    """The magnitude of the field on each face: 1 almost everywhere, less if heat arrives from several sides.
+
+    A front of heat falls by the same factor over each length, |grad log u| = 1 / sqrt(t) for small faces and in a
+    fitted flow, else by arccosh(1 + l^2 / (2 t)) over an edge of length l on large ones. If fronts meet, at the cut
+    locus and between two sources, it falls more slowly, and the distance has no gradient of length 1 there either.
+    Integrating a unit field all the same overestimates distance on both sides.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    u : (n,) or (n, k) float64
+        Heat.
+    t : float or (n_components,) float64
+        Time step that the heat was made with.
+    full_rate : float, optional
+        Share of a front's rate from which on a direction is trusted fully: on a mesh, fronts scatter by some percent
+        around 1. 0.95 for a fitted flow and 0.9 else; docs/engines.md compares values.
+    fitted : bool
+        Whether the heat comes from a fitted `HeatFlow`.
+
+    Returns
+    -------
+    (m,) or (m, k) float64
+        Factor of X on each face, between 0 and 1; 1 if u is not positive. On faces with a corner on the boundary, which
+        mirrors the front if it is insulated, a slower rate is enough, and the factor is 1 if the flow is not `fitted`.
+    """
+    return _share_of_rate(operators, u, lowest_full_rate(operators, t, fitted, full_rate))
+
+
+def _share_of_rate(operators: Operators, u: FloatArray, full_rate: FloatArray) -> FloatArray:
+    """|grad log u| over `full_rate` (m,), 1 if it is more, `full_rate` is 0 or u is not positive."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gradient = operators.gradient_rows @ np.log(u)
+        components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
+        rate = np.sqrt(np.einsum("k...,k...->...", components, components))
+        share = (rate.T / full_rate).T
+    return np.asarray(np.where(share < 1, share, 1.0))
+
+
+def lowest_full_rate(
+    operators: Operators, t: float | FloatArray, fitted: bool, full_rate: float | None = None
+) -> FloatArray:
+    """The rate (m,), in e-foldings per length, from which on a direction is trusted fully."""
+    if full_rate is None:
+        full_rate = _FULL_RATE_FITTED if fitted else _FULL_RATE
+    if isinstance(t, np.ndarray):
+        t = operators.expand_to_faces(t)
+    lowest = full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
+    lowest[operators.boundary_faces] *= _AT_BOUNDARY if fitted else 0.0
+    return np.asarray(lowest)
+
+
+def _front_rate(operators: Operators, t: float | FloatArray) -> FloatArray:
+    """How fast a front of heat falls on each face (m,), in e-foldings per length, if the flow is not fitted."""
+    size = operators.face_sizes
+    # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 if size^2 is lost beside 1: faces of no size at all.
+    return np.asarray(2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
+
+
+class DivergenceTables(NamedTuple):
+    """All that the divergence takes of a triangulation, a row per face, so that a pass reads little memory.
+
+    Attributes
+    ----------
+    order : (n,) int
+        The vertices as they are visited.
+    corners : (m, 3) int32
+        Places in `order`; the faces in the order of their first corners there.
+    numbers : (m, 5) float64
+        One over the length of the side from corner 0 to corner 1; the foot of corner 2 on it, from 0 to 1 between the
+        two; one over the height. Then the area, and one over the square of the rate below which a direction is not
+        trusted fully.
+    """
+
+    order: IntArray
+    corners: AnyArray
+    numbers: FloatArray
+
+
+def divergence_tables(
+    elements: TriangleElements, weights: FloatArray, full_rate: FloatArray, order: IntArray | None
+) -> DivergenceTables:
+    """The tables of `elements`, for faces of area `weights` (m,) and vertices visited in `order`.
+
+    `full_rate` (m,) is the rate of decay from which on a direction is trusted fully, 0 for any.
+    """
+    F = elements.corners
+    n, m = 1 + int(F.max(initial=-1)) if order is None else len(order), len(F)
+    order = np.arange(n) if order is None else order
+    place = np.empty(n, np.int32)
+    place[order] = np.arange(n, dtype=np.int32)
+    corners = place[F]
+    first = np.minimum(np.minimum(corners[:, 0], corners[:, 1]), corners[:, 2])
+    # No two of these numbers are equal, so that every way of sorting gives the same.
+    by_first = np.sort(first.astype(np.int64) * m + np.arange(m)) % m
+    numbers = np.empty((m, 5))
+    with np.errstate(divide="ignore"):
+        for column, values in enumerate((*elements.frames(), weights, full_rate**-2.0)):
+            numbers[:, column] = values[by_first]
+    return DivergenceTables(order, corners[by_first], numbers)
+
+
+def normalized_divergence(t: DivergenceTables, u: FloatArray, smallest: float, of_log: bool = False) -> FloatArray:
+    """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate if that is below 1.
+
+    It follows the gradient of log u if `of_log`, on faces with no corner below `smallest`. It is 0 if no
+    component of grad u reaches `smallest`, and of length 1 if u is not positive.
+    """
+    divergence = np.zeros(u.shape)
+    for column, of_column in zip(u.T, divergence.T, strict=True):
+        ordered = column[t.order].astype(np.float64, copy=False)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            log_u = np.log(ordered)
+        of_column[t.order] = divergence_of_descent(t.corners, t.numbers, ordered, log_u, smallest, of_log)
+    return divergence
+
+
+class NormalizedDivergence:
+    """The right-hand side of step 3: the divergence of the field X of step 2.
+
+    The same as ``D @ (damping(...) * normalize(...))`` to rounding. For triangles there is a compiled kernel, one pass
+    over the faces that stores no field; the tables are made once.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    t : float or (n_components,) float64, optional
+        Time step that the heat was made with, to have the field damped by `damping`; it has length 1 otherwise.
+    order : (n,) int, optional
+        All vertices, near ones near each other, to read memory in; that of the mesh may jump, and a pass that waits for
+        memory takes several times as long.
+    fitted : bool
+        Whether the heat comes from a fitted `HeatFlow`; the field then follows the gradient of log u.
+    """
+
+    def __init__(
+        self,
+        operators: Operators,
+        t: float | FloatArray | None = None,
+        order: IntArray | None = None,
+        fitted: bool = False,
+    ) -> None:
+        self._arguments = operators, t, order, fitted
+        self._full_rate: FloatArray | None = None
+        self._tables: DivergenceTables | None = None
+        full_rate = None if t is None else lowest_full_rate(operators, t, fitted)
+        if isinstance(operators.gradient, TriangleElements):
+            full_rate = np.zeros(len(operators.weights)) if full_rate is None else full_rate
+            self._tables = divergence_tables(operators.gradient, operators.weights, full_rate, order)
+        else:
+            self._full_rate = full_rate
+            _ = operators.D  # made on first use otherwise, in the middle of the first query
+
+    def divergence(self, u: FloatArray) -> FloatArray:
+        """Integrated divergence (n, k) for heat (n, k)."""
+        operators, _, _, fitted = self._arguments
+        if self._tables is not None:
+            return normalized_divergence(self._tables, u, LOWEST_HEAT, fitted)
+        divergence = np.empty(u.shape)
+        # One column at a time: the field of all takes more memory than the caches hold.
+        for column, of_column in zip(np.ascontiguousarray(u.T), divergence.T, strict=True):
+            X = normalize(operators, column, fitted)
+            if self._full_rate is not None:
+                X *= np.tile(_share_of_rate(operators, column, self._full_rate), operators.dimension)
+            of_column[:] = operators.D @ X
+        return divergence
+
+    def __reduce__(
+        self,
+    ) -> tuple[type[NormalizedDivergence], tuple[Operators, float | FloatArray | None, IntArray | None, bool]]:
+        return NormalizedDivergence, self._arguments
+
+
+class PoissonProblem:
+    """L phi = b, factored, with one vertex of each component grounded.
+
+    The constants on each component are the null space of L. Fixing one value in each removes the null space and changes
+    nothing else; adding a small multiple of the identity instead would distort the solution on large domains.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    backend : {"auto", "scipy", "multifrontal", "iterative"}
+        See `factorize`.
+    analysis : Analysis, optional
+        As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew if it does not fit.
+
+    Raises
+    ------
+    FactorizationError
+        If -L without the grounded vertices is not positive definite.
+    """
+
+    def __init__(self, operators: Operators, backend: Backend = "auto", analysis: Analysis | None = None) -> None:
+        free = operators.referenced.copy()
+        # The first vertex of every component; components without faces are not free anyway.
+        free[np.unique(operators.components, return_index=True)[1]] = False
+        # Here, and only here, the sign changes: L is negative semidefinite, factors need a positive definite matrix.
+        matrix = shifted(operators.L, -1.0, np.zeros(operators.n))
+        if analysis is None or not analysis.fits(matrix):
+            analysis = analyse(matrix, backend)
+        self.backend = analysis.backend
+        self.factor = analysis.factorize(matrix, free)
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """The solution phi, 0 at the grounded vertices. On each component b must sum to 0, as a divergence does."""
+        phi = self.factor.solve(b)
+        # The right-hand side's sign, turned afterwards and in place: at a million vertices a copy costs milliseconds.
+        return np.asarray(np.subtract(0.0, phi, out=phi))
+
+
+def integrate(operators: Operators, X: FloatArray) -> FloatArray:
+    """Step 3: the function whose gradient is closest to X, L phi = D X.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    X : (d m,) or (d m, k) float64
+        Vector field, constant per face, stacked by coordinate.
+
+    Returns
+    -------
+    (n,) or (n, k) float64
+        phi, determined up to a constant on each component: 0 at the first vertex of each.
+    """
+    return PoissonProblem(operators).solve(operators.D @ X)
