@@ -12,6 +12,7 @@ from surfaces import moebius_strip
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, OffsetSources, SurfacePoints, shapes
+from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 
 
 def moved(mesh: Mesh, amount: float = 0.15) -> Mesh:
@@ -76,6 +77,29 @@ def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str) 
     np.testing.assert_allclose(dV.sum(axis=0), 0, atol=1e-10 * np.abs(dV).sum())
     np.testing.assert_allclose(np.cross(mesh.V, dV).sum(axis=0), 0, atol=1e-10 * np.abs(dV).sum())
     assert (dV * mesh.V).sum() == pytest.approx((g * distance).sum(), abs=1e-10 * scale)
+
+
+def test_scaling_gives_the_distance_where_faces_have_a_vertex_twice() -> None:
+    """Double pyramids with far tips: their intrinsic Delaunay triangles fold around edges from a vertex to itself."""
+    rng, n_folded = np.random.default_rng(3), 0
+    for _ in range(20):
+        k = int(rng.integers(3, 7))
+        turn = np.sort(rng.random(k)) * 2 * np.pi
+        rim = rng.uniform(0.02, 0.5) * np.stack([np.cos(turn), np.sin(turn), np.zeros(k)], axis=1)
+        here, ahead = np.arange(k), np.roll(np.arange(k), -1)
+        F = np.concatenate(
+            [np.stack([*side, np.full(k, tip)], axis=1) for side, tip in (((here, ahead), k), ((ahead, here), k + 1))]
+        )
+        mesh = Mesh(np.vstack([rim, rng.standard_normal((2, 3)) * [3, 1, 0.3]]), F)
+        corners = np.sort(intrinsic_delaunay(intrinsic_triangulation(mesh)).F, axis=1)
+        n_folded += (np.diff(corners, axis=1) == 0).any()
+        places = rng.dirichlet([1, 1, 1], 2)
+        for sources in ([0], SurfacePoints(rng.integers(0, 2 * k, 2), places)):
+            distance, pull_back = GeodesicSolver(mesh).distance_vjp(sources)
+            assert not len(pull_back.inexact)
+            g = rng.standard_normal(mesh.n_vertices)
+            assert (pull_back(g) * mesh.V).sum() == pytest.approx((g * distance).sum(), rel=1e-9, abs=1e-9)
+    assert n_folded > 15
 
 
 def test_on_a_flat_convex_mesh_the_ends_move_along_the_line() -> None:
