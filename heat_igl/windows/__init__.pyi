@@ -4,6 +4,7 @@ from heat_igl.windows.directions import WindowWays as WindowWays
 from heat_igl.windows.directions import in_circle as in_circle
 from heat_igl.windows.engine import Engine as Engine
 from heat_igl.windows.engine import GuardedEngine as GuardedEngine
+from heat_igl.windows.engine import Invariants as Invariants
 from heat_igl.windows.engine import MeshTriangles as MeshTriangles
 from heat_igl.windows.engine import OperatorTriangles as OperatorTriangles
 from heat_igl.windows.engine import Triangles as Triangles
@@ -15,7 +16,6 @@ from heat_igl.windows.exact import ExactSurface as ExactSurface
 from heat_igl.windows.exact import Origin as Origin
 from heat_igl.windows.exact import exact_distance as exact_distance
 from heat_igl.windows.from_vertex import vectors_from as vectors_from
-from heat_igl.windows.invariants import Invariants as Invariants
 from heat_igl.windows.local import blocks_within as blocks_within
 from heat_igl.windows.local import distances_within as distances_within
 from heat_igl.windows.local import nearest_vertices as nearest_vertices

@@ -13,8 +13,8 @@ from heat_igl.kernels.signals import raise_caught
 from heat_igl.kernels.windows import windows
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.windows.engine import ROUNDING
 from heat_igl.windows.exact import TOLERANCE, Found, Leaving
-from heat_igl.windows.invariants import ROUNDING
 from heat_igl.windows.tables import Tables
 
 __all__ = [
