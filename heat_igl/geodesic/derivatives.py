@@ -9,7 +9,6 @@ docs/derivatives.md derives each step.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -17,57 +16,17 @@ from heat_igl.errors import MeshError, real_numbers
 from heat_igl.intrinsic import Merged
 from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back
 from heat_igl.intrinsic.place_derivatives import PlaceSlopes
-from heat_igl.kernels.mesh import side_derivatives as kernels
 from heat_igl.mesh import Mesh, PointCloud
-from heat_igl.operators import MetricSides, Surface
+from heat_igl.operators import MetricSides, SideLengths, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import Change, PathLengths
 
-__all__ = ["DistanceDerivative", "SideLengths", "SidesOfMesh", "differentiable_surface"]
+__all__ = ["DistanceDerivative", "differentiable_surface"]
 
 # A distance that differs from the length of the path by more than this fraction is not the length of that path.
 # Rounding is below 1e-14; in flat parts other paths are longer by 1e-13 to 1e-9, with derivatives that differ by 1e-3.
 _SAME = 1e-12
-
-
-class SidesOfMesh(Protocol):
-    """The lengths of the sides of a mesh's faces as functions of the positions of the vertices."""
-
-    @property
-    def mesh(self) -> Mesh:
-        """The mesh."""
-
-    def by_positions(self, by_side: FloatArray) -> FloatArray:
-        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
-
-    def push_positions(self, dV: FloatArray) -> FloatArray:
-        """How the lengths (m, 3) change when the vertices move by dV (n, 3)."""
-
-
-class SideLengths:
-    """Distances of the ends of the sides in space.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        m triangles on n vertices.
-    """
-
-    def __init__(self, mesh: Mesh) -> None:
-        self.mesh = mesh
-
-    def by_positions(self, by_side: FloatArray) -> FloatArray:
-        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
-        by_position = np.zeros((self.mesh.n_vertices, 3))
-        kernels.pull_to_positions(self.mesh.F, self.mesh.V, by_side, by_position)
-        return by_position
-
-    def push_positions(self, dV: FloatArray) -> FloatArray:
-        """How the lengths (m, 3) change when the vertices move by dV (n, 3); not at all for sides without length."""
-        by_side = np.empty(self.mesh.F.shape)
-        kernels.push_to_sides(self.mesh.F, self.mesh.V, np.ascontiguousarray(dV), by_side)
-        return by_side
 
 
 class DistanceDerivative:
@@ -91,7 +50,7 @@ class DistanceDerivative:
         distance: FloatArray,
         sources: SourceSet,
         surface: Surface,
-        sides: SidesOfMesh | None,
+        sides: SideLengths | None,
         paths: PathLengths,
     ) -> None:
         self.distance, self._sources, self._sides, self._paths = distance, sources, sides, paths
@@ -240,7 +199,7 @@ class DistanceDerivative:
         distance = self.distance[reached]
         return np.asarray(reached[np.abs(self._paths.lengths()[reached] - distance) > _SAME * distance])
 
-    def _positions(self) -> SidesOfMesh:
+    def _positions(self) -> SideLengths:
         if self._sides is None:
             raise MeshError(
                 "the solver was made without positions, so there are no vertices to move: use by_lengths for the "

@@ -20,7 +20,7 @@ from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
 
 if TYPE_CHECKING:
-    from heat_igl.geodesic.derivatives import DistanceDerivative, SidesOfMesh
+    from heat_igl.geodesic.derivatives import DistanceDerivative
     from heat_igl.heat.directions import Directions
     from heat_igl.intrinsic import TangentFrames
     from heat_igl.sweep.simplex_derivative import SimplexDerivative
@@ -320,7 +320,8 @@ class GeodesicSolver(BatchedSolver):
         if isinstance(self._engine, SimplexEngine):
             answer = self._engine.derivative(self._source_set(sources))
             return answer.distance, answer
-        from heat_igl.geodesic.derivatives import DistanceDerivative, SideLengths, differentiable_surface
+        from heat_igl.geodesic.derivatives import DistanceDerivative, differentiable_surface
+        from heat_igl.operators import SideLengths
 
         engine, chosen, domain = self._windows("derivatives are those of"), self._source_set(sources), self._domain
         surface = differentiable_surface(
@@ -328,7 +329,7 @@ class GeodesicSolver(BatchedSolver):
             chosen,
             None if isinstance(domain, Operators) else domain,
         )
-        sides: SidesOfMesh | None = SideLengths(domain) if isinstance(domain, Mesh) else None
+        sides = SideLengths(domain) if isinstance(domain, Mesh) else None
         if isinstance(domain, Operators):
             sides = domain.metric
         distance = self.distance(sources)

@@ -15,6 +15,7 @@ from heat_igl.operators.matrices import divergence_matrix as divergence_matrix
 from heat_igl.operators.metric import fibre_metric as fibre_metric
 from heat_igl.operators.metric import metric_operators as metric_operators
 from heat_igl.operators.metric_derivatives import MetricSides as MetricSides
+from heat_igl.operators.metric_derivatives import SideLengths as SideLengths
 from heat_igl.operators.metric_simplices import MetricSimplices as MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators as point_cloud_operators
 from heat_igl.operators.simplices import cotan_operators as cotan_operators

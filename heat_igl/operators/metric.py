@@ -107,7 +107,7 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
     domain = operators_in_metric(mesh, _checked(g, mesh), laplacian)
     if domain.surface is None:
         return domain
-    return replace(domain, metric=MetricSides.of(mesh, metric))
+    return replace(domain, metric=MetricSides(mesh, metric))
 
 
 def fibre_metric(

@@ -1,4 +1,4 @@
-"""The derivative of a function of edge lengths in a metric, by the metric and by the positions of the vertices."""
+"""Derivatives of a function of edge lengths by the positions of the vertices, and by a metric."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from heat_igl.mesh import Mesh
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["MetricSides", "plane_axes"]
+__all__ = ["MetricSides", "SideLengths", "plane_axes"]
 
 
 def plane_axes(mesh: Mesh) -> FloatArray:
@@ -21,35 +21,64 @@ def plane_axes(mesh: Mesh) -> FloatArray:
     return np.stack([x, y], axis=1)
 
 
-class MetricSides:
+class SideLengths:
+    """The lengths of the sides of a mesh's faces as functions of the positions of the vertices, in space.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        m triangles on n vertices.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        tail, head = mesh.edges.T
+        length = mesh.edge_lengths
+        # The derivative (3, k) of the length of each edge by the vector along it; 0 for edges without length.
+        along = np.stack([x[head] - x[tail] for x in mesh.V.T])
+        self.mesh, self._slopes = mesh, np.divide(along, length, out=along, where=length > 0)
+
+    def by_positions(self, by_side: FloatArray) -> FloatArray:
+        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
+        (tail, head), n = self.mesh.edges.T, self.mesh.n_vertices
+        pull = np.bincount(self.mesh.facets.of_face.ravel(), by_side.ravel()) * self._slopes
+        return np.stack([np.bincount(head, part, n) - np.bincount(tail, part, n) for part in pull], axis=1)
+
+    def push_positions(self, dV: FloatArray) -> FloatArray:
+        """How the lengths (m, 3) change when the vertices move by dV (n, 3)."""
+        tail, head = self.mesh.edges.T
+        change = sum(slope * (x[head] - x[tail]) for slope, x in zip(self._slopes, dV.T, strict=True))
+        return np.asarray(change)[self.mesh.facets.of_face]
+
+
+class MetricSides(SideLengths):
     """The lengths of sides s = sqrt(e^T g e), e along a side; an edge has the mean of what the faces at it say.
+
+    Derivatives by positions have the metric fixed in space.
 
     Parameters
     ----------
     mesh : Mesh
         m triangles.
     metric : (m, 3, 3) or (m, 2, 2) array_like
-        As for `metric_operators`.
-    along : (m, 3, 3) or (m, 3, 2) float64
-        The vector e along the side opposite each corner, from the next corner to the one after, as `metric` takes it.
+        A checked metric, as for `metric_operators`.
     """
 
-    def __init__(self, mesh: Mesh, metric: ArrayLike, along: FloatArray) -> None:
-        self.mesh, self._along = mesh, along
-        given = np.asarray(metric, np.float64)
+    def __init__(self, mesh: Mesh, metric: ArrayLike) -> None:
+        self.mesh, given = mesh, np.asarray(metric, np.float64)
         self._metric = (given + np.swapaxes(given, 1, 2)) / 2
-        # g e over s: the derivative of s by e.
-        self._slopes = np.einsum("mij,mcj->mci", self._metric, along)
-        self._own = np.sqrt(np.einsum("mci,mci->mc", self._slopes, along))
-        self._slopes /= self._own[..., None]
-
-    @classmethod
-    def of(cls, mesh: Mesh, metric: ArrayLike) -> MetricSides:
-        """Those in a checked metric (m, 3, 3) or (m, 2, 2)."""
         corners = mesh.V[mesh.F]
-        if np.shape(metric)[1] == 2:
+        if given.shape[1] == 2:
             corners = np.einsum("mkx,mcx->mck", plane_axes(mesh), corners - corners[:, :1])
-        return cls(mesh, metric, np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1))
+        # From the next corner to the one after.
+        self._along = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
+        slopes = np.einsum("mij,mcj->mci", self._metric, self._along)
+        self._own = np.sqrt(np.einsum("mci,mci->mc", slopes, self._along))
+        is_ascending = mesh.F[:, [1, 2, 0]] < mesh.F[:, [2, 0, 1]]
+        slopes /= np.where(is_ascending, self._own, -self._own)[..., None]
+        of_side = mesh.facets.of_face.ravel()
+        self._n_faces = np.bincount(of_side)
+        columns = slopes.reshape(len(of_side), -1).T
+        self._slopes = np.stack([np.bincount(of_side, column) / self._n_faces for column in columns])
 
     def by_metric(self, by_side: FloatArray) -> FloatArray:
         """The derivative by the metric, in the shape in which it was given, from that by the lengths (m, 3)."""
@@ -63,26 +92,19 @@ class MetricSides:
         return np.asarray(-own * np.sqrt(self._metric[:, 0, 0]))
 
     def by_positions(self, by_side: FloatArray) -> FloatArray:
-        """The derivative (n, 3) by the positions of the vertices, the metric fixed in space."""
+        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
         self._check_in_space()
-        pull = self._mean(by_side)[..., None] * self._slopes
-        on_corners = np.roll(pull, -1, axis=1) - np.roll(pull, 1, axis=1)
-        result = np.zeros_like(self.mesh.V)
-        np.add.at(result, self.mesh.F, on_corners)
-        return result
+        return super().by_positions(by_side)
 
     def push_positions(self, dV: FloatArray) -> FloatArray:
-        """How the lengths (m, 3) change when the vertices move by dV (n, 3), the metric fixed in space."""
+        """How the lengths (m, 3) change when the vertices move by dV (n, 3)."""
         self._check_in_space()
-        corners = dV[self.mesh.F]
-        along = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
-        return self._mean(np.einsum("mci,mci->mc", self._slopes, along))
+        return super().push_positions(dV)
 
     def _mean(self, by_side: FloatArray) -> FloatArray:
         """The mean (m, 3) over the faces at each edge."""
         of_side = self.mesh.facets.of_face
-        count = np.bincount(of_side.ravel())
-        return np.asarray((np.bincount(of_side.ravel(), by_side.ravel()) / count)[of_side])
+        return np.asarray((np.bincount(of_side.ravel(), by_side.ravel()) / self._n_faces)[of_side])
 
     def _check_in_space(self) -> None:
         if self._metric.shape[1] == 2:

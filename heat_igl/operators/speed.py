@@ -65,7 +65,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2)
     if domain.surface is None:
         return domain
-    return replace(domain, metric=MetricSides.of(mesh, np.eye(3) / s[:, None, None] ** 2))
+    return replace(domain, metric=MetricSides(mesh, np.eye(3) / s[:, None, None] ** 2))
 
 
 # Lengths in the metric are squared, and their fourth powers give areas; edges may be longer and shorter than 1.

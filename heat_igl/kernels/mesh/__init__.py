@@ -11,7 +11,6 @@ goes through these modules, as far as its use needs:
 4. `refinement` splits faces of a Delaunay triangulation and flips edges until no angle is small, and records the moves;
    `carrying` finds the faces that points are in after them.
 5. `polar_angles` sums the angles around vertices for tangent frames.
-6. `side_derivatives` leads derivatives by edge lengths back to the positions.
 
 `bounds` and `checking` are about distances: what edges and straight lines say of them without a search.
 """
