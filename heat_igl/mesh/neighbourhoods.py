@@ -31,8 +31,6 @@ _SEVERAL_SHEETS = 0.04
 # Directions in which balls are tried, half and their opposites: every 22 degrees. With 60 a tenth of a neighbour
 # stays on the other of two sheets 1.5 spacings apart; with 120 and 160 errors at thin parts are no smaller.
 _DIRECTIONS = 100
-# Radii of balls on the two sides whose ratio is at most this are those of a thin part or a narrow gap.
-_THIN = 0.7
 # Cosine of the angle between the normal of the roomier side and the fitted plane's, below which the plane is wrong.
 _ASTRAY = 0.95
 
@@ -182,11 +180,11 @@ def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[In
     number = np.full(len(P), -1, np.int32)
     number[index[:, 0]] = np.arange(len(index))
 
-    def balls(rows: slice) -> tuple[FloatArray, FloatArray, FloatArray]:
-        normals, radii, room = roomiest_normals(P, index[rows], principal[rows], directions)
-        return normals, radii, room
+    def balls(rows: slice) -> tuple[FloatArray, FloatArray]:
+        normals, radii = roomiest_normals(P, index[rows], principal[rows], directions)
+        return normals, radii
 
-    normals, radii, room = map(np.concatenate, zip(*over_rows(balls, len(index), _BLOCK), strict=True))
+    normals, radii = map(np.concatenate, zip(*over_rows(balls, len(index), _BLOCK), strict=True))
 
     def seen(rows: slice) -> tuple[IntArray, FloatArray, FloatArray]:
         kept = on_one_side(P, index[rows], number, normals, radii)
@@ -194,9 +192,10 @@ def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[In
         return kept, radius, axes
 
     found, radius, axes = map(np.concatenate, zip(*over_rows(seen, len(index), _BLOCK), strict=True))
-    is_thin = room[:, 1] < _THIN * room[:, 0]
-    axes[is_thin] = _axes_along(_blend(axes[is_thin, 2], normals[is_thin]))
-    return found, radius, axes
+    # Both normals where they agree, and that of the balls elsewhere: neighbours beyond an edge bend the plane.
+    alike = np.einsum("rx,rx->r", axes[:, 2], normals)[:, None]
+    mean = normals + np.where(np.abs(alike) >= _ASTRAY, np.sign(alike) * axes[:, 2], 0)
+    return found, radius, _axes_along(mean / np.linalg.norm(mean, axis=1, keepdims=True))
 
 
 def _axes_along(normals: FloatArray) -> FloatArray:
@@ -218,13 +217,6 @@ def _directions(m: int) -> FloatArray:
     spiral = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
     octant = spiral[(spiral > 0).all(axis=1)]
     return np.concatenate([octant * [x, y, 1] for x in (-1, 1) for y in (-1, 1)])
-
-
-def _blend(of_planes: FloatArray, of_balls: FloatArray) -> FloatArray:
-    """Normals (k, 3) between those of fitted planes and of balls where both agree, and those of balls elsewhere."""
-    alike = np.einsum("rx,rx->r", of_planes, of_balls)[:, None]
-    mean = of_balls + np.where(np.abs(alike) >= _ASTRAY, np.sign(alike) * of_planes, 0)
-    return np.asarray(mean / np.linalg.norm(mean, axis=1, keepdims=True))
 
 
 def without_noise(tree: PointTree) -> PointTree:

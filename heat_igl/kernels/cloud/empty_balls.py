@@ -2,8 +2,8 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.empty_balls import ASIDE, ROUNDS, TINY
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.heat_igl.kernels.cloud.empty_balls import ROUNDS, TINY
+from cython.cimports.libc.math import sqrt
 
 __all__ = ["on_one_side", "roomiest_normals"]
 
@@ -38,13 +38,10 @@ def roomiest_normals(
     radii : (b, 2) float64
         Of the largest empty balls that touch the point along the normal, and opposite to it; no larger than the
         neighbourhood.
-    room : (b, 2) float64
-        Radii of the largest balls on the side of the normal and on the other side, in shares of the neighbourhood.
     """
-    normals, radii, room = np.empty((index.shape[0], 3)), np.empty((index.shape[0], 2)), np.empty((index.shape[0], 2))
+    normals, radii = np.empty((index.shape[0], 3)), np.empty((index.shape[0], 2))
     normal: cython.double[:, ::1] = normals
     radius: cython.double[:, ::1] = radii
-    free: cython.double[:, ::1] = room
     inverted: cython.double[:, ::1] = np.empty((index.shape[1], 3))
     shares: cython.double[:, ::1] = np.empty((2, directions.shape[1]))
     local: cython.double[::1] = np.empty(3)
@@ -54,12 +51,12 @@ def roomiest_normals(
         for row in range(index.shape[0]):
             reach: cython.double = _invert(P, index[row], axes[row], inverted)
             _shares(inverted, directions, shares)
-            _average(directions, shares, local, free[row])
+            _average(directions, shares, local)
             radius[row, 0] = reach * _share(inverted, local, 1.0)
             radius[row, 1] = reach * _share(inverted, local, -1.0)
             for x in range(3):
                 normal[row, x] = local[0] * axes[row, 0, x] + local[1] * axes[row, 1, x] + local[2] * axes[row, 2, x]
-    return normals, radii, room
+    return normals, radii
 
 
 @cython.cfunc
@@ -131,9 +128,8 @@ def _average(
     directions: cython.const[cython.double][:, ::1],
     share: cython.double[:, ::1],
     normal: cython.double[::1],
-    room: cython.double[::1],
 ) -> cython.void:
-    """The mean direction on the side of the largest ball, and the largest balls on that side and on the other."""
+    """The mean direction on the side of the largest ball."""
     a: cython.Py_ssize_t
     x: cython.Py_ssize_t
     side: cython.Py_ssize_t
@@ -157,12 +153,6 @@ def _average(
         size: cython.double = sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2])
         for x in range(3):
             normal[x] = mean[x] / size
-    room[0] = room[1] = 0.0
-    for a in range(share.shape[1]):
-        along: cython.double = _along(directions, a, normal)
-        if fabs(along) > ASIDE:
-            side = 0 if along > 0.0 else 1
-            room[0], room[1] = max(room[0], share[side, a]), max(room[1], share[1 - side, a])
 
 
 @cython.cfunc
