@@ -430,5 +430,10 @@ def test_a_hanging_child_does_not_outlive_a_killed_caller_for_long() -> None:
     assert psutil.wait_procs([child], timeout=20)[0]
 
 
+def test_memory_of_a_solver_is_without_that_of_its_library() -> None:
+    pytest.importorskip("pymeshlab")  # which takes 50 MB
+    assert (reference.measured("meshlab", rectangle(5, 5, 1, 1), 0).peak_memory or 0) < 2e7
+
+
 def test_every_native_function_has_a_name() -> None:
     assert sorted(solver.function for solver in measurement._SOLVERS.values()) == sorted(native.__all__)

@@ -52,6 +52,7 @@ def call(
     arrays: Mapping[str, AnyArray],
     parameters: Mapping[str, Any] | None = None,
     *,
+    library: str = "",
     timeout: float = TIMEOUT,
     memory: float = MEMORY,
 ) -> Reply:
@@ -66,6 +67,8 @@ def call(
         Passed through files.
     parameters : mapping of str, optional
         Values that JSON can carry.
+    library : str
+        A module that is imported before memory is measured.
     timeout : float
         Seconds after which the child is killed.
     memory : float
@@ -83,6 +86,7 @@ def call(
             np.save(folder / f"{key}.npy", array, allow_pickle=False)
         bounds = {"memory": int(min(memory, _NO_BOUND)), "timeout": min(timeout, _LONGEST)}
         request = {"function": function, "arrays": list(arrays), "parameters": dict(parameters or {}), **bounds}
+        request["library"] = library
         (folder / "request.json").write_text(json.dumps(request))
         try:
             done = subprocess.run(
@@ -144,6 +148,8 @@ def answer(name: str) -> None:
     try:
         arrays = {key: np.load(folder / f"{key}.npy", mmap_mode="r").view(np.ndarray) for key in request["arrays"]}
         called = getattr(importlib.import_module(module), function)
+        if request["library"]:
+            importlib.import_module(request["library"])
         with PeakMemory() as peak:
             result = called(**arrays, **request["parameters"])
         values = dict(result) if isinstance(result, Mapping) else {}

@@ -132,6 +132,7 @@ def measured(
         f"heat_igl.reference.native:{chosen.function}",
         {"V": mesh.V, "F": mesh.F, "sources": seeds, "components": mesh.components},
         options,
+        library=chosen.module,
         timeout=timeout,
         memory=memory,
     )
