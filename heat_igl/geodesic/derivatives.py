@@ -12,13 +12,14 @@ from functools import cached_property
 
 import numpy as np
 
-from heat_igl.errors import MeshError, real_numbers
+from heat_igl.errors import MeshError
 from heat_igl.intrinsic import Merged
 from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back
 from heat_igl.intrinsic.place_derivatives import PlaceSlopes
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import MetricSides, SideLengths, Surface
 from heat_igl.sources import SourceSet
+from heat_igl.sweep.simplex_derivative import gradient_rows, velocities
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import Change, PathLengths
 
@@ -81,7 +82,9 @@ class DistanceDerivative:
             If the solver has no vertices to move: it was made from edge lengths or operators.
         """
         sides = self._positions()
-        result = [sides.by_positions(self._on_given_faces(self._by_sides(row)[0])) for row in self._rows(g)]
+        result = [
+            sides.by_positions(self._on_given_faces(self._by_sides(row)[0])) for row in gradient_rows(g, self.distance)
+        ]
         return np.stack(result) if np.ndim(g) == 2 else result[0]
 
     def by_lengths(self, g: ArrayLike) -> FloatArray:
@@ -90,7 +93,7 @@ class DistanceDerivative:
         An edge of two faces changes both of its sides: its derivative is the sum of theirs. Rows are the faces of the
         mesh; of faces that are there twice, one has the derivative of both.
         """
-        result = [self._on_given_faces(self._by_sides(row)[0]) for row in self._rows(g)]
+        result = [self._on_given_faces(self._by_sides(row)[0]) for row in gradient_rows(g, self.distance)]
         return np.stack(result) if np.ndim(g) == 2 else result[0]
 
     def by_points(self, g: ArrayLike) -> FloatArray:
@@ -116,7 +119,7 @@ class DistanceDerivative:
             If the solver has no positions.
         """
         slopes = self._place_slopes
-        (row,) = self._rows(g, 1)
+        (row,) = gradient_rows(g, self.distance, 1)
         _, by_place = self._by_sides(row)
         return np.zeros((0, 3)) if by_place is None else np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
@@ -126,13 +129,13 @@ class DistanceDerivative:
         Symmetric on each face. Raises a ValueError without a metric, and if g has another shape or is not finite.
         """
         metric = self._metric("metric_operators(mesh, metric)")
-        (row,) = self._rows(g, 1)
+        (row,) = gradient_rows(g, self.distance, 1)
         return metric.by_metric(self._on_given_faces(self._by_sides(row)[0]))
 
     def by_speed(self, g: ArrayLike) -> FloatArray:
         """The gradient (m,) by the speeds that were given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
         metric = self._metric("speed_operators(mesh, speed)")
-        (row,) = self._rows(g, 1)
+        (row,) = gradient_rows(g, self.distance, 1)
         return metric.by_speed(self._on_given_faces(self._by_sides(row)[0]))
 
     def _metric(self, function: str) -> MetricSides:
@@ -164,13 +167,13 @@ class DistanceDerivative:
             If the solver has no vertices to move.
         """
         sides, places = self._positions(), self._sources.points
-        moved = _velocities("dV", dV, sides.mesh.V.shape, "vertex")
+        moved = velocities("dV", dV, sides.mesh.V.shape, "vertex")
         by_side = self._on_faces(sides.push_positions(moved))
         given = None
         if len(places.faces):
             by_place = np.zeros((len(places.faces), 3))
             if points is not None:
-                velocity = _velocities("points", points, by_place.shape, "source point")
+                velocity = velocities("points", points, by_place.shape, "source point")
                 by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
             given = PlaceSlopes(places.faces, places.barycentric, by_place)
         change = carry_lengths(self._paths.triangulation, by_side, len(self._faces.history), given)
@@ -207,20 +210,6 @@ class DistanceDerivative:
             )
         return self._sides
 
-    def _rows(self, g: ArrayLike, most: int = 2) -> FloatArray:
-        """`g` as rows (k, n), 0 at unreachable vertices."""
-        array = real_numbers("g", g)
-        n = len(self.distance)
-        if not 1 <= array.ndim <= most or array.shape[-1] != n:
-            also = f" or (k, {n})" if most == 2 else ""
-            raise ValueError(f"g must have shape ({n},){also}, one entry per vertex, but it has shape {array.shape}")
-        rows = np.array(array.reshape(-1, n))
-        rows[:, self.unreachable] = 0.0
-        if not np.isfinite(rows).all():
-            row, vertex = np.argwhere(~np.isfinite(rows))[0]
-            raise ValueError(f"g must be finite at reachable vertices, but is {rows[row, vertex]} at vertex {vertex}")
-        return rows
-
     def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """The derivative (m, 3) by the sides of the faces before any flip, and (p, 3) by the points in given faces."""
         change, points = self._paths.pull_back(row), self._sources.points
@@ -250,14 +239,6 @@ class DistanceDerivative:
         on_faces = np.zeros((len(kept), 3))
         np.put_along_axis(on_faces, self._merged.corner[which], by_side[which], axis=1)
         return on_faces
-
-
-def _velocities(name: str, given: ArrayLike, shape: tuple[int, ...], of: str) -> FloatArray:
-    """Velocities as finite float64 of the given shape."""
-    array = real_numbers(name, given)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise ValueError(f"{name} must be {shape} finite numbers, one velocity per {of}; it has shape {array.shape}")
-    return array
 
 
 def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Mesh | PointCloud | None) -> Surface:

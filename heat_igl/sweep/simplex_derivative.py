@@ -23,7 +23,7 @@ from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["FixedPointDerivative", "SimplexDerivative"]
+__all__ = ["FixedPointDerivative", "SimplexDerivative", "gradient_rows", "velocities"]
 
 # A complex step, whose square is no double.
 _STEP = 1e-100
@@ -249,9 +249,7 @@ class SimplexDerivative(ABC):
 
     def push_forward(self, dV: ArrayLike) -> FloatArray:
         """How the distances (n,) change when the vertices move by dV (n, 3), and tensors stay; 0 where unreachable."""
-        moved = real_numbers("dV", dV)
-        if moved.shape != (self._simplices.n, 3) or not np.isfinite(moved).all():
-            raise ValueError(f"dV must be ({self._simplices.n}, 3) finite numbers, not of shape {moved.shape}")
+        moved = velocities("dV", dV, (self._simplices.n, 3), "vertex")
         self._require_given()
         return self._moved(moved)
 
@@ -466,3 +464,11 @@ def gradient_rows(g: ArrayLike, distance: FloatArray, most: int = 2) -> FloatArr
         row, vertex = np.argwhere(~np.isfinite(rows))[0]
         raise ValueError(f"g must be finite at reachable vertices, but is {rows[row, vertex]} at vertex {vertex}")
     return rows
+
+
+def velocities(name: str, given: ArrayLike, shape: tuple[int, ...], of: str) -> FloatArray:
+    """Velocities as finite float64 of the given shape."""
+    array = real_numbers(name, given)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be {shape} finite numbers, one velocity per {of}; it has shape {array.shape}")
+    return array
