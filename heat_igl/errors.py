@@ -228,6 +228,11 @@ def truth(name: str, value: object) -> bool:
     raise ValueError(f"{name} must be True or False, not {shown(value)}")
 
 
+def checked_cutoff(value: float | None) -> float:
+    """The cutoff as a positive float, infinity for None; a ValueError for anything else."""
+    return np.inf if value is None else positive("cutoff", value, infinite=True)
+
+
 def require_choice(name: str, value: object, choices: Iterable[str | None]) -> None:
     """Raise a ValueError that calls `value` `name` and lists the `choices` if it is none of them."""
     known = list(choices)

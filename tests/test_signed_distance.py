@@ -26,7 +26,7 @@ from heat_igl import (
     isolines,
     shapes,
 )
-from heat_igl.heat import curve_levels
+from heat_igl.heat import normal_integration
 from heat_igl.mesh import region_boundary
 from heat_igl.sources import oriented_set
 
@@ -326,7 +326,7 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     solver = SignedHeatSolver(mesh)
     domain, integration = solver.operators, solver._integration
     pieces = integration._pieces(oriented_set(curves, mesh))
-    on_curves = curve_levels._OnCurves(domain, mesh.F, pieces)
+    on_curves = normal_integration._OnCurves(domain, mesh.F, pieces)
     values = np.sin(5 * pieces.barycentric[:, 0] + pieces.faces)
     h = domain.mean_edge_lengths[on_curves.component]
     rows = np.repeat(np.arange(len(values)), 3)
@@ -335,7 +335,7 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     truth = spsolve(sp.csc_array(-domain.L + weighted @ B), weighted @ values)
     off = []
     for steps in (3, 200):
-        monkeypatch.setattr(curve_levels, "_SMOOTH_STEPS", steps)
+        monkeypatch.setattr(normal_integration, "_SMOOTH_STEPS", steps)
         found = integration._levels._smooth(values, on_curves)
         off.append(np.abs(found - truth).max() / np.abs(truth).max())
     assert off[1] < 1e-9

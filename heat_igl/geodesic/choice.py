@@ -13,8 +13,6 @@ from heat_igl.operators import Operators
 from heat_igl.plan import DistanceMethod
 from heat_igl.typing import ArrayLike
 
-__all__ = ["Solver", "SolverChoice"]
-
 Solver = GeodesicSolver | HeatMethodSolver
 _OPTIONS_OF_HEAT = tuple(option.name for option in fields(SolverOptions))
 

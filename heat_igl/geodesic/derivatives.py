@@ -23,8 +23,6 @@ from heat_igl.sweep.simplex_derivative import gradient_rows, velocities
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import Change, PathLengths
 
-__all__ = ["DistanceDerivative", "differentiable_surface"]
-
 # A distance that differs from the length of the path by more than this fraction is not the length of that path.
 # Rounding is below 1e-14; in flat parts other paths are longer by 1e-13 to 1e-9, with derivatives that differ by 1e-3.
 _SAME = 1e-12

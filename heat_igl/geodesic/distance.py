@@ -8,15 +8,12 @@ from typing import get_args
 import igl
 import numpy as np
 
-from heat_igl.errors import names_guessed, require_choice
+from heat_igl.errors import checked_cutoff, names_guessed, require_choice
 from heat_igl.geodesic.solver import GeodesicSolver
-from heat_igl.heat.batches import checked_cutoff, cut_off
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_mesh
 from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod
 from heat_igl.sources import OffsetSources, Sources, named_vertices, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
-
-__all__ = ["geodesic_distance"]
 
 
 @names_guessed
@@ -82,25 +79,25 @@ def geodesic_distance(
     [0.0, 3.0, 5.0, 4.0]
     """
     require_choice("method", method, get_args(DistanceMethod))
-    beyond = checked_cutoff(cutoff)
+    limit = checked_cutoff(cutoff)
     given = as_mesh(mesh)
     if method == "heat":
         from heat_igl.heat import HeatMethodSolver  # what follows needs none of its modules
 
-        distance = HeatMethodSolver(given, region=region).distance(sources, cutoff=beyond)
+        distance = HeatMethodSolver(given, region=region).distance(sources, cutoff=limit)
         return distance if targets is None else distance[named_vertices(targets, len(distance), "targets")]
     if isinstance(given, PolygonMesh):
         given = given.triangles
     is_plain = targets is None and region is None and method != "sweep"
-    if beyond is not None and is_plain and isinstance(given, Mesh) and not given.has_copies:
-        near = _within_reach(given, sources, beyond)
+    if limit < np.inf and is_plain and isinstance(given, Mesh) and not given.has_copies:
+        near = _within_reach(given, sources, limit)
         if near is not None:
-            return _on_part(given, near, sources, tolerance if method != "exact" else 0.0, beyond)
+            return _on_part(given, near, sources, tolerance if method != "exact" else 0.0, limit)
     solver = GeodesicSolver(given, method=method, tolerance=tolerance, region=region)
     if targets is None:
-        return solver.distance(sources, cutoff=beyond)
+        return solver.distance(sources, cutoff=limit)
     found = solver._to_targets(sources, targets)
-    found[found > (np.inf if beyond is None else beyond)] = np.inf
+    found[found > limit] = np.inf
     return found
 
 
@@ -115,7 +112,8 @@ def _on_part(mesh: Mesh, faces: BoolArray, sources: Sources, tolerance: float, c
         solver = GeodesicSolver(Mesh(mesh.V[used], numbers.reshape(-1, 3)), tolerance=tolerance)
         there = OffsetSources(np.searchsorted(used, chosen.vertices[is_there]), chosen.vertex_offset[is_there])
         distance[used] = solver.distance(there, cutoff=cutoff)
-    return np.asarray(cut_off(distance, cutoff))
+    distance[distance > cutoff] = np.inf
+    return distance
 
 
 def _within_reach(mesh: Mesh, sources: Sources, cutoff: float) -> BoolArray | None:

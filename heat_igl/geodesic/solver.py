@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.errors import MeshError, names_guessed
-from heat_igl.heat.batches import BatchedSolver, LabelledDistance, checked_cutoff, cut_off
+from heat_igl.errors import MeshError, checked_cutoff, names_guessed
+from heat_igl.heat.batches import BatchedSolver, LabelledDistance
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Operators
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from heat_igl.heat.directions import Directions
     from heat_igl.intrinsic import TangentFrames
     from heat_igl.sweep.simplex_derivative import SimplexDerivative
-
-__all__ = ["GeodesicSolver"]
 
 
 class GeodesicSolver(BatchedSolver):
@@ -233,9 +231,10 @@ class GeodesicSolver(BatchedSolver):
         ValueError
             If `cutoff` is not positive.
         """
-        beyond = checked_cutoff(cutoff)
-        limit = np.inf if beyond is None else beyond
-        return np.asarray(cut_off(self._engine.distance(self._source_set(sources), limit, n_threads()), beyond))
+        limit = checked_cutoff(cutoff)
+        distance = self._engine.distance(self._source_set(sources), limit, n_threads())
+        distance[distance > limit] = np.inf
+        return distance
 
     @names_guessed
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
@@ -252,10 +251,9 @@ class GeodesicSolver(BatchedSolver):
         LabelledDistance
             `distance` (n,) and `labels` (n,).
         """
-        beyond = checked_cutoff(cutoff)
-        limit = np.inf if beyond is None else beyond
+        limit = checked_cutoff(cutoff)
         distance, labels = self._engine.labelled(self._source_set(sources), limit, n_threads())
-        distance = cut_off(distance, beyond)
+        distance[distance > limit] = np.inf
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
 
@@ -286,7 +284,7 @@ class GeodesicSolver(BatchedSolver):
         found = directions(*engine.directed(chosen), frames)
         if isinstance(self._domain, PointCloud):
             if self._domain.cover is not None:
-                from heat_igl.heat.two_sides import directions_from_one_side
+                from heat_igl.heat.directions import directions_from_one_side
 
                 found = directions_from_one_side(found, frames, self.n_vertices, self._domain.n_faces)
             return found if self._originals is None else found.of(self._originals)

@@ -2,9 +2,9 @@ from heat_igl.heat.batches import LabelledDistance as LabelledDistance
 from heat_igl.heat.checking import AnswerCheck as AnswerCheck
 from heat_igl.heat.checking import Comparison as Comparison
 from heat_igl.heat.directions import Directions as Directions
+from heat_igl.heat.normal_integration import Level as Level
 from heat_igl.heat.parts import Magnitude as Magnitude
 from heat_igl.heat.parts import SolverOptions as SolverOptions
-from heat_igl.heat.signed_heat import Level as Level
 from heat_igl.heat.signed_heat import SignedHeatSolver as SignedHeatSolver
 from heat_igl.heat.signed_volumes import VoxelBox as VoxelBox
 from heat_igl.heat.signed_volumes import volume_signed_distance as volume_signed_distance

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from heat_igl.errors import AccuracyWarning, SourceError, names_guessed, positive, shown, truth
+from heat_igl.errors import AccuracyWarning, SourceError, checked_cutoff, names_guessed, shown, truth
 from heat_igl.runtime import (
     block_size,
     float_type,
@@ -23,8 +23,6 @@ from heat_igl.runtime import (
 )
 from heat_igl.sources import Sources, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-
-__all__ = ["BatchedSolver", "LabelledDistance", "checked_cutoff", "cut_off"]
 
 
 class LabelledDistance(NamedTuple):
@@ -128,7 +126,7 @@ class BatchedSolver(ABC):
             raise SourceError(
                 f"source_sets must be a sequence of sets of sources, not {shown(source_sets)}: try distance"
             )
-        beyond = checked_cutoff(cutoff)
+        limit = checked_cutoff(cutoff)
         chosen = list(self._named(source_sets))
         shape = (len(chosen), self.n_vertices)
         if out is None:
@@ -137,8 +135,9 @@ class BatchedSolver(ABC):
             _check_destination(out, shape, dtype)
         write = row_writer(out)
         with progress_bar("distances", len(chosen), truth("progress", progress)) as advance:
-            for rows in self._blocks(chosen, len(chosen), np.inf if beyond is None else beyond):
-                write(cut_off(rows, beyond).astype(out.dtype, copy=False))
+            for rows in self._blocks(chosen, len(chosen), limit):
+                rows[rows > limit] = np.inf
+                write(rows.astype(out.dtype, copy=False))
                 advance(len(rows))
         return out
 
@@ -230,24 +229,3 @@ def _check_destination(out: AnyArray, shape: tuple[int, int], dtype: npt.DTypeLi
         raise ValueError(f"dtype is {np.dtype(dtype)}, but out holds {out.dtype}: leave one of them away")
     if isinstance(out, np.ndarray) and not out.flags.writeable:
         raise ValueError("out is read-only: open a memmap with mode='r+'")
-
-
-def checked_cutoff(value: float | None) -> float | None:
-    """The cutoff as a float; None for none, which infinity is too.
-
-    Raises
-    ------
-    ValueError
-        If it is not a positive number.
-    """
-    if value is None:
-        return None
-    cutoff = positive("cutoff", value, infinite=True)
-    return None if cutoff == np.inf else cutoff
-
-
-def cut_off(distances: FloatArray, cutoff: float | None) -> FloatArray:
-    """The same array, with ``inf`` for distances beyond `cutoff`."""
-    if cutoff is not None:
-        distances[distances > cutoff] = np.inf
-    return distances

@@ -16,8 +16,6 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows import OperatorTriangles, WindowEngine
 from heat_igl.windows.bounds import Bounds
 
-__all__ = ["AnswerCheck", "Checker", "Comparison", "Comparisons"]
-
 # Mean shortfall from which on all distances are raised to straight lines.
 _RAISED = 0.005
 # Values from which on a warning is issued: mean shortfall before distances are raised, largest shortfall if they are

@@ -12,8 +12,6 @@ from heat_igl.mesh.grouping import next_in_run
 from heat_igl.sources import OrientedSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["has_gaps", "left_of_closed", "left_of_nearest", "total_length", "vertices_on", "zero_curve_in_gaps"]
-
 # Ends of curves nearer to each other than this share of the mean edge length meet.
 _SAME_PLACE = 1e-6
 # The zero curve of an integrated distance runs within a quarter of an edge of the curves. It counts as the closing of a

@@ -8,11 +8,10 @@ import numpy as np
 
 from heat_igl.intrinsic import PolarAngles, TangentFrames
 from heat_igl.mesh import SurfacePoints
+from heat_igl.mesh.cloud_orientation import on_one_side
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows import PathAngles, in_circle
-
-__all__ = ["Directions", "carried", "directions", "rigid_angles"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,3 +115,21 @@ def rigid_angles(angles: FloatArray, polar: PolarAngles, vertices: IntArray) -> 
 def _arrival(back: FloatArray, polar: PolarAngles) -> FloatArray:
     """The angle (n,) in the frame opposite the polar angle `back` (n,)."""
     return in_circle(rigid_angles(back, polar, np.arange(len(back))) + np.pi)
+
+
+def directions_from_one_side(found: Directions, frames: TangentFrames, n: int, m: int) -> Directions:
+    """The directions of paths from the first side of a cover, see `two_sided_cover`, on the n vertices and m faces.
+
+    Of the two copies of a vertex that which is nearer; arrivals on the second side are seen from the first.
+    """
+    is_other = found.distance[n : 2 * n] < found.distance[:n]
+    seen = found.of(np.arange(n) + n * is_other)
+    mirrored = in_circle(np.angle(axis_of_second_side(frames, n)) - seen.arrival)
+    start = unchecked_points(*on_one_side(seen.start.faces, seen.start.barycentric, m))
+    return replace(seen, arrival=np.where(is_other, mirrored, seen.arrival), start=start)
+
+
+def axis_of_second_side(frames: TangentFrames, n: int) -> AnyArray:
+    """The x axis (n,) of the second side, as complex numbers in the frame of the first."""
+    x = frames.x[n : 2 * n]
+    return np.asarray(np.einsum("nx,nx->n", x, frames.x[:n]) + 1j * np.einsum("nx,nx->n", x, frames.y[:n]))

@@ -12,8 +12,6 @@ from heat_igl.runtime import LOWEST_HEAT, warn_caller
 from heat_igl.steps import HeatFlow, NormalizedDivergence, PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["_HEAT_ERROR", "Integration", "damped_field", "_imposed_faces"]
-
 # A known distance that is longer than the integrated distance by more than this share of it comes from a source that is
 # not the nearest: integrated distance is wrong by less, by 1 to 4 % in the mean. It decides on the far corners of faces
 # much larger than the mean alone; from 0 to 1, errors on the cow, the fandisk and the camel's head are the same.

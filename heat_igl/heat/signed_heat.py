@@ -7,7 +7,6 @@ from typing import get_args
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, require_choice
-from heat_igl.heat.curve_levels import Level
 from heat_igl.heat.curve_sides import (
     has_gaps,
     left_of_closed,
@@ -16,7 +15,7 @@ from heat_igl.heat.curve_sides import (
     vertices_on,
     zero_curve_in_gaps,
 )
-from heat_igl.heat.normal_integration import NormalIntegration
+from heat_igl.heat.normal_integration import Level, NormalIntegration
 from heat_igl.heat.parts import SolverOptions, prepare
 from heat_igl.heat.solver import HeatMethodSolver
 from heat_igl.intrinsic import IntrinsicTriangulation, oriented
@@ -27,8 +26,6 @@ from heat_igl.runtime import both, n_threads, warn_caller
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, require_resolved, source_set
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows import ExactSurface, MeshTriangles
-
-__all__ = ["Level", "SignedHeatSolver"]
 
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed_theory.md).

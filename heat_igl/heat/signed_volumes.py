@@ -15,8 +15,6 @@ from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT
 from heat_igl.steps import HeatFlow, PoissonProblem, smallest_time_step
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["VoxelBox", "volume_signed_distance"]
-
 # Each time step of a grid is this times the one before. It gives the directions at points that have less heat than this
 # share of the largest, since transforms in double precision leave few digits of it there.
 _NEXT_STEP = 4.0

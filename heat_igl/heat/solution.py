@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from heat_igl.heat.checking import AnswerCheck, Comparison
 from heat_igl.typing import FloatArray
 
-__all__ = ["Diagnostics", "HeatSolution"]
-
 
 @dataclass(frozen=True)
 class Diagnostics:

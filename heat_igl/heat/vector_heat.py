@@ -9,12 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, SourceError, names_guessed, real_numbers, require_choice
-from heat_igl.heat.heat_transport import HeatTransport
-from heat_igl.heat.outward_field import OutwardField
 from heat_igl.heat.parts import SolverOptions, prepare
-from heat_igl.heat.path_transport import PathTransport
 from heat_igl.heat.solver import HeatMethodSolver
-from heat_igl.heat.two_sides import TwoSidedTransport
+from heat_igl.heat.vector_transport import HeatTransport, OutwardField, PathTransport, TwoSidedTransport
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.linear import Backend
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices, tangent_surface
@@ -22,8 +19,6 @@ from heat_igl.operators import Operators, edge_rotations, operators
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows import MeshTriangles, WindowEngine
-
-__all__ = ["VectorHeatSolver", "VectorMethod"]
 
 VectorMethod = Literal["heat", "windows"]
 

@@ -25,8 +25,6 @@ from heat_igl.linear.superlu import SuperLUAnalysis
 from heat_igl.plan import MOST_FILL, SMALLEST_MULTIFRONTAL
 from heat_igl.typing import BoolArray
 
-__all__ = ["Backend", "analyse", "factorize"]
-
 Backend = Literal["auto", "scipy", "multifrontal", "iterative"]
 
 _ANALYSES: dict[str, Callable[[sp.csc_matrix], Analysis]] = {

@@ -17,8 +17,6 @@ import numpy as np
 from heat_igl.kernels.linear import dissection, graphs
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 
-__all__ = ["Dissection", "dissect"]
-
 # Pieces with more vertices than this, and than this share of all, are cut one at a time, and their parts are dissected
 # in parallel; smaller pieces are dissected by one thread.
 _LARGE = 3000

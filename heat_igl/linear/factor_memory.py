@@ -7,8 +7,6 @@ import scipy.sparse as sp
 
 from heat_igl.runtime import available_memory
 
-__all__ = ["factor_bytes", "factors_fit", "is_of_volume"]
-
 # Bytes per row of each of two factors while they are made, on log2 n and on n^(1/3): the multifrontal ones of spheres
 # and tori of 150k vertices took 25 to 37, those of a box of 30k vertices 35. Rather too much than too little.
 _BYTES_SURFACE = 45.0

@@ -14,8 +14,6 @@ from heat_igl.kernels.linear import symbolic
 from heat_igl.linear.dissection import Dissection
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 
-__all__ = ["Fronts", "fronts"]
-
 # The number of pieces of the tree that are solved in parallel, roughly; and the fewest entries of a piece, so that it
 # is worth a thread.
 _PIECES = 6

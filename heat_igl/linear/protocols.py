@@ -10,8 +10,6 @@ import scipy.sparse as sp
 from heat_igl.errors import FactorizationError
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Analysis", "Factorization", "check_finite", "check_probe"]
-
 
 class Factorization(Protocol):
     """A factored principal submatrix of a matrix A (n, n).

@@ -9,8 +9,6 @@ from heat_igl.errors import FactorizationError
 from heat_igl.linear.protocols import check_finite, check_probe
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["SuperLUAnalysis", "SuperLUFactorization"]
-
 
 class SuperLUAnalysis:
     """SuperLU orders the matrix while it factors it, so there is nothing to keep."""

@@ -9,8 +9,6 @@ from heat_igl.mesh import grouping
 from heat_igl.sources.source_sets import SourcePoints, SourceSegments
 from heat_igl.typing import FloatArray
 
-__all__ = ["samples"]
-
 
 def samples(
     triangulation: IntrinsicTriangulation, segments: SourceSegments, spacing: float | FloatArray

@@ -14,8 +14,6 @@ from heat_igl.mesh.projection import rows_in_space
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Oriented", "OrientedPoints", "OrientedSet", "oriented_set"]
-
 _ACCEPTED = (
     "a SurfaceCurve, OrientedPoints, a mask of the faces or of the vertices of a region, or a list of these kinds"
 )

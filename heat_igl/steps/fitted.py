@@ -10,8 +10,6 @@ import scipy.sparse as sp
 from heat_igl.operators import Operators
 from heat_igl.typing import FloatArray
 
-__all__ = ["fitted_laplacian"]
-
 
 def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.

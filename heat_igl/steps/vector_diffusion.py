@@ -11,8 +11,6 @@ from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.steps.three_steps import shifted
 from heat_igl.typing import AnyArray, FloatArray
 
-__all__ = ["VectorHeatFlow"]
-
 # Fewer unknowns than this are factored by SuperLU.
 _SMALLEST_MULTIFRONTAL = 1000
 
