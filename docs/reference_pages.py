@@ -14,7 +14,7 @@ GROUPS = {
         write_distances_within read_distances_within""",
     "Meshes, polygons and points": """Mesh PolygonMesh PointCloud as_mesh sample_mesh to_trimesh to_pyvista to_open3d
         mesh.MeshReport mesh.CloudReport terrain mesh.Terrain image_domain mesh.ImageDomain closest_points
-        mesh.ClosestPoints mesh.split_long_edges""",
+        mesh.ClosestPoints""",
     "Files": """read_mesh read_polygon_mesh read_point_cloud read_attributes write_attributes write_mesh
         write_point_cloud write_curves""",
     "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on curve_through edge_curve",

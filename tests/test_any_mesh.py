@@ -71,7 +71,6 @@ CALLS: dict[str, Call] = {
     "smooth": lambda mesh: heat_igl.smooth(mesh, PHI, 0.3),
     "speed_operators": lambda mesh: heat_igl.speed_operators(mesh, np.ones(MESH.n_faces)).L,
     "activation_times": lambda mesh: heat_igl.activation_times(mesh, np.eye(3), 0),
-    "split_long_edges": lambda mesh: heat_igl.mesh.split_long_edges(mesh, 0.3).V,
     "straighten": lambda mesh: heat_igl.straighten(mesh, PATH).positions(MESH),
     "sublevel_areas": lambda mesh: heat_igl.curves.sublevel_areas(mesh, PHI, [0.1, 0.3]),
     "tangent_frames": lambda mesh: heat_igl.tangent_frames(mesh).x,

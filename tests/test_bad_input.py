@@ -161,7 +161,6 @@ def number_cases() -> Iterator[Case]:
         "cutoff": lambda mesh, value: heat_igl.geodesic_distance(mesh, 0, cutoff=value),
         "t": lambda mesh, value: heat_igl.HeatMethodSolver(mesh, t=value),
         "radius": lambda mesh, value: heat_igl.distances_within(mesh, value),
-        "longest": lambda mesh, value: heat_igl.mesh.split_long_edges(mesh, value),
         "tolerance": lambda mesh, value: heat_igl.curve_on(mesh, mesh.V[mesh.F[0, :2]], tolerance=value),
         "spacing": lambda _, value: heat_igl.VoxelBox((0, 0, 0), value, (2, 2, 2)),
     }

@@ -7,13 +7,11 @@ import pickle
 
 import numpy as np
 import pytest
-from conftest import perturbed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import heat_igl
 from heat_igl import (
-    HeatMethodSolver,
     Mesh,
     MeshError,
     PolygonMesh,
@@ -25,9 +23,7 @@ from heat_igl import (
     edge_curve,
     shapes,
 )
-from heat_igl.mesh import connectivity, grouping, split_long_edges
-from heat_igl.mesh.connectivity import boundary_loops
-from tests.steiner import graph_distance
+from heat_igl.mesh import connectivity, grouping
 
 # --- Mesh, MeshReport and connectivity on small shapes whose every number can be worked out by hand
 
@@ -293,9 +289,9 @@ def test_longest_path_with_loops_and_repeated_edges() -> None:
     edges = np.array([[1, 0], [1, 2], [2, 1], [3, 2], [2, 2], [4, 5], [6, 5]])
     lengths = np.array([1.0, 9, 2, 3, 50, 2, 3.5])
     graph = connectivity.shortest_edge_graph(edges, lengths, 7)
-    assert connectivity.longest_path(graph, np.array([0, 0, 0, 0, 1, 1, 1])) == 6
+    assert connectivity.longest_paths(graph, np.array([0, 0, 0, 0, 1, 1, 1])).max() == 6
     alone = connectivity.shortest_edge_graph(edges[5:], lengths[5:], 7)
-    assert connectivity.longest_path(alone, np.array([0, 1, 2, 3, 4, 4, 4])) == 5.5
+    assert connectivity.longest_paths(alone, np.array([0, 1, 2, 3, 4, 4, 4])).max() == 5.5
 
 
 def test_facets_of_tetrahedra_are_opposite_their_corner() -> None:
@@ -638,76 +634,3 @@ def test_a_polyline_over_a_valley_is_led_through_it():
 def test_refused_edges(vertices, message):
     with pytest.raises(SourceError, match=message):
         edge_curve(shapes.grid(4), vertices)
-
-
-# --- subdivision
-
-
-def uneven() -> Mesh:
-    """A sphere whose triangles are sixteen times longer on one side than on the other."""
-    sphere = perturbed(shapes.icosphere(3), 0.3)
-    return Mesh(sphere.V * np.where(sphere.V[:, 2:] > 0, [[1, 1, 16]], [[1, 1, 1]]), sphere.F)
-
-
-def double_area_vector(mesh: Mesh, F) -> np.ndarray:
-    corner = mesh.V[F]
-    return np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-
-
-@pytest.mark.parametrize("factor", [3.0, 1.0, 0.4])
-def test_the_surface_stays_and_edges_become_short(factor):
-    mesh = uneven()
-    longest = factor * mesh.edge_lengths.mean()
-    fine = split_long_edges(mesh, longest)
-    assert fine.n_vertices > mesh.n_vertices
-    assert longest / 2 < fine.edge_lengths.max() <= longest
-    assert (fine.V[: mesh.n_vertices] == mesh.V).all()
-    assert fine.measures.sum() == pytest.approx(mesh.measures.sum(), rel=1e-12)
-    # Orientation is kept: pieces of a face add up to it as vectors, and a closed surface stays closed.
-    whole = np.abs(double_area_vector(mesh, mesh.F)).sum(axis=0)
-    assert np.abs(double_area_vector(fine, fine.F)).sum(axis=0) == pytest.approx(whole, rel=1e-12)
-    assert (fine.facets.n_faces == 2).all()
-    assert fine.n_vertices - len(fine.edges) + fine.n_faces == 2
-    volume = [np.einsum("fk,fk->", m.V[m.F[:, 0]], double_area_vector(m, m.F)) for m in (mesh, fine)]
-    assert volume[1] == pytest.approx(volume[0], rel=1e-12)
-
-
-def test_by_default_no_edge_stays_longer_than_the_mean():
-    mesh = uneven()
-    mean = mesh.edge_lengths.mean()
-    assert mean / 2 < split_long_edges(mesh).edge_lengths.max() <= mean
-    assert split_long_edges(mesh).n_vertices == split_long_edges(mesh, mean).n_vertices
-
-
-def test_edges_of_many_faces_keep_all_of_them():
-    book = shapes.book(5, 3)
-    fine = split_long_edges(book, 0.1)
-    spine = fine.facets.n_faces == 5
-    assert fine.edge_lengths[spine].sum() == pytest.approx(1, rel=1e-12)
-    assert set(np.unique(fine.facets.n_faces)) == {1, 2, 5}
-    rim = fine.facets.n_faces == 1
-    assert fine.edge_lengths[rim].sum() == pytest.approx(15, rel=1e-12)
-    assert boundary_loops(fine.facets, fine.n_vertices) == boundary_loops(book.facets, book.n_vertices)
-    assert (fine.boundary[: book.n_vertices] == book.boundary).all()
-
-
-def test_large_triangles_are_worth_splitting():
-    """A torus, one half of it pulled out; splitting its long edges takes the mean error from 3.8 to 2.2 %."""
-    torus = perturbed(shapes.torus(16, 40), 0.3)
-    mesh = Mesh(torus.V * np.where(torus.V[:, :1] > 0, [[3, 1, 1]], [[1, 1, 1]]), torus.F)
-    fine = split_long_edges(mesh, mesh.edge_lengths.mean())
-    sources = np.arange(0, mesh.n_vertices, 100)
-    truth = graph_distance(mesh, sources, 8)
-    away = truth > 0
-    errors = []
-    for domain in (mesh, fine):
-        distance = HeatMethodSolver(domain).distances(list(sources))[:, : mesh.n_vertices]
-        errors.append(float(np.mean(np.abs(distance[away] / truth[away] - 1))))
-    assert errors[1] < 0.7 * errors[0]
-
-
-def test_new_vertices_lie_in_the_middle():
-    fine = split_long_edges(shapes.grid(1), 1.0)
-    assert fine.V[4:].tolist() == [[0.5, 0.5, 0.0]]
-    finer = split_long_edges(shapes.grid(1), 0.8)
-    assert sorted(finer.V.tolist()) == sorted(shapes.grid(2).V.tolist())

@@ -7,17 +7,15 @@ follows from the faces, so rounding cannot open a loop or draw a segment twice.
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 
-from heat_igl.errors import MeshError, positive, refuse_masked, shown
+from heat_igl.errors import MeshError, positive, real_numbers, shown
 from heat_igl.geodesic import Solver
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices, crossings, joined_segments, level_segments
 from heat_igl.sources import Sources
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray
+from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = ["enclosed_areas", "isolines", "offset_curves", "sublevel_areas"]
 
@@ -193,27 +191,17 @@ def _evenly_spaced(values: FloatArray, k: int) -> FloatArray:
 def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
     if mesh.is_tetrahedral:
         raise MeshError("isolines need triangles, but the mesh is tetrahedral")
-    array = _real("values", values)
+    array = real_numbers("values", values)
     if array.shape != (mesh.n_vertices,):
         raise ValueError(f"values must have shape ({mesh.n_vertices},), one per vertex, not {array.shape}")
     bad = np.isnan(array) | (array == -np.inf)
     if bad.any():
         first = int(np.argmax(bad))
         raise ValueError(f"values[{first}] is {array[first]} ({int(bad.sum())} of {len(array)} are NaN or -inf)")
-    wanted = np.atleast_1d(_real("levels", levels))
+    wanted = np.atleast_1d(real_numbers("levels", levels))
     if wanted.ndim != 1 or not np.isfinite(wanted).all():
         raise ValueError(f"levels must be finite numbers in one dimension, not {shown(levels)}")
     return array, wanted
-
-
-def _real(name: str, array: ArrayLike) -> FloatArray:
-    refuse_masked(name, array)
-    found: AnyArray | None = None
-    with suppress(ValueError):  # of ragged lists
-        found = np.asarray(array)
-    if found is None or found.dtype.kind not in "iuf":
-        raise ValueError(f"{name} must be real numbers, not {shown(array) if found is None else found.dtype}")
-    return found.astype(np.float64)
 
 
 def _areas_below(mesh: Mesh, values: FloatArray, level: float) -> FloatArray:

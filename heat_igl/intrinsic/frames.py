@@ -252,10 +252,8 @@ def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> 
     ValueError
         If the shape is another, or a number is not finite; the message names the first offender.
     """
-    given = as_array(name, vectors)
-    if given.dtype.kind not in "iuf":
-        raise ValueError(f"{name} must hold real numbers, not {given.dtype}")
-    found = np.atleast_2d(given.astype(np.float64))
+    given = real_numbers(name, vectors)
+    found = np.atleast_2d(given)
     if found.ndim != 2 or found.shape[1] != size or (k is not None and len(found) != k):
         wanted = "k" if k is None else k
         raise ValueError(f"{name} must have shape ({wanted}, {size}), but it has shape {given.shape}")

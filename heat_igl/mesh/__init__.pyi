@@ -33,7 +33,6 @@ from heat_igl.mesh.regions import region_boundary as region_boundary
 from heat_igl.mesh.report import DELAUNAY_TOLERANCE as DELAUNAY_TOLERANCE
 from heat_igl.mesh.report import CloudReport as CloudReport
 from heat_igl.mesh.report import MeshReport as MeshReport
-from heat_igl.mesh.subdivision import split_long_edges as split_long_edges
 from heat_igl.mesh.surface_points import ON_SIDE as ON_SIDE
 from heat_igl.mesh.surface_points import ON_SIDE_COMPUTED as ON_SIDE_COMPUTED
 from heat_igl.mesh.surface_points import NestedCurves as NestedCurves

@@ -25,7 +25,6 @@ __all__ = [
     "edge_distance",
     "edges",
     "facets",
-    "longest_path",
     "longest_paths",
     "nonmanifold_vertices",
     "shortest_edge_graph",
@@ -163,11 +162,6 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     bad = np.bincount(centre, minlength=n) > 1
     bad[found.vertices[found.n_faces > 2]] = True
     return np.flatnonzero(bad)
-
-
-def longest_path(graph: sp.csr_array, components: IntArray) -> float:
-    """Length of a longest shortest path along edges, over all components: the largest of `longest_paths`."""
-    return float(longest_paths(graph, components).max())
 
 
 def longest_paths(graph: sp.csr_array, components: IntArray) -> FloatArray:

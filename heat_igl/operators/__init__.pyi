@@ -14,12 +14,12 @@ from heat_igl.operators.matrices import check_laplacian as check_laplacian
 from heat_igl.operators.matrices import divergence_matrix as divergence_matrix
 from heat_igl.operators.metric import fibre_metric as fibre_metric
 from heat_igl.operators.metric import metric_operators as metric_operators
+from heat_igl.operators.metric import speed_operators as speed_operators
 from heat_igl.operators.metric_derivatives import MetricSides as MetricSides
 from heat_igl.operators.metric_derivatives import SideLengths as SideLengths
 from heat_igl.operators.metric_simplices import MetricSimplices as MetricSimplices
 from heat_igl.operators.point_clouds import point_cloud_operators as point_cloud_operators
 from heat_igl.operators.simplices import cotan_operators as cotan_operators
-from heat_igl.operators.speed import speed_operators as speed_operators
 from heat_igl.operators.suitability import is_rough_or_narrow as is_rough_or_narrow
 from heat_igl.operators.suitability import share_on_large_triangles as share_on_large_triangles
 from heat_igl.operators.surface import Surface as Surface

@@ -1,4 +1,4 @@
-"""A metric on each face: distance is measured with a length for every direction."""
+"""A metric or a speed on each face: distance is measured with a length for every direction, or is a travel time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.simplices import cotan_operators, longest_sides
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["fibre_metric", "metric_operators", "operators_in_metric"]
+__all__ = ["fibre_metric", "metric_operators", "operators_in_metric", "speed_operators"]
 
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
 # for its length.
@@ -108,6 +108,66 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
     if domain.surface is None:
         return domain
     return replace(domain, metric=MetricSides(mesh, metric))
+
+
+def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
+    """The operators of a mesh on which one travels at a speed of its own in each face.
+
+    Distance is then the time T of the fastest way, |grad T| = 1 / speed: Fermat's principle, and Snell's law where the
+    speed changes. It is `metric_operators` with the metric ``speed^-2``, the same in all directions.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles or tetrahedra.
+    speed : (m,) array_like
+        Length per unit of time on each face, positive.
+
+    Returns
+    -------
+    Operators
+        For `GeodesicSolver` and `HeatMethodSolver`, with every length a travel time. Where speeds of neighbours
+        differ by at most 10 %, the mean is taken for the edge between them, and triangles with these travel
+        times are an intrinsic triangulation, on which every method works. Where they jump, and on tetrahedra,
+        `GeodesicSolver` takes the Hopf-Lax formula on each simplex (`HopfLaxEngine`), right at any contrast;
+        then sources are vertices.
+
+    Raises
+    ------
+    ValueError
+        If `speed` is not a positive number for each face.
+    MeshError
+        If a tetrahedron has no volume.
+
+    Notes
+    -----
+    A time step that is asked for (`t_coef`, `t`) asks for heat. One step for slow and fast faces cannot suit both: with
+    jumps, heat is 1 to 4 % wrong at a contrast of 2, 28 % at 1000, and arbitrarily wrong beyond.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(10, 2)
+    >>> domain = heat_igl.speed_operators(mesh, [2.0] * mesh.n_faces)
+    >>> time = heat_igl.GeodesicSolver(domain).distance(0)
+    >>> round(float(time[10]), 6)  # the length 10 at the speed 2
+    5.0
+    """
+    mesh = as_simplices(mesh)
+    (m, p), s = (mesh.n_faces, mesh.F.shape[1] - 1), real_numbers("speed", speed)
+    if s.shape != (m,):
+        raise ValueError(
+            f"speed must have shape ({m},), one per face, not {s.shape}: speed[mesh.F].mean(axis=1) of one per vertex"
+        )
+    remedy = "remove faces that cannot be crossed"
+    _raise_at_first(~((s > 0) & np.isfinite(s)), "speed", s, "must be positive and finite", remedy)
+    largest = _LARGEST**0.5
+    outside = (s < 1 / largest) | (s > largest)
+    _raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
+    domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2)
+    if domain.surface is None:
+        return domain
+    return replace(domain, metric=MetricSides(mesh, np.eye(3) / s[:, None, None] ** 2))
 
 
 def fibre_metric(
@@ -392,10 +452,11 @@ def _check_definite(smallest: FloatArray, g: FloatArray) -> None:
     )
 
 
-def _raise_at_first(bad: AnyArray, name: str, values: AnyArray, problem: str) -> None:
+def _raise_at_first(bad: AnyArray, name: str, values: AnyArray, problem: str, remedy: str = "") -> None:
     """A ValueError with the first of the `values` that are `bad`."""
     if bad.any():
         first = int(np.argmax(bad))
         raise ValueError(
             f"{name}[{first}] = {values[first].tolist()} {problem} ({int(bad.sum())} of {len(bad)} are not)"
+            + (f": {remedy}" if remedy else "")
         )
