@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -18,6 +20,19 @@ import heat_igl
 from heat_igl.validation.zoo import SHAPES
 
 ROOT = Path(__file__).resolve().parents[1]
+# For processes: the package under test, wherever they run.
+ENVIRONMENT = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(Path(heat_igl.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
+}
+
+
+def run_python(*arguments: str | Path, cwd: Path, timeout: float = 120) -> subprocess.CompletedProcess[str]:
+    """Python in a process of its own, with the package under test."""
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)], cwd=cwd, env=ENVIRONMENT, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True, timeout=timeout, check=False,
+    )  # fmt: skip
 
 
 def wheel_path(name: str) -> Path:
@@ -58,6 +73,11 @@ def relative_error(d: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """|d - truth| / truth at the vertices with a positive finite truth."""
     there = (truth > 0) & np.isfinite(truth)
     return np.abs(d[there] - truth[there]) / truth[there]
+
+
+def mean_error(d: np.ndarray, truth: np.ndarray) -> float:
+    """The mean of `relative_error`."""
+    return float(relative_error(d, truth).mean())
 
 
 def pygeodesic_distance(mesh: heat_igl.Mesh, source: int) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 import scipy.spatial
 from conftest import perturbed
 
-from heat_igl import Mesh, PolygonMesh, shapes
+from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
 
 
 def bumpy() -> Mesh:
@@ -118,6 +118,15 @@ def dual_of_sphere(subdivisions: int) -> PolygonMesh:
     """Hexagons and twelve pentagons, their vertices on the unit sphere."""
     mesh = dual(shapes.icosphere(subdivisions))
     return PolygonMesh(mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), mesh.polygons)
+
+
+def assert_connected(mesh: Mesh, *curves: SurfaceCurve, within: float = 1e-12) -> None:
+    """Each segment begins where the one before it ends, the first of a closed curve at its end."""
+    for curve in curves:
+        starts = np.einsum("kc,kcx->kx", curve.start, mesh.V[mesh.F[curve.faces]])
+        before = np.roll(curve.positions(mesh)[1:], 1, axis=0)
+        first = 0 if curve.is_closed else 1
+        np.testing.assert_allclose(before[first:], starts[first:], atol=within * np.ptp(mesh.V))
 
 
 def to_polyline(P: np.ndarray, corners: np.ndarray) -> np.ndarray:

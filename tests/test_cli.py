@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
+from conftest import ENVIRONMENT, run_python
 
 import heat_igl
 from heat_igl import MeshError, cli, drawing, io, shapes
@@ -24,18 +25,8 @@ from heat_igl.io import read_attributes, read_mesh, read_polylines, write_curves
 # --- The command line: what it prints, what it leaves behind, and how it fails
 
 
-ENVIRONMENT = {
-    **os.environ,
-    # The package under test, wherever the command runs.
-    "PYTHONPATH": os.pathsep.join([str(Path(heat_igl.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
-}
-
-
-def command(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "heat_igl", *map(str, arguments)],
-        cwd=cwd, env=ENVIRONMENT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+def command(*arguments: str | Path | float, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return run_python("-m", "heat_igl", *map(str, arguments), cwd=cwd)
 
 
 def files(folder: Path) -> set[str]:
@@ -146,9 +137,7 @@ def test_an_output_that_cannot_be_written(ball: Path, option: str) -> None:
 
 def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
     code = "import sys; sys.modules['typer'] = None; from heat_igl.__main__ import main; sys.exit(main())"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
-    )
+    done = run_python("-c", code, cwd=tmp_path)
     assert done.returncode == 1
     assert_one_line(done.stderr, "pip install typer rich")
 

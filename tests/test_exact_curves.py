@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import flat_perturbed
-from surfaces import cube, to_polyline
+from surfaces import assert_connected, cube, to_polyline
 from test_exact import delaunay
-from test_paths import MESHES, assert_on_surface, lengths
+from test_paths import MESHES, lengths
 
 from heat_igl import (
     GeodesicSolver,
@@ -109,7 +109,7 @@ def test_exact_paths_end_on_curves(name):
     paths = shortest_paths(mesh, used, level)
     distance = geodesic_distance(mesh, level, method="exact")[used]
     np.testing.assert_allclose(lengths(mesh, paths), distance, rtol=1e-12, atol=1e-14)
-    assert_on_surface(mesh, paths)
+    assert_connected(mesh, *paths)
 
 
 def test_labels_offsets_and_targets():

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed
+from surfaces import assert_connected
 
 import heat_igl
 from heat_igl import (
@@ -31,14 +32,6 @@ def length(mesh: Mesh, curve: SurfaceCurve) -> float:
 
 def begins(mesh: Mesh, curve: SurfaceCurve) -> np.ndarray:
     return np.einsum("kc,kcx->kx", curve.start, mesh.V[mesh.F[curve.faces]])
-
-
-def assert_connected(mesh: Mesh, curve: SurfaceCurve) -> None:
-    ends = curve.positions(mesh)
-    gap = np.abs(ends[:-1] - begins(mesh, curve)).max()
-    if curve.is_closed:
-        gap = max(gap, np.abs(ends[-1] - ends[0]).max())
-    assert gap <= 1e-9 * np.ptp(mesh.V)
 
 
 def fan(mesh: Mesh, v: int) -> tuple[dict[int, float], bool]:
@@ -84,7 +77,7 @@ def side_angles(mesh: Mesh, curve: SurfaceCurve) -> list[float]:
 
 def assert_locally_shortest(mesh: Mesh, curve: SurfaceCurve) -> None:
     """Straight across edges, angles of at least pi on both sides of vertices."""
-    assert_connected(mesh, curve)
+    assert_connected(mesh, curve, within=1e-9)
     kept = curve.lengths(mesh) > 1e-10 * np.ptp(mesh.V)
     curve = SurfaceCurve(curve.faces[kept], curve.start[kept], curve.end[kept], curve.is_closed)
     assert min(side_angles(mesh, curve), default=np.pi) >= np.pi - 1e-6
@@ -360,7 +353,7 @@ def test_edges_of_three_faces_are_crossed():
     far = np.argmax(mesh.V[:, 0]), np.argmax(mesh.V[:, 1])
     walk = edge_walk(mesh, [int(far[0]), int(far[1])])
     curve = straighten(mesh, walk)
-    assert_connected(mesh, curve)
+    assert_connected(mesh, curve, within=1e-9)
     exact = heat_igl.pair_distances(mesh, [far])[0]
     assert length(mesh, curve) == pytest.approx(exact, rel=1e-9)
 

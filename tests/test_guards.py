@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import mean_error
 
 import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, shapes
@@ -229,11 +230,6 @@ def test_heat_is_held_to_the_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
         assert (np.abs(found[i] - found[j]) <= 1.041 * np.linalg.norm(mesh.V[i] - mesh.V[j], axis=1)).all()
 
 
-def error(distance: FloatArray, truth: FloatArray) -> float:
-    there = np.isfinite(truth) & (truth > 0)
-    return float(np.mean(np.abs(distance[there] - truth[there]) / truth[there]))
-
-
 @pytest.mark.parametrize("kind", ["helix", "spiral ramp", "handles", "spiky sphere", "random tetrahedra", "clusters"])
 def test_heat_says_when_it_is_wrong(kind: str) -> None:
     """Kinds on which heat was off by more than 5 % in silence; more members are in scripts/accuracy.py."""
@@ -243,7 +239,7 @@ def test_heat_says_when_it_is_wrong(kind: str) -> None:
             warnings.simplefilter("always")
             solver = HeatMethodSolver(mesh)
             distance = solver.distance(7)
-        off = error(distance, GeodesicSolver(mesh, method="exact").distance(7))
+        off = mean_error(distance, GeodesicSolver(mesh, method="exact").distance(7))
         assert off < 0.05 or any("off by" in str(warning.message) for warning in caught)
         assert off > 0.02 or not any("off by" in str(warning.message) for warning in caught)
         compared = solver.diagnostics.compared

@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import perturbed, zoo
+from conftest import mean_error, perturbed, zoo
 from surfaces import moebius_strip
 
 import heat_igl
@@ -477,11 +477,6 @@ def test_points_keep_their_distance_from_a_vertex(coarse: IntrinsicTriangulation
 @pytest.fixture(scope="module")
 def refined() -> HeatMethodSolver:
     return HeatMethodSolver(stretched())
-
-
-def mean_error(distance: FloatArray, truth: FloatArray) -> float:
-    there = truth > 0
-    return float(np.mean(np.abs(distance - truth)[there] / truth[there]))
 
 
 def test_answers_are_at_the_vertices_of_the_mesh(refined: HeatMethodSolver) -> None:

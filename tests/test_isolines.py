@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from conftest import flat_perturbed, zoo
+from surfaces import assert_connected
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, isolines, shapes, write_curves
@@ -24,13 +25,6 @@ def length(mesh, curves):
 def signed_area(mesh, curve):
     x, y, _ = curve.positions(mesh).T
     return (x[:-1] * y[1:] - x[1:] * y[:-1]).sum() / 2
-
-
-def assert_connected(mesh, curve):
-    starts = np.einsum("kc,kcx->kx", curve.start, mesh.V[mesh.F[curve.faces]])
-    np.testing.assert_allclose(starts, curve.positions(mesh)[:-1], atol=1e-13)
-    if curve.is_closed:
-        np.testing.assert_allclose(curve.positions(mesh)[-1], curve.positions(mesh)[0], atol=1e-13)
 
 
 @pytest.mark.parametrize("method", ["heat", "exact"])

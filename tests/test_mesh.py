@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from surfaces import assert_connected
 
 import heat_igl
 from heat_igl import (
@@ -480,18 +481,6 @@ def test_a_face_out_of_range_is_refused():
 
 
 # --- projection
-
-
-def ends(mesh, curve):
-    """Where segments begin and end, in space."""
-    return tuple(np.einsum("sc,scx->sx", at, mesh.V[mesh.F[curve.faces]]) for at in (curve.start, curve.end))
-
-
-def assert_connected(mesh, curve):
-    start, end = ends(mesh, curve)
-    np.testing.assert_allclose(start[1:], end[:-1], atol=1e-12)
-    if curve.is_closed:
-        np.testing.assert_allclose(end[-1], start[0], atol=1e-12)
 
 
 def test_closest_points_and_their_gap():

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import perturbed
+from conftest import flat_perturbed, mean_error, perturbed
 
 import heat_igl
 from heat_igl import fibre_metric, metric_operators, shapes
@@ -14,24 +14,12 @@ from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators, operators
 from heat_igl.reference.baselines import graph_distance
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.validation import relative_error
-
-
-def flat(mesh: Mesh, seed: int = 0) -> Mesh:
-    """Perturbed within the plane."""
-    V = perturbed(mesh, 0.25, seed).V.copy()
-    V[:, 2] = 0
-    return Mesh(V, mesh.F)
 
 
 def distance(domain: Operators, source: int = 0, method: str = "heat") -> FloatArray:
     if method != "heat":
         return heat_igl.GeodesicSolver(domain, method=method).distance(source)
     return heat_igl.HeatMethodSolver(domain).distance(source)
-
-
-def error(found: FloatArray, exact: FloatArray) -> float:
-    return float(np.nanmean(relative_error(found, exact)))
 
 
 def stretch(ratio: float, degrees: float = 30.0) -> FloatArray:
@@ -44,7 +32,7 @@ def stretch(ratio: float, degrees: float = 30.0) -> FloatArray:
 @pytest.mark.parametrize("ratio", [1.0, 4.0, 100.0])
 def test_one_tensor_is_a_linear_map(ratio):
     """Operators, heat and unfolding are those of the mesh that the map makes."""
-    mesh, A = flat(shapes.grid(24)), stretch(ratio)
+    mesh, A = flat_perturbed(shapes.grid(24), 0.25), stretch(ratio)
     mapped = Mesh(mesh.V @ A.T, mesh.F)
     domain = metric_operators(mesh, np.tile(A.T @ A, (mesh.n_faces, 1, 1)))
     expected = operators(mapped, "auto")
@@ -53,11 +41,11 @@ def test_one_tensor_is_a_linear_map(ratio):
     assert domain.mean_edge_length == pytest.approx(expected.mean_edge_length, rel=1e-3)
     exact = np.linalg.norm(mapped.V - mapped.V[300], axis=1)
     for method in ("sweep", "exact"):
-        assert error(distance(domain, 300, method=method), exact) < 1e-4
-    assert error(distance(domain, 300), exact) < 0.015
+        assert mean_error(distance(domain, 300, method=method), exact) < 1e-4
+    assert mean_error(distance(domain, 300), exact) < 0.015
     # Straight lines are there on the mesh alone.
-    on_mesh = error(heat_igl.HeatMethodSolver(mapped).distance(300), exact)
-    assert error(distance(domain, 300), exact) < 1.1 * on_mesh + 0.006
+    on_mesh = mean_error(heat_igl.HeatMethodSolver(mapped).distance(300), exact)
+    assert mean_error(distance(domain, 300), exact) < 1.1 * on_mesh + 0.006
 
 
 def test_metrics_in_the_plane_of_each_face_and_in_space():
@@ -86,7 +74,7 @@ def test_a_plane_with_the_metric_of_a_helicoid():
     """(u, v) -> (u cos v, u sin v, c v) has the metric du^2 + (u^2 + c^2) dv^2."""
     c, errors = 0.7, []
     for n in (20, 40):
-        plane = flat(shapes.grid(n))
+        plane = flat_perturbed(shapes.grid(n), 0.25)
         u, v = plane.V[:, 0] * 2 - 1, plane.V[:, 1] * 3
         helicoid = Mesh(np.stack([u * np.cos(v), u * np.sin(v), c * v], axis=1), plane.F)
         plane = Mesh(np.stack([u, v, 0 * u], axis=1), plane.F)
@@ -97,7 +85,7 @@ def test_a_plane_with_the_metric_of_a_helicoid():
         assert domain.surface is not None
         source = int(np.argmin(np.hypot(u - 0.6, v - 0.5)))
         exact = heat_igl.geodesic_distance(helicoid, source)
-        errors.append([error(distance(domain, source, method=method), exact) for method in ("exact", "heat")])
+        errors.append([mean_error(distance(domain, source, method=method), exact) for method in ("exact", "heat")])
     assert errors[1][0] < 0.5 * errors[0][0]
     assert errors[1][0] < 0.002
     assert errors[1][1] < 0.02
@@ -121,7 +109,7 @@ def test_fibres_around_a_cylinder():
     ways = [step - step[source] + turn * around for turn in (-2, -1, 0, 1, 2)]
     exact = np.min([np.hypot(way @ direction, 3 * (way @ normal)) for way in ways], axis=0)
     for method, bound in (("exact", 0.006), ("heat", 0.04)):
-        assert error(distance(domain, source, method=method), exact) < bound, method
+        assert mean_error(distance(domain, source, method=method), exact) < bound, method
 
 
 def cylinder(around: int, rows: int) -> tuple[FloatArray, IntArray]:
@@ -137,7 +125,7 @@ def cylinder(around: int, rows: int) -> tuple[FloatArray, IntArray]:
 def test_a_piecewise_constant_metric_that_fits_together():
     """Half of a square is stretched across the border, along which both halves agree: a rectangle."""
     mesh = shapes.grid(24)
-    moved = flat(mesh).V
+    moved = flat_perturbed(mesh, 0.25).V
     mesh = Mesh(np.where(mesh.V[:, :1] == 0.5, mesh.V, moved), mesh.F)
     V = mesh.V.copy()
     V[:, 0] += 2 * np.maximum(V[:, 0] - 0.5, 0)
@@ -146,15 +134,15 @@ def test_a_piecewise_constant_metric_that_fits_together():
     assert domain.surface is not None
     exact = np.linalg.norm(V - V[100], axis=1)
     for method in ("sweep", "exact"):
-        assert error(distance(domain, 100, method=method), exact) < 1e-6
-    assert error(distance(domain, 100), exact) < 0.015
+        assert mean_error(distance(domain, 100, method=method), exact) < 1e-6
+    assert mean_error(distance(domain, 100), exact) < 0.015
 
 
 def test_layers_by_snells_law():
     """Three layers: the time is the least over where the straight pieces cross the two borders."""
     speeds, borders = np.array([1.0, 2.5, 0.5]), (1 / 3, 2 / 3)
     mesh = shapes.grid(48)
-    moved = flat(mesh).V
+    moved = flat_perturbed(mesh, 0.25).V
     on_border = np.abs(mesh.V[:, :1] - np.array(borders)).min(axis=1) < 1e-9
     mesh = Mesh(np.where(on_border[:, None], mesh.V, moved), mesh.F)
     layer = np.searchsorted(borders, mesh.V[mesh.F][:, :, 0].mean(axis=1))
@@ -175,7 +163,7 @@ def test_layers_by_snells_law():
 @pytest.mark.parametrize("ratio", [2.0, 5.0, 20.0])
 def test_no_distance_is_negative_where_fibres_change_at_every_edge(ratio):
     """Distance is no longer than along edges, and no shorter than in the plane in the metric's shortest direction."""
-    mesh = flat(shapes.grid(16))
+    mesh = flat_perturbed(shapes.grid(16), 0.25)
     angle = np.random.default_rng(0).uniform(0, np.pi, mesh.n_faces)
     fibres = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     domain = metric_operators(mesh, fibre_metric(fibres, along=1.0, across=ratio))
@@ -187,7 +175,7 @@ def test_no_distance_is_negative_where_fibres_change_at_every_edge(ratio):
 
 
 def test_points_are_sources_in_a_metric():
-    mesh, A = flat(shapes.grid(12)), stretch(5.0)
+    mesh, A = flat_perturbed(shapes.grid(12), 0.25), stretch(5.0)
     domain = metric_operators(mesh, np.tile(A.T @ A, (mesh.n_faces, 1, 1)))
     inside = heat_igl.SurfacePoints([100], [[0.2, 0.3, 0.5]])
     place = inside.barycentric[0] @ mesh.V[mesh.F[100]]

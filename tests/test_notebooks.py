@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import json
-import os
 import re
 import subprocess
 import sys
@@ -12,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-import heat_igl
+from conftest import ENVIRONMENT
 
 pytest.importorskip("nbclient")
 pytest.importorskip("ipykernel")
@@ -51,9 +49,8 @@ def test_notebooks_are_numbered() -> None:
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs(path: Path, tmp_path: Path) -> None:
     environment = {
-        **{name: value for name, value in os.environ.items() if name not in NO_DISPLAY},
+        **{name: value for name, value in ENVIRONMENT.items() if name not in NO_DISPLAY},
         **dict.fromkeys(("http_proxy", "https_proxy"), "http://127.0.0.1:9"),  # nothing listens there
-        "PYTHONPATH": os.pathsep.join([str(Path(heat_igl.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
         "IPYTHONDIR": str(tmp_path / "ipython"),
         "JUPYTER_PLATFORM_DIRS": "1",
     }

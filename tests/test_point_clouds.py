@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import surfaces
+from conftest import mean_error
 
 import heat_igl
 from heat_igl import (
@@ -53,11 +54,6 @@ def cylinder(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Points, and their angle and height."""
     angle, height = np.random.default_rng(seed).random((2, n)) * [[2 * np.pi], [3]]
     return np.stack([np.cos(angle), np.sin(angle), height], axis=1), np.stack([angle, height], axis=1)
-
-
-def mean_error(distance: np.ndarray, truth: np.ndarray) -> float:
-    away = truth > 0
-    return float((np.abs(distance - truth)[away] / truth[away]).mean())
 
 
 # The triangles.

@@ -14,7 +14,7 @@ import igl
 import numpy as np
 import psutil
 import pytest
-from conftest import wheel_path, zoo
+from conftest import relative_error, wheel_path, zoo
 from scipy.spatial import Delaunay
 
 from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
@@ -59,11 +59,6 @@ def flat_torus(n: int, m: int) -> tuple[Mesh, FloatArray, FloatArray]:
     return Mesh(V, F), np.stack([along.ravel(), up.ravel()], axis=1), np.array([n * side, 2.0])
 
 
-def relative(distance: FloatArray, truth: FloatArray) -> FloatArray:
-    away = np.isfinite(truth) & (truth > 0)
-    return np.asarray(np.abs(distance[away] - truth[away]) / truth[away])
-
-
 # --- exact -----------------------------------------------------------------------------------------------------------
 
 
@@ -76,7 +71,7 @@ def test_exact_solvers_agree(name: str) -> None:
     for solver, tolerance in (("pygeodesic", 1e-10), ("gdist", 1e-10), ("igl", 1e-6)):
         other = reference.exact(mesh, source, solver=solver)
         assert np.array_equal(np.isinf(other), np.isinf(truth))
-        assert relative(other, truth).max() < tolerance
+        assert relative_error(other, truth).max() < tolerance
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -85,7 +80,7 @@ def test_exact_from_several_sources_is_the_minimum_over_them(solver: str) -> Non
     sources = [5, 1200, 2800]
     alone = np.min([reference.exact(mesh, source, solver=solver) for source in sources], axis=0)
     together = reference.exact(mesh, [*sources, 5], solver=solver)
-    assert relative(together, alone).max() < 1e-9
+    assert relative_error(together, alone).max() < 1e-9
     assert (together[sources] == 0).all()
 
 
@@ -100,7 +95,7 @@ def test_exact_is_approached_from_above_by_independent_paths() -> None:
     for per_edge in (3, 7, 15):
         above = graph_distance(mesh, 7, per_edge)[0]
         assert (above >= truth * (1 - 1e-12)).all()
-        excess.append(relative(above, truth).mean())
+        excess.append(relative_error(above, truth).mean())
     assert 3 < excess[0] / excess[1] < 6
     assert 3 < excess[1] / excess[2] < 6
     assert excess[2] < 2e-3
@@ -111,7 +106,7 @@ def test_exact_is_approached_from_above_by_independent_paths() -> None:
 def test_exact_does_not_depend_on_the_unit(solver: str, factor: float) -> None:
     mesh = cow()
     truth = reference.exact(mesh, 2470, solver=solver) * factor
-    assert relative(reference.exact(Mesh(mesh.V * factor, mesh.F), 2470, solver=solver), truth).max() < 1e-9
+    assert relative_error(reference.exact(Mesh(mesh.V * factor, mesh.F), 2470, solver=solver), truth).max() < 1e-9
 
 
 def test_exact_is_inf_beyond_the_component_and_at_unreferenced_vertices() -> None:
@@ -219,7 +214,7 @@ def test_exact_tends_to_the_smooth_surface_with_the_square_of_the_edge(
     for level in range(4):
         mesh = build(level)
         source = mesh.n_vertices - 1 - 2 * 2**level  # on the rim, a quarter of a turn from where angles jump
-        errors.append(relative(reference.exact(mesh, source), closed(mesh, source)).mean())
+        errors.append(relative_error(reference.exact(mesh, source), closed(mesh, source)).mean())
     ratios = np.array(errors[:-1]) / errors[1:]
     assert (ratios[1:] > 3.3).all()
     assert (ratios[1:] < 4.8).all()
@@ -231,7 +226,7 @@ def test_exact_on_a_fine_sphere() -> None:
     mesh = shapes.icosphere(7)
     found = reference.measured("pygeodesic", mesh, 5)
     # Inscribed with edges of h = 0.0094, the polyhedron is shorter by a fraction of h^2 = 9e-5.
-    assert relative(found.distance, closed_forms.sphere(mesh, 5)).mean() < 2e-5
+    assert relative_error(found.distance, closed_forms.sphere(mesh, 5)).mean() < 2e-5
     assert found.peak_memory is None or 1e9 < found.peak_memory < 4e9
 
 
@@ -261,10 +256,10 @@ def test_convex_solid_is_the_straight_line() -> None:
 def test_heat_filter_of_meshlab_survives_an_offset() -> None:
     mesh = cow()
     near = reference.meshlab_heat(mesh, 5)
-    assert 0 < relative(near, reference.exact(mesh, 5)).mean() < 0.1
+    assert 0 < relative_error(near, reference.exact(mesh, 5)).mean() < 0.1
     # At 1e6 the coordinates keep ten digits, of which single precision leaves none.
     far = Mesh(mesh.V + 1e6, mesh.F)
-    assert relative(reference.meshlab_heat(far, 5), near).max() < 1e-2
+    assert relative_error(reference.meshlab_heat(far, 5), near).max() < 1e-2
 
 
 INEXACT: dict[str, Callable[..., FloatArray]] = {
@@ -281,7 +276,7 @@ def test_unreachable_is_inf_in_all(name: str) -> None:
     pair = Mesh(np.vstack([mesh.V, mesh.V + 5, [[0, 0, 0]]]), np.vstack([mesh.F, mesh.F + n]))
     distance = INEXACT[name](pair, [3, 900])
     assert np.isinf(distance[n:]).all()
-    assert relative(distance[:n], reference.exact(mesh, [3, 900])).mean() < 0.1
+    assert relative_error(distance[:n], reference.exact(mesh, [3, 900])).mean() < 0.1
     both = INEXACT[name](pair, [3, n + 900])
     assert np.isfinite(both[: 2 * n]).all()
     assert np.isinf(both[2 * n])

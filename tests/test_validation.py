@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import subprocess
-import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +14,7 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import zoo
+from conftest import run_python, zoo
 
 import heat_igl
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, reference, shapes, validate, validation
@@ -320,12 +318,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def command(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    root = str(Path(heat_igl.__file__).parents[1])
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
-    return subprocess.run(
-        [sys.executable, "-m", "heat_igl", "validate", *options],
-        cwd=folder / "meshes", env=environment, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+    return run_python("-m", "heat_igl", "validate", *options, cwd=folder / "meshes")
 
 
 def test_command_prints_and_writes_the_report(folder: Path) -> None:
