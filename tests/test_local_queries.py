@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import perturbed, zoo
+from conftest import perturbed
 from surfaces import bent_pages, bumpy, two_arms
 
 import heat_igl
@@ -207,16 +207,6 @@ def test_a_cutoff_ends_the_search():
     assert all(less < more for less, more in pairwise(windows))
     # On a sphere of radius 1 a cap of radius 0.2 is a hundredth of the area.
     assert windows[1] < 0.03 * windows[-1]
-
-
-def test_edges_of_four_faces():
-    mesh = zoo("voxel blob")
-    sources = [0, 100, 250]
-    indices, distances = nearest_vertices(mesh, 12, sources)
-    for i, v in enumerate(sources):
-        exact = exact_distance(mesh.V, mesh.F, v)
-        np.testing.assert_allclose(distances[i], np.sort(exact)[:12], rtol=1e-13)
-        np.testing.assert_allclose(exact[indices[i][indices[i] >= 0]], distances[i][indices[i] >= 0], rtol=1e-13)
 
 
 def test_distances_that_will_not_fit_into_memory_are_refused_early(monkeypatch):

@@ -1,4 +1,4 @@
-"""Identities that hold to rounding, on triangles, intrinsic Delaunay triangulations and tetrahedra."""
+"""Identities that hold to rounding, on every kind of domain."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from conftest import perturbed
 from scipy.spatial import Delaunay
+from surfaces import bent_pages
 
-from heat_igl import Mesh, MeshError, shapes
+from heat_igl import Mesh, MeshError, PointCloud, shapes, speed_operators
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_gradient, intrinsic_triangulation
-from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators
+from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators, point_cloud_operators
 from heat_igl.operators.simplices import cotangent_laplacian
 
 
@@ -29,7 +30,15 @@ DOMAINS = {
     "unreferenced vertices": lambda: operators(
         Mesh(np.vstack([[[9, 9, 9]], bad_sphere().V, [[8, 8, 8]]]), bad_sphere().F + 1)
     ),
+    "edges of three faces": lambda: operators(bent_pages()),
+    "points": lambda: point_cloud_operators(PointCloud(shapes.icosphere(2).V)),
+    "speeds on triangles": lambda: with_speeds(perturbed(shapes.torus(12, 30))),
+    "speeds in tetrahedra": lambda: with_speeds(perturbed(shapes.box(4))),
 }
+
+
+def with_speeds(mesh: Mesh) -> Operators:
+    return speed_operators(mesh, np.random.default_rng(0).choice([0.5, 1, 3], mesh.n_faces))
 
 
 @pytest.fixture(params=DOMAINS, ids=str)
