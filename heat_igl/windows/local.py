@@ -161,10 +161,8 @@ def nearest_vertices(
         If `k` is not a positive integer.
     MemoryError
         If s rows of k do not fit into memory.
-    MeshError
-        If the mesh cannot be used, or is tetrahedral.
-    SourceError
-        If `sources` does not name vertices.
+    MeshError, SourceError
+        As for `distances_within`.
 
     Examples
     --------

@@ -11,33 +11,11 @@ from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.kernels.windows import paths
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
-from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.windows.exact import Searched, search, starts_at
-from heat_igl.windows.tables import MARGIN, Tables, from_triangulation
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.windows.exact import search, starts_at
+from heat_igl.windows.tables import MARGIN, from_triangulation
 
-__all__ = ["ExactPaths", "PathStarts", "exact_paths"]
-
-
-class PathStarts(NamedTuple):
-    """The ends of k paths to trace back, by the numbers of the tables: vertices, or targets of the search.
-
-    Attributes
-    ----------
-    vertex : (k,) int32
-        The vertex; -1 for a target.
-    face, barycentric : (k,) int32, (k, 3) float64
-        The target, or a corner at the vertex.
-    distance, root, entered, crossing : (k,)
-        Result of the search there.
-    """
-
-    vertex: AnyArray
-    face: AnyArray
-    barycentric: FloatArray
-    distance: FloatArray
-    root: AnyArray
-    entered: AnyArray
-    crossing: FloatArray
+__all__ = ["ExactPaths", "exact_paths"]
 
 
 class ExactPaths(NamedTuple):
@@ -104,31 +82,12 @@ def exact_paths(
     )
     inside = SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None
     done = search(tables, sources_there, targets=inside, goals=np.unique(vertex[is_corner]))
-    starts = _starts(tables, done, vertex)
-    ends = np.zeros(len(vertex), np.int64)
-    where, places = paths.trace_back(tables, done.found, done.starts, starts, ends)
+    number = np.where(is_corner, tables.number[vertex], -1).astype(np.int32)
+    target, ends = np.full(len(faces), -1), np.zeros(len(faces), np.int64)
+    target[~is_corner] = done.nearest_copy(int((~is_corner).sum()))
+    where, places = paths.trace_back(tables, done.found, done.starts, done.targets, number, target, ends)
+    distance = done.found.distance[number]
+    distance[~is_corner] = done.targets.found.distance[target[~is_corner]]
     return ExactPaths(
-        tables.face[where].astype(np.int64), places, np.append(0, ends), tables.unscaled(starts.distance) + begin
+        tables.face[where].astype(np.int64), places, np.append(0, ends), tables.unscaled(distance) + begin
     )
-
-
-def _starts(tables: Tables, done: Searched, vertex: IntArray) -> PathStarts:
-    """Starts of paths, by the caller's numbers: `vertex`, or where that is -1, the targets one after the other."""
-    at, place = done.targets.found, done.targets.place
-    k, of_target = len(vertex), np.flatnonzero(vertex < 0)
-    which = done.nearest_copy(len(of_target))
-    number = tables.number[vertex]
-    corner = tables.corner_of_vertex[number]
-    starts = PathStarts(
-        np.where(vertex < 0, -1, number).astype(np.int32),
-        (corner // 3).astype(np.int32),
-        np.eye(3)[corner % 3],
-        done.found.distance[number],
-        np.full(k, -1, np.int32),
-        np.full(k, -1, np.int32),
-        np.zeros(k),
-    )
-    found = (place.faces, place.barycentric, at.distance, at.root, at.entered, at.crossing)
-    for column, values in zip(starts[1:], found, strict=True):
-        column[of_target] = values[which]
-    return starts

@@ -44,7 +44,7 @@ def breadth_first(edges, n: cython.int, start: cython.int):
     vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
     alignment, lengths = np.empty(3 * m, np.uint8), np.empty(3 * m)
     numbers, faces = np.full(n, -1, np.int32), np.empty(m, np.int32)
-    search: _Search = _Search()
+    search: _Numbering = _Numbering()
     search.vertex, search.twin, search.aligned, search.length = edges.vertex, edges.twin, edges.aligned, edges.length
     search.new_vertex, search.new_twin, search.new_aligned, search.new_length = vertices, twins, alignment, lengths
     search.number, search.face, search.place = numbers, faces, np.full(m, -1, np.int32)
@@ -71,7 +71,7 @@ def breadth_first(edges, n: cython.int, start: cython.int):
 
 @cython.final
 @cython.cclass
-class _Search:
+class _Numbering:
     """Input and results of a breadth-first search over the faces."""
 
     vertex: cython.const[cython.int][::1]

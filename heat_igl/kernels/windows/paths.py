@@ -53,7 +53,15 @@ class InnerSources:
         return self.segment_offset[i]
 
 
-def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
+def trace_back(
+    tables,
+    found,
+    sources,
+    targets,
+    vertex: cython.const[cython.int][::1],
+    target: cython.const[cython.longlong][::1],
+    end: cython.longlong[::1],
+):
     """Paths from vertices and points to the sources of a search.
 
     Parameters
@@ -64,8 +72,10 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
         What `windows.search` found for the vertices.
     sources : Starts
         Its sources.
-    begin : PathStarts
-        Where the k paths begin; see `heat_igl.windows.traced_paths.PathStarts`.
+    targets : Targets
+        Points whose distance was asked for.
+    vertex, target : (k,)
+        Where the paths end: a vertex, or if that is -1, one of the places of `targets`.
     end : (k,)
         Takes where the segments of each path end; nothing is added for a path that was lost.
 
@@ -76,13 +86,13 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
     """
     tracer: PathTracer = PathTracer(tables, found, sources)
     segments: Segments = tracer.segments
-    vertex: cython.const[cython.int][::1] = begin.vertex
-    from_face: cython.const[cython.int][::1] = begin.face
-    from_place: cython.const[cython.double][:, ::1] = begin.barycentric
-    from_distance: cython.const[cython.double][::1] = begin.distance
-    from_root: cython.const[cython.int][::1] = begin.root
-    from_entered: cython.const[cython.int][::1] = begin.entered
-    from_crossing: cython.const[cython.double][::1] = begin.crossing
+    corner_of_vertex: cython.const[cython.int][::1] = tables.corner_of_vertex
+    face: cython.const[cython.int][::1] = targets.place.faces
+    place: cython.const[cython.double][:, ::1] = targets.place.barycentric
+    distance: cython.const[cython.double][::1] = targets.found.distance
+    root: cython.const[cython.int][::1] = targets.found.root
+    entered: cython.const[cython.int][::1] = targets.found.entered
+    crossing: cython.const[cython.double][::1] = targets.found.crossing
     i: cython.Py_ssize_t
     line_end: LineEnd
     here: cython.double[3]
@@ -91,15 +101,16 @@ def trace_back(tables, found, sources, begin, end: cython.longlong[::1]):
             tracer.n_steps = 0
             first: cython.longlong = segments.n
             v: cython.int = vertex[i]
-            line_end.x, line_end.y, line_end.z = from_place[i, 0], from_place[i, 1], from_place[i, 2]
-            line_end.face, line_end.distance, line_end.root = from_face[i], from_distance[i], from_root[i]
-            line_end.entered, line_end.crossing = from_entered[i], from_crossing[i]
             if v < 0:
+                j: cython.longlong = target[i]
+                line_end.x, line_end.y, line_end.z = place[j, 0], place[j, 1], place[j, 2]
+                line_end.face, line_end.distance, line_end.root = face[j], distance[j], root[j]
+                line_end.entered, line_end.crossing = entered[j], crossing[j]
                 v = tracer.along_bends(tracer.straight(cython.address(line_end)))
             elif tracer.root[v] == v:
                 # A segment without length, at a source.
-                at_corner(2 if line_end.z == 1.0 else 1 if line_end.y == 1.0 else 0, here)
-                segments.append(line_end.face, here, here)
+                at_corner(corner_of_vertex[v] % 3, here)
+                segments.append(corner_of_vertex[v] // 3, here, here)
             else:
                 v = tracer.along_bends(v)
             if v == LOST:
