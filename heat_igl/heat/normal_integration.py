@@ -61,7 +61,7 @@ class NormalIntegration:
         self._V, self._F, self._n = mesh.V, mesh.F, mesh.n_vertices
         self._faces, self._triangulation = faces, triangulation
         self._mean_edge_length = domain.mean_edge_length
-        self._poisson = parts.last_steps.poisson
+        self._poisson = parts.poisson
         self._vector_flow = VectorHeatFlow(
             domain, edge_rotations(domain), _one_or_all(parts.time_steps), backend, parts.fitted
         )

@@ -14,7 +14,6 @@ import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, positive, require_choice
 from heat_igl.heat.checking import Checker, Comparisons
-from heat_igl.heat.integration import Integration
 from heat_igl.heat.solution import Diagnostics
 from heat_igl.heat.source_terms import SourceAssembler
 from heat_igl.linear import Analysis, Backend
@@ -178,8 +177,10 @@ class SolverParts:
         From sources to right-hand sides.
     heat_flow : HeatFlow
         Step 1, factored.
-    last_steps : Integration
-        Steps 2 and 3.
+    divergence : NormalizedDivergence
+        Step 2, for the field without known distances near the sources.
+    poisson : PoissonProblem
+        Step 3, factored.
     time_steps : (n_components,) float64
         Time step of each component.
     t_damping : float, (n_components,) float64 or None
@@ -205,7 +206,8 @@ class SolverParts:
     analysis: Analysis
     assembler: SourceAssembler
     heat_flow: HeatFlow
-    last_steps: Integration
+    divergence: NormalizedDivergence
+    poisson: PoissonProblem
     time_steps: FloatArray
     t_damping: float | FloatArray | None
     fitted: bool
@@ -284,7 +286,6 @@ def prepare(
     heat_flow, poisson, divergence = _factored(domain, options, step, found, t_damping, fitted)
     factored = time.perf_counter()
     assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped)
-    last_steps = Integration(domain, heat_flow, divergence, poisson, t_damping, fitted, assembler.triangulation)
     triangulation = None if domain.surface is None else domain.surface.triangulation
     factors = [*heat_flow.factors, poisson.factor]
     diagnostics = Diagnostics(
@@ -309,7 +310,8 @@ def prepare(
         analysis=found,
         assembler=assembler,
         heat_flow=heat_flow,
-        last_steps=last_steps,
+        divergence=divergence,
+        poisson=poisson,
         time_steps=np.broadcast_to(step, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,

@@ -156,10 +156,6 @@ class SourceAssembler:
     plain : bool
         Around source vertices take every distance from heat, as the paper does, and none from edges.
 
-    Attributes
-    ----------
-    triangulation : IntrinsicTriangulation or None
-        The triangles that are solved on.
     """
 
     def __init__(
@@ -175,7 +171,6 @@ class SourceAssembler:
         # Of each component, if each has a time step.
         self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
         surface = domain.surface
-        self.triangulation = None if surface is None else surface.triangulation
         given = domain.given_surface
         self._faces = None if given is None else given.faces
         # In edges of the mesh: if vertices were added, the operators have shorter ones.
@@ -348,17 +343,6 @@ class SourceAssembler:
     def _h_at(self, vertex: IntArray) -> FloatArray:
         """Mean edge length (k,) of the components of some vertices."""
         return np.asarray(self._h[self._domain.components[vertex]])
-
-
-def take_shorter(distance: FloatArray, seeds: Seeds, error: float, start: FloatArray) -> BoolArray:
-    """Set known values if they are shorter, or longer by less than the error of `distance`; which were.
-
-    The error is relative to the distance from `start` (n,), the value at the source.
-    """
-    begin = start[seeds.vertex]
-    taken = seeds.value - begin < (distance[seeds.vertex] - begin) * (1 + error)
-    distance[seeds.vertex[taken]] = seeds.value[taken]
-    return np.asarray(taken)
 
 
 def drop_overtaken(term: SourceTerm, heat_flow: HeatFlow, n: int) -> SourceTerm:
