@@ -11,9 +11,9 @@ import scipy.sparse as sp
 
 from heat_igl.errors import SourceError
 from heat_igl.heat.parts import SolverParts
-from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_gradient, lay_out
+from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
 from heat_igl.mesh import Mesh
-from heat_igl.operators import Operators, divergence_matrix, edge_rotations, face_rotations
+from heat_igl.operators import Operators, TriangleElements, divergence_matrix, edge_rotations, face_rotations
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, both
 from heat_igl.sources import OrientedSet
 from heat_igl.steps import HeatFlow, PoissonProblem, VectorHeatFlow
@@ -66,7 +66,7 @@ class NormalIntegration:
             domain, edge_rotations(domain), _one_or_all(parts.time_steps), backend, parts.fitted
         )
         self._rotations = face_rotations(domain)
-        gradient = intrinsic_gradient(triangulation).tocsr()
+        gradient = TriangleElements(triangulation).matrix().tocsr()
         self._D = divergence_matrix(gradient, triangulation.areas)
         self._levels = CurveLevels(domain, mesh.F, parts.heat_flow, self._poisson)
 

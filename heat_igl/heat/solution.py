@@ -82,7 +82,7 @@ class HeatSolution:
         falls below 1e-308 it reads 0; the steps themselves run on a multiple that does not.
     direction : (m, d) float64
         Unit vectors X of step 2, per face of the triangulation that was solved on, d = 3 components in space or
-        d = 2 in the face's own frame (`intrinsic_gradient`); 0 on faces without heat.
+        d = 2 in the face's own frame (`TriangleElements`); 0 on faces without heat.
     magnitude : (m,) float64
         Length that X was given for step 3: 1, or `damping` if heat arrives from several sides.
     distance : (n,) float64

@@ -6,7 +6,6 @@ from heat_igl.intrinsic.gluing import from_edge_lengths as from_edge_lengths
 from heat_igl.intrinsic.gluing import from_gluing as from_gluing
 from heat_igl.intrinsic.gluing import intrinsic_triangulation as intrinsic_triangulation
 from heat_igl.intrinsic.gluing import oriented as oriented
-from heat_igl.intrinsic.gradient import intrinsic_gradient as intrinsic_gradient
 from heat_igl.intrinsic.half_edges import HalfEdges as HalfEdges
 from heat_igl.intrinsic.half_edges import mollify as mollify
 from heat_igl.intrinsic.history import Covered as Covered

@@ -63,23 +63,10 @@ def carry_lengths_back(
 def carry_lengths(
     triangulation: IntrinsicTriangulation, by_side: FloatArray, n_before: int = 0, places: PlaceSlopes | None = None
 ) -> tuple[FloatArray, FloatArray | None]:
-    """How the sides of a triangulation change when those of earlier faces change.
+    """How the sides of a triangulation change when those of earlier faces change: `carry_lengths_back`, forth.
 
-    Parameters
-    ----------
-    triangulation, n_before
-        As for `carry_lengths_back`.
-    by_side : (m', 3) float64
-        Changes of the sides of the earlier faces.
-    places : PlaceSlopes, optional
-        Points, with the changes of their coordinates in the given faces.
-
-    Returns
-    -------
-    by_side : (m, 3) float64
-        Changes of the sides.
-    by_place : (p, 3) float64 or None
-        Changes of the points' coordinates in the triangulation.
+    Takes the changes (m', 3) of the sides of the earlier faces, and points with the changes of their coordinates in the
+    given faces; returns the changes (m, 3) of the sides, and those (p, 3) of the coordinates in the triangulation.
     """
     by_side = by_side.copy()
     visited = [] if places is None else places.visited(triangulation)

@@ -76,18 +76,10 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
 
 
 def closed_cover(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
-    """The tufted cover of triangles that meet two by two at their edges, without positions.
+    """The tufted cover of triangles that meet two by two at their edges, without positions; see `tufted_cover`.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        m triangles, no three at an edge; a boundary and faces that are not oriented alike are welcome.
-
-    Returns
-    -------
-    IntrinsicTriangulation
-        As `tufted_cover` makes it: inner edges are glued front to front and back to back, or front to back if the
-        two faces are not aligned, and boundary edges front to back.
+    Inner edges are glued front to front and back to back, or front to back if the two faces are not aligned, and
+    boundary edges front to back.
     """
     F, lengths, m = triangulation.F, triangulation.l, len(triangulation.F)
     front = np.arange(F.size)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.intrinsic import IntrinsicTriangulation, apex, intrinsic_gradient
+from heat_igl.intrinsic import IntrinsicTriangulation, apex
 from heat_igl.typing import FloatArray, IntArray
 
 __all__ = ["EdgeLengths", "TriangleElements"]
@@ -35,21 +34,31 @@ class TriangleElements:
     ----------
     triangulation : IntrinsicTriangulation
         The triangles.
-    make_matrix : callable
-        Makes the gradient as a matrix (d m, n).
+    in_space : callable, optional
+        Makes the gradient in space (3 m, n).
     """
 
     triangulation: IntrinsicTriangulation
-    make_matrix: Callable[[], sp.csc_matrix]
-
-    @classmethod
-    def in_planes(cls, triangulation: IntrinsicTriangulation) -> TriangleElements:
-        """Elements whose gradients have two components, in the plane of each triangle (`intrinsic_gradient`)."""
-        return cls(triangulation, partial(intrinsic_gradient, triangulation))
+    in_space: Callable[[], sp.csc_matrix] | None = None
 
     def matrix(self) -> sp.csc_matrix:
-        """The gradient G (d m, n), made anew."""
-        return self.make_matrix()
+        """The gradient G (d m, n), made anew: in space, or d = 2 in the plane of each triangle (paper, equation 5).
+
+        Then row f is the component along the edge from corner 0 to corner 1 of triangle f, and row m + f the one
+        across it, towards corner 2. Unit 1 / length.
+        """
+        if self.in_space is not None:
+            return self.in_space()
+        (per_base, foot, per_height), zero = self.frames(), np.zeros(len(self.corners))
+        along = -per_base, per_base, zero
+        across = (foot - 1) * per_height, -foot * per_height, per_height
+        values = np.stack([np.stack(part, axis=1) for part in (along, across)])
+        columns = np.tile(self.corners.astype(np.int32), (2, 1)).ravel()
+        starts = np.arange(0, values.size + 1, 3, dtype=np.int32)
+        rows = sp.csr_matrix((values.ravel(), columns, starts), shape=(len(starts) - 1, self.triangulation.n))
+        if (self.corners[:, [1, 2, 0]] == self.corners).any():
+            rows.sum_duplicates()  # an edge from a vertex to itself
+        return rows.tocsc()
 
     @property
     def corners(self) -> IntArray:

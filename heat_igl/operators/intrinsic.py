@@ -44,7 +44,7 @@ def intrinsic_operators(
         on_laplacian(L)
     referenced = np.zeros(n, bool)
     referenced[F] = True
-    elements = TriangleElements.in_planes(triangulation)
+    elements = TriangleElements(triangulation)
     components = connectivity.connected_components(F, n) if paths is None or paths.n_vertices < n else paths.components
     if paths is not None:
         of_given = paths.longest_distances

@@ -46,21 +46,10 @@ _MOST_SAMPLES = 1000
 def fit_for_heat(
     triangulation: IntrinsicTriangulation, laplacian: Laplacian, component: IntArray
 ) -> IntrinsicTriangulation:
-    """The triangles that heat is solved on, by the option `laplacian` of `operators`.
+    """The triangles that heat is solved on, by the option `laplacian` of `operators` other than "cotan".
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        Intrinsic Delaunay, no three faces at an edge.
-    laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined"}
-        See `operators`.
-    component : (n,) int64
-        Component of each vertex.
-
-    Returns
-    -------
-    IntrinsicTriangulation
-        `triangulation` itself, its tufted cover, or a refinement of one of them.
+    Of an intrinsic Delaunay triangulation, no three faces at an edge, with the component (n,) of each vertex: itself,
+    its tufted cover, or a refinement of one of them.
     """
     n_components = int(component.max(initial=-1)) + 1
     if laplacian == "intrinsic-delaunay-refined":
@@ -120,16 +109,10 @@ def _thin_and_large(triangulation: IntrinsicTriangulation, component: IntArray) 
 
 
 def refined(triangulation: IntrinsicTriangulation, component: IntArray, is_chosen: BoolArray) -> IntrinsicTriangulation:
-    """Triangles fit for heat, by `delaunay_refinement`; of the tufted cover where the surface is not closed.
+    """Triangles fit for heat in the chosen components (k,), by `delaunay_refinement`.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        Intrinsic Delaunay, no three faces at an edge.
-    component : (n,) int64
-        Component of each vertex.
-    is_chosen : (k,) bool
-        Components that are refined.
+    Of an intrinsic Delaunay triangulation, no three faces at an edge, with the component (n,) of each vertex; of its
+    tufted cover where the surface is not closed.
     """
     if (triangulation.twin < 0).any() or not triangulation.aligned.all():
         triangulation = intrinsic_delaunay(closed_cover(triangulation))

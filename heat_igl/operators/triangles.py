@@ -84,16 +84,8 @@ def tufted_operators(
 ) -> Operators:
     """The operators of any triangle mesh by way of the tufted cover, made intrinsic Delaunay (see `changed_operators`).
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Triangles.
-    history : tuple of Merged
-        How the faces of `mesh` came from those that points refer to.
-    on_laplacian : callable, optional
-        Called with twice L as soon as it is known.
-    laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto"}
-        Whether the cover is refined, see `operators`.
+    `history` tells how the faces of `mesh` came from those that points refer to; `on_laplacian` is called with twice L;
+    `laplacian`, other than "cotan", says whether the cover is refined, see `operators`.
     """
     cover = tufted_cover(mesh)
     triangulation = intrinsic_delaunay(replace(cover, history=(*history, *cover.history)))
