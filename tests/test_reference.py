@@ -102,7 +102,7 @@ def test_exact_is_approached_from_above_by_independent_paths() -> None:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("factor", [1e-9, 1e-3, 3.7, 1e6])
+@pytest.mark.parametrize("factor", [1e-9, 1e6])
 def test_exact_does_not_depend_on_the_unit(solver: str, factor: float) -> None:
     mesh = cow()
     truth = reference.exact(mesh, 2470, solver=solver) * factor

@@ -168,7 +168,7 @@ def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize("name", ["voxel blob", "pinched", "dust"])
 def test_no_reference_brings_the_process_down(name: str) -> None:
     mesh = zoo(name)
-    report = validate(mesh, draw_sources(mesh, 3), validation.METHODS, reference=None)
+    report = validate(mesh, draw_sources(mesh, 1), validation.METHODS, reference=None)
     assert [row.method for row in report.rows] == list(validation.METHODS)
     for row in report.rows:
         assert (row.failure is None) == (row.method in report.distances)

@@ -6,7 +6,6 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 from conftest import flat_perturbed, perturbed
 
 import heat_igl
@@ -35,8 +34,7 @@ def test_connection_laplacian_is_hermitian_and_negative_semidefinite(name, lapla
     assert connection.format == "csc"
     assert abs(connection - connection.conj().T).max() < 1e-12 * abs(connection).max()
     if laplacian == "intrinsic-delaunay":
-        largest = spl.eigsh(connection, k=1, which="LA", return_eigenvectors=False, tol=1e-6)[0]
-        assert largest < 1e-8 * abs(connection).max()
+        assert np.linalg.eigvalsh(connection.toarray())[-1] < 1e-8 * abs(connection).max()
     # On a single edge only the argument differs from L.
     L = operators(mesh, laplacian).L
     np.testing.assert_allclose(abs(connection.diagonal()), abs(L.diagonal()), rtol=1e-10)
