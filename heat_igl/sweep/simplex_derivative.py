@@ -32,7 +32,7 @@ _MOST_STEPS, _SETTLED = 12, 1e-12
 # Where the fixed point is farther away than this share of a distance, the search had not settled, and the derivative is
 # that at what it found. From the second share on, a distance is another than the engine gives.
 _UNSETTLED, _SAME = 1e-2, 1e-3
-# A share of a corner that is rounding.
+# A share of a corner, and of a second difference, that is rounding.
 _ROUNDING = 1e-9
 # Squared volume of a flat tetrahedron, as in `heat_igl.kernels.sweep.facets`.
 _FLAT = 1e-4
@@ -174,7 +174,9 @@ class _FacetUpdate:
                 doubted = np.abs(np.real(doubt)) >= np.abs(np.real(sag))
                 ratio = doubt / np.where(np.real(sag) == 0, 1, sag)
                 share = _larger(_size(ratio), 1 - _smaller(trust[:, i], trust[:, j]))
-                sag = sag - _size(doubt) * share * np.sign(np.real(sag))
+                # Where fronts are those of one point, there is no doubt, and none arises when vertices move.
+                size = np.where(np.abs(np.real(ratio)) < _ROUNDING, 0, _size(doubt))
+                sag = sag - size * share * np.sign(np.real(sag))
                 edge = [metric[:, m % metric.shape[1]] for m in (i, j)]
                 from_i, from_j = (
                     2 * d * np.sqrt(g[:, i, i] + g[:, j, j] - 2 * g[:, i, j])
