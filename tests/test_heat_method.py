@@ -10,6 +10,7 @@ import pytest
 from conftest import perturbed, wheel_path, zoo
 
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, read_mesh, shapes
+from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import SolverOptions
 from heat_igl.operators import Operators, intrinsic_operators, operators
 from heat_igl.steps import HeatFlow, fitted_laplacian, integrate
@@ -222,7 +223,7 @@ def test_options_put_together_before_are_those_of_the_keywords():
     options = SolverOptions(**chosen)
     assert type(options.t_coef) is float
     np.testing.assert_array_equal(
-        HeatMethodSolver.from_options(mesh, options).distance(5), HeatMethodSolver(mesh, **chosen).distance(5)
+        SolverChoice("heat", heat=options).on(mesh).distance(5), HeatMethodSolver(mesh, **chosen).distance(5)
     )
 
 

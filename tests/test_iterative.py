@@ -69,7 +69,7 @@ def test_a_source_in_the_corner_of_a_grid():
 def test_multigrid_solves():
     A = -operators(perturbed(shapes.icosphere(4))).L[1:][:, 1:].tocsc()
     x = np.random.default_rng(0).standard_normal((A.shape[0], 2))
-    solver = iterative.iterative(A)
+    solver = iterative.IterativeAnalysis().factorize(A)
     assert isinstance(solver, iterative.Multigrid)
     np.testing.assert_allclose(solver.solve(A @ x), x, rtol=0, atol=1e-8)
 
@@ -118,7 +118,7 @@ def test_negative_weights_are_refused(cow):
     with pytest.raises(FactorizationError, match=r'negative heat.*use laplacian="intrinsic-delaunay"'):
         solver.distance(0)
     with pytest.raises(FactorizationError, match="singular or not positive definite"):
-        iterative.iterative(sp.diags([1.0, -1.0]).tocsc())
+        iterative.IterativeAnalysis().factorize(sp.diags([1.0, -1.0]).tocsc())
 
 
 def test_chosen_where_factors_would_not_fit(monkeypatch):

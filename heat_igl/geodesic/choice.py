@@ -64,5 +64,5 @@ class SolverChoice:
     def on(self, mesh: MeshLike | Operators, region: ArrayLike | None = None) -> Solver:
         """The solver on a mesh, or on operators."""
         if self.method == "heat":
-            return HeatMethodSolver.from_options(mesh, self.heat, region)
+            return HeatMethodSolver(mesh, region=region, **vars(self.heat))
         return GeodesicSolver(mesh, method=self.method, tolerance=self.tolerance, region=region)

@@ -117,16 +117,20 @@ class HeatMethodSolver(BatchedSolver):
         region: ArrayLike | None = None,
     ) -> None:
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
-        self._set_up(mesh if isinstance(mesh, Operators) and F is None else as_mesh(mesh, F), options, region)
-
-    @classmethod
-    def from_options(
-        cls, mesh: MeshLike | Operators, options: SolverOptions, region: ArrayLike | None = None
-    ) -> HeatMethodSolver:
-        """A solver on `mesh` with options that were put together before."""
-        solver = cls.__new__(cls)
-        solver._set_up(mesh if isinstance(mesh, Operators) else as_mesh(mesh), options, region)
-        return solver
+        domain = mesh if isinstance(mesh, Operators) and F is None else as_mesh(mesh, F)
+        if region is not None:
+            self._part = MeshPart.of(domain, region)
+            domain = self._part.mesh
+        if isinstance(domain, Operators):
+            if options.laplacian != "auto":
+                raise ValueError(f"laplacian={options.laplacian!r} is for meshes: operators have a Laplacian already")
+            # Whoever made the operators chose the triangulation.
+            chosen = replace(options, laplacian="intrinsic-delaunay")
+            self._mesh, self._parts = None, prepare(domain, chosen)
+        elif isinstance(domain, PolygonMesh):
+            self._mesh, self._parts = None, prepare_polygons(domain, options)
+        else:
+            self._mesh, self._parts = domain, prepare_mesh(domain, options)
 
     @classmethod
     def from_edge_lengths(
@@ -206,26 +210,6 @@ class HeatMethodSolver(BatchedSolver):
         if self._part is not None and isinstance(moved, Mesh):
             solver._part = replace(self._part, mesh=moved)
         return solver
-
-    def _set_up(
-        self,
-        mesh: Mesh | PolygonMesh | PointCloud | Operators,
-        options: SolverOptions,
-        region: ArrayLike | None = None,
-    ) -> None:
-        if region is not None:
-            self._part = MeshPart.of(mesh, region)
-            mesh = self._part.mesh
-        if isinstance(mesh, Operators):
-            if options.laplacian != "auto":
-                raise ValueError(f"laplacian={options.laplacian!r} is for meshes: operators have a Laplacian already")
-            # Whoever made the operators chose the triangulation.
-            chosen = replace(options, laplacian="intrinsic-delaunay")
-            self._mesh, self._parts = None, prepare(mesh, chosen)
-        elif isinstance(mesh, PolygonMesh):
-            self._mesh, self._parts = None, prepare_polygons(mesh, options)
-        else:
-            self._mesh, self._parts = mesh, prepare_mesh(mesh, options)
 
     @classmethod
     def _of(cls, parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> HeatMethodSolver:

@@ -41,38 +41,25 @@ class IterativeAnalysis:
         return True
 
     def factorize(self, A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | Multigrid:
-        """See `iterative`."""
-        return iterative(A, free)
+        """`Relaxation` if each diagonal entry exceeds the rest of its row, as in a step of heat flow, else `Multigrid`.
 
-
-def iterative(A: sp.csc_matrix, free: BoolArray | None = None) -> Relaxation | Multigrid:
-    """A solver for `A` without factors: `Relaxation` if each diagonal entry exceeds the rest of its row, as in
-    a step of heat flow, and `Multigrid` if rows sum to zero, as in a Poisson problem.
-
-    Parameters
-    ----------
-    A : (n, n) csc_matrix
-        Symmetric, both triangles stored.
-    free : (n,) bool, optional
-        Rows and columns to keep; solutions are 0 on the others.
-
-    Raises
-    ------
-    FactorizationError
-        If A has a diagonal entry that is not positive.
-    MissingExtraError
-        If pyamg is needed and missing.
-    """
-    kept = np.ones(A.shape[0], bool) if free is None else free
-    diagonal = A.diagonal()[kept]
-    if not (diagonal > 0).all():
-        raise FactorizationError(f"the matrix ({A.shape[0]} rows) is singular or not positive definite")
-    excess = (A @ np.ones(A.shape[0]))[kept]
-    return Relaxation(A, free) if (excess > _EXCESS * diagonal).all() else Multigrid(A, free)
+        Raises
+        ------
+        FactorizationError
+            If A has a diagonal entry that is not positive.
+        MissingExtraError
+            If pyamg is needed and missing.
+        """
+        kept = np.ones(A.shape[0], bool) if free is None else free
+        diagonal = A.diagonal()[kept]
+        if not (diagonal > 0).all():
+            raise FactorizationError(f"the matrix ({A.shape[0]} rows) is singular or not positive definite")
+        excess = (A @ np.ones(A.shape[0]))[kept]
+        return Relaxation(A, free) if (excess > _EXCESS * diagonal).all() else Multigrid(A, free)
 
 
 def has_iterative() -> bool:
-    """Whether the library that `iterative` needs is installed."""
+    """Whether the library that `Multigrid` needs is installed."""
     return importlib.util.find_spec("pyamg") is not None
 
 

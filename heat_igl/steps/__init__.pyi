@@ -7,7 +7,6 @@ from heat_igl.steps.three_steps import analysis as analysis
 from heat_igl.steps.three_steps import damping as damping
 from heat_igl.steps.three_steps import diffuse as diffuse
 from heat_igl.steps.three_steps import integrate as integrate
-from heat_igl.steps.three_steps import mass_unit as mass_unit
 from heat_igl.steps.three_steps import normalize as normalize
 from heat_igl.steps.three_steps import smallest_time_step as smallest_time_step
 from heat_igl.steps.three_steps import smallest_time_steps as smallest_time_steps

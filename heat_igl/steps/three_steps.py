@@ -104,7 +104,9 @@ class HeatFlow:
                 "boundary='neumann', or divide the faces"
             )
         mass = operators.M.diagonal()
-        self.mean_mass = mass_unit(operators, t)
+        # A number, or one (n,) for each vertex if each component has a t.
+        has_several = isinstance(t, np.ndarray)
+        self.mean_mass = operators.expand_to_vertices(operators.mean_masses) if has_several else operators.mean_mass
         L = fitted_laplacian(operators, t) if fitted else operators.L
         step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
         matrix = shifted(L, -step / self.mean_mass, mass / self.mean_mass)
@@ -138,11 +140,6 @@ class HeatFlow:
             u[self._on_boundary] = held
             solutions.append(u)
         return solutions[0] if len(solutions) == 1 else (solutions[0] + solutions[1]) / 2
-
-
-def mass_unit(operators: Operators, t: float | FloatArray) -> float | FloatArray:
-    """The mean mass by which `HeatFlow` divides: a number, or one (n,) for each vertex if each component has a t."""
-    return operators.expand_to_vertices(operators.mean_masses) if np.ndim(t) else operators.mean_mass
 
 
 def diffuse(operators: Operators, u0: FloatArray, t: float, boundary: Boundary = "neumann") -> FloatArray:
