@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import igl
 import numpy as np
 import scipy.sparse as sp
 
@@ -23,7 +24,7 @@ from heat_igl.intrinsic import (
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.operators.matrices import Laplacian, Operators
 from heat_igl.operators.triangles import operators
-from heat_igl.typing import AnyArray, FloatArray
+from heat_igl.typing import AnyArray
 
 __all__ = ["FaceRotations", "connection_laplacian", "edge_rotations", "face_rotations", "with_rotations"]
 
@@ -93,7 +94,8 @@ def edge_rotations(domain: Operators) -> sp.csc_matrix:
     half_edge = np.arange(triangulation.F.size)
     tail, head = triangulation.tail(half_edge), triangulation.head(half_edge)
     rho = transport_angles(triangulation, angles)
-    weight = _half_weights(triangulation)
+    # Half the cotangent opposite each half-edge, the face's part of the weight; faces without area have none.
+    weight = np.nan_to_num(igl.cotmatrix_entries(triangulation.l), posinf=0.0, neginf=0.0).ravel()
     turn = np.exp(1j * rho)
     n = triangulation.n
     loop = tail == head
@@ -167,13 +169,3 @@ def _triangles(domain: Operators) -> tuple[IntrinsicTriangulation, PolarAngles]:
         raise MeshError("tangent vectors need the triangles of an oriented manifold, which this domain does not have")
     angles = polar_angles(surface.faces)
     return surface.triangulation, carried_angles(angles, surface.triangulation)
-
-
-def _half_weights(triangulation: IntrinsicTriangulation) -> FloatArray:
-    """Half the cotangent (3 m,) opposite each half-edge: the contribution of the face to the weight of the edge."""
-    square = triangulation.l**2
-    eight_areas = 8 * triangulation.areas[:, None]
-    cotangent = np.divide(
-        square.sum(axis=1, keepdims=True) - 2 * square, eight_areas, out=np.zeros_like(square), where=eight_areas > 0
-    )
-    return np.asarray(cotangent.ravel())
