@@ -87,18 +87,24 @@ def _along(
 ) -> cython.double:
     """All pieces of the line that was followed; as `_piece`, with the arrays of all sides."""
     total: cython.double = 0.0
+    of_face: cython.p_double = cython.NULL
+    tangent_of_face: cython.pointer[cython.const[cython.double]] = cython.NULL
     j: cython.longlong
     for j in range(tracer.segments.n):
         f: cython.int = 3 * tracer.segments.face[j]
         is_last: cython.bint = j == tracer.segments.n - 1
         place: cython.p_double = cython.address(tracer.segments.place[j, 0, 0])
+        if slope != cython.NULL:
+            of_face = slope + f
+        if tangent != cython.NULL:
+            tangent_of_face = tangent + f
         total += _piece(
             cython.address(tracer.length[f]),
             place,
             place + 3,
             weight,
-            cython.NULL if slope == cython.NULL else slope + f,
-            cython.NULL if tangent == cython.NULL else tangent + f,
+            of_face,
+            tangent_of_face,
             at_end if is_last else cython.NULL,
             end_moves if is_last else cython.NULL,
         )
