@@ -42,7 +42,7 @@ def delaunay_stars(
     is_closed: cython.uchar[::1] = closed
     found: cython.int[:, ::1] = corners
     radius: cython.double[::1] = radii
-    star: cython.double[:, ::1] = np.empty((k + 1, 5))
+    star: cython.double[:, ::1] = np.empty((k + 1, 3))
     members: cython.int[::1] = np.empty(k + 1, np.int32)
     stack: cython.int[::1] = np.empty(k + 2, np.int32)
     m: cython.Py_ssize_t = 0
@@ -75,12 +75,11 @@ def _neighbours_around(
     """Put the neighbours of point i into `star` and `members`, sorted by angle and inverted; return how many there are.
 
     The inversion p / |p|^2 takes circles through the point to straight lines: the star of the point is the part of the
-    convex hull of the inverted neighbours that it sees, found by Graham's scan. Neighbours inside the hull of the
+    convex hull of the inverted neighbours that it sees, found by Graham's scan. Neighbours beyond the circles of the
     nearest ones are left out.
     """
     a: cython.Py_ssize_t
     size: cython.Py_ssize_t = 0
-    n_sides: cython.Py_ssize_t = 0
     reach: cython.double = INFINITY  # squared: twice the largest radius of the circles of the star
     for a in range(neighbours.shape[1]):
         j: cython.Py_ssize_t = neighbours[i, a]
@@ -91,9 +90,8 @@ def _neighbours_around(
             < least_cosine[i]
         ):
             continue
-        if size == FEW and n_sides == 0:
-            n_sides = _sides(_visible_hull(size, star, stack), star, stack)
-            reach = _reach(n_sides, star)
+        if size == FEW and reach == INFINITY:
+            reach = _reach(_visible_hull(size, star, stack), star, stack)
         # In the plane, distances are shorter by a few percent at most, see `in_plane`; the others are farther away.
         if _squared_distance(P, i, j) > 1.2 * reach:
             break
@@ -108,7 +106,7 @@ def _neighbours_around(
         # A point above the centre has no direction in the plane.
         if square <= 0.0:
             continue
-        if square > reach or _is_inside(n_sides, star, x / square, y / square):
+        if square > reach:
             continue
         # Grows with the angle, and needs no arctangent.
         angle: cython.double = y / (fabs(x) + fabs(y))
@@ -178,45 +176,20 @@ def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: c
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _sides(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.Py_ssize_t:
-    """Fill the columns of the sides in `star`; return how many there are, -1 if the hull is not around the point."""
+def _reach(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.double:
+    """Squared distance beyond which neighbours are in no circle of the star; infinite if it is not around the point."""
     a: cython.Py_ssize_t
+    largest: cython.double = 0.0
     for a in range(top):
         p: cython.Py_ssize_t = stack[a]
         q: cython.Py_ssize_t = stack[a + 1]
         turn: cython.double = star[p, X] * star[q, Y] - star[p, Y] * star[q, X]
         if turn <= 0.0:
-            return -1
-        star[a, ACROSS_X] = (star[p, Y] - star[q, Y]) / turn
-        star[a, ACROSS_Y] = (star[q, X] - star[p, X]) / turn
-    return top
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _reach(n_sides: cython.Py_ssize_t, star: cython.double[:, ::1]) -> cython.double:
-    """Squared distance beyond which neighbours, inverted, are inside all sides; infinite if there are none."""
-    a: cython.Py_ssize_t
-    largest: cython.double = 0.0
-    for a in range(n_sides):
-        largest = max(largest, star[a, ACROSS_X] * star[a, ACROSS_X] + star[a, ACROSS_Y] * star[a, ACROSS_Y])
-    return largest / (INSIDE * INSIDE) if n_sides > 0 else INFINITY
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-@cython.exceptval(check=False)
-def _is_inside(
-    n_sides: cython.Py_ssize_t, star: cython.double[:, ::1], x: cython.double, y: cython.double
-) -> cython.bint:
-    """Whether a point is inside all sides of a hull, of which there are some."""
-    a: cython.Py_ssize_t
-    for a in range(n_sides):
-        if star[a, ACROSS_X] * x + star[a, ACROSS_Y] * y < -INSIDE:
-            return False
-    return n_sides > 0
+            return INFINITY
+        dx: cython.double = star[q, X] - star[p, X]
+        dy: cython.double = star[q, Y] - star[p, Y]
+        largest = max(largest, (dx * dx + dy * dy) / (turn * turn))
+    return OUTSIDE * largest
 
 
 @cython.cfunc
