@@ -11,7 +11,9 @@ from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
     BESIDE,
+    JOINS,
     LEFT_OF_APEX,
+    MARGIN,
     NARROW,
     NEAR,
     OVERLAP,
@@ -416,6 +418,21 @@ def _insert(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double) -> cython.double:
+    """What windows may take to an end of their half-edge, compared with the distance of that vertex.
+
+    Of the length too: straight past a vertex near the root, both ways round to the same number. From where paths leave
+    into all faces, what passes the vertex by less than rounding is not kept: between more than two faces at each of its
+    edges, there would be as many such windows as there are ways around the vertex.
+    """
+    slack: cython.double = -MARGIN if s.kind[v] == JOINS else s.tolerance
+    return s.upper[v] + slack * (s.upper[v] + length)
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
@@ -426,12 +443,8 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     u: cython.pointer(Window)
     w: cython.pointer(Window)
     length: cython.double = s.length[h]
-    from_tail: cython.double = s.upper[s.vertex[next_half_edge(h)]]
-    from_head: cython.double = s.upper[s.vertex[previous_half_edge(h)]]
-    # Of the length too: straight past a vertex near the root, both ways round to the same number.
-    from_tail += s.tolerance * (from_tail + length)
-    from_head += s.tolerance * (from_head + length)
-    from_head += length
+    from_tail: cython.double = _bound_over(s, s.vertex[next_half_edge(h)], length)
+    from_head: cython.double = _bound_over(s, s.vertex[previous_half_edge(h)], length) + length
     for i in range(n):
         w = windows + i
         if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset) or w.stop - w.start <= NARROW * length:
