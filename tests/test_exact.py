@@ -15,6 +15,7 @@ from conftest import (
     wheel_path,
     zoo,
 )
+from scipy.spatial import Delaunay
 from surfaces import (
     COORDINATES,
     bumpy,
@@ -136,6 +137,37 @@ def test_nonmanifold_meshes_against_steiner_points(name):
         # Mollification lengthens edges of degenerate faces.
         assert excess.min() > -1e-7
         assert excess.mean() < 1e-2
+
+
+def of_tetrahedra(n: int, share: float, seed: int) -> Mesh:
+    """The boundary of some of the tetrahedra of a Delaunay triangulation: up to a dozen faces at an edge."""
+    rng = np.random.default_rng(seed)
+    P = rng.random((n, 3))
+    T = Delaunay(P).simplices
+    T = T[rng.random(len(T)) < share]
+    F = np.concatenate([T[:, corners] for corners in ([1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1])])
+    _, which, count = np.unique(np.sort(F, axis=1), axis=0, return_inverse=True, return_counts=True)
+    used, F = np.unique(F[count[which.ravel()] == 1], return_inverse=True)
+    return Mesh(P[used], F.reshape(-1, 3))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_boundaries_of_tetrahedra_against_steiner_points(seed):
+    mesh = of_tetrahedra(40, 0.6, seed)
+    sources = [0, mesh.n_vertices // 2]
+    for source, bound in zip(sources, graph_distance(mesh, sources, 8), strict=True):
+        d = exact_distance(mesh.V, mesh.F, source)
+        there = np.isfinite(d) & (d > 0)
+        np.testing.assert_array_equal(np.isfinite(d), np.isfinite(bound))
+        excess = bound[there] / d[there] - 1
+        assert -1e-12 < excess.min() <= excess.mean() < 5e-3
+
+
+@pytest.mark.parametrize("source", [254, 468, 565, 638])
+def test_windows_do_not_multiply_at_edges_of_many_faces(source):
+    mesh = of_tetrahedra(800, 0.7, 2)
+    # Each half-edge holds what is shortest there; on a sphere as rough there are 3 to 5.
+    assert ExactSurface(from_mesh(mesh, 0)).solve(np.array([source])).n_windows < 10 * mesh.F.size
 
 
 @pytest.mark.parametrize(

@@ -239,9 +239,11 @@ def _without_copies(
     order = np.argsort(F, axis=1)
     first, which, _ = connectivity.unique_rows(np.take_along_axis(F, order, axis=1), given.n)
     first = first[which]
-    # An edge of more than two faces was never flipped: its vertices tell it apart.
-    twin = given.twin.reshape(m, 3)
-    is_copy: BoolArray = ((twin == -2) | (twin // 3 == first[:, None])).all(axis=1) & (first < np.arange(m))
+    # Edges of more than two faces were never flipped: among them, though not beside others, vertices tell one apart.
+    twin = np.take_along_axis(given.twin.reshape(m, 3), order, axis=1)
+    is_many = twin == -2
+    is_shared = (is_many & is_many[first]) | (twin // 3 == first[:, None])
+    is_copy: BoolArray = is_shared.all(axis=1) & (first < np.arange(m))
     kept = np.flatnonzero(~is_copy)
     if len(kept) == m:
         return given, kept, ()

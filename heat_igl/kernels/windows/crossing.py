@@ -365,7 +365,8 @@ def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cytho
         and u.root == w.root
         and fabs(u.offset - w.offset) <= (SAME * (fabs(w.offset) + length) if w.is_plane else 0.0)
         and fabs(u.depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
-        and u.start <= w.start <= u.stop + NARROW * length
+        and u.start <= w.stop + NARROW * length
+        and w.start <= u.stop + NARROW * length
     )
 
 
@@ -377,38 +378,48 @@ def _insert(
     k: cython.int,
     w: cython.pointer(Window),
     length: cython.double,
+    sliver: cython.double,
 ) -> cython.int:
     """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then.
 
-    The window may stand in the same array, behind the k.
+    The window may stand in the same array, behind the k. Without a `sliver`, it is compared with all of them.
     """
     j: cython.int = k
+    place: cython.int = k
     outcome: cython.int
+    u: cython.pointer(Window)
     moved: Window
     narrow: cython.double = NARROW * length
     while j > 0:
-        outcome = _settle(cython.address(windows[j - 1]), w, SLIVER * length)
-        if outcome == 1 or windows[j - 1].stop - windows[j - 1].start <= narrow:
+        u = windows + (j - 1)
+        if sliver <= 0.0 and _goes_on(u, w, length):
+            u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
+            return k
+        outcome = _settle(u, w, sliver)
+        if outcome == 1 or u.stop - u.start <= narrow:
             # remove j - 1
             if j < k:
                 memmove(windows + (j - 1), windows + j, (k - j) * cython.sizeof(Window))
             k -= 1
             j -= 1
+            place -= 1
             if outcome == 2:
                 return k
             continue
         if outcome == 2 or w.stop - w.start <= narrow:
             return k
-        if outcome == 4:
-            j -= 1
-            continue
-        break
+        if outcome == 4 and place == j:
+            place -= 1
+        elif sliver > 0.0:
+            break
+        j -= 1
+    j = place
     if j < k:
         moved = w[0]
         memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
         windows[j] = moved
         return k + 1
-    if j > 0 and _goes_on(cython.address(windows[j - 1]), w, length):
+    if j > 0 and windows[j - 1].start <= w.start and _goes_on(cython.address(windows[j - 1]), w, length):
         if w.stop > windows[j - 1].stop:
             windows[j - 1].stop = w.stop
         return k
@@ -443,6 +454,8 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     u: cython.pointer(Window)
     w: cython.pointer(Window)
     length: cython.double = s.length[h]
+    # Over an edge of more than two faces windows come in any order, some of them with the same root on several ways.
+    sliver: cython.double = SLIVER * length if s.twin[h] >= 0 else 0.0
     from_tail: cython.double = _bound_over(s, s.vertex[next_half_edge(h)], length)
     from_head: cython.double = _bound_over(s, s.vertex[previous_half_edge(h)], length) + length
     for i in range(n):
@@ -451,13 +464,13 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
             continue
         u = windows + (k - 1)
         # The usual case: behind the last, and not a half of it.
-        is_behind = k > 0 and (w.start >= u.start) & (w.start > u.stop - SLIVER * length)
-        if is_behind and fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
+        is_behind = k > 0 and (w.start >= u.start) & (w.start > u.stop - sliver)
+        if is_behind and sliver > 0.0 and fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
             if k < i:
                 windows[k] = w[0]
             k += 1
         else:
-            k = _insert(windows, k, w, length)
+            k = _insert(windows, k, w, length, sliver)
     return k
 
 
