@@ -279,8 +279,8 @@ class FixedPointDerivative(SimplexDerivative):
     """The derivative of distance by the Hopf-Lax formula, each vertex through the facet that was chosen.
 
     `distance` is the fixed point of the updates to rounding, and the engine ends once distances change by less than
-    1e-4. `inexact` are the vertices at which bounds, or a search that has not settled, give another distance by more
-    than a thousandth.
+    1e-4. `inexact` are the vertices at which bounds give another distance by more than a thousandth, and all if the
+    search did not settle.
 
     Parameters
     ----------
@@ -333,8 +333,8 @@ class FixedPointDerivative(SimplexDerivative):
         with np.errstate(invalid="ignore"):
             off = np.abs(self._state - found)[:, 0] > _UNSETTLED * distance
             if off.any():
-                self._state = found
-                off = np.abs(self._linearized()[:, 0]) > _SAME * distance
+                self._state, off = found, np.isfinite(distance)
+                self._linearized()
             off[self._vertices[~self._is_known, 0]] = True
             self.distance = self._state[:, 0].copy()
             self.inexact = np.flatnonzero(off | (np.abs(self.distance - answer) > _SAME * answer))

@@ -77,7 +77,7 @@ class HopfLax(Facet):
         self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
         self.fixed = np.isfinite(d).view(np.uint8)
         self.queue = PriorityQueue(n)
-        self.handed, self.facet = np.full(n, np.inf), np.full(n, -1, np.int32)
+        self.handed = np.full(n, np.inf)
         with cython.nogil:
             self.spread()
         raise_caught()
@@ -101,7 +101,7 @@ class HopfLax(Facet):
         """
         n = self.d.shape[0]
         self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
-        self.place = np.zeros((n, self.p))
+        self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen(settled)
@@ -148,7 +148,7 @@ class HopfLax(Facet):
                         value: cython.double = self.linear(s, c)
                         if value < self.d[u]:
                             self.label[u] = self.label[self.corners[s, self.nearest_corner()]]
-                            self.d[u], self.facet[u] = value, s * size + c
+                            self.d[u] = value
                             if value + gain * fabs(value) < self.handed[u]:
                                 self.wait(u)
                 v = self.nearest_waiting()
@@ -310,7 +310,7 @@ class HopfLax(Facet):
         best: cython.double = INFINITY
         best_at: cython.int = -1
         kept: cython.double[3]
-        # The facet of first order, or of the last visit, comes first: it rules out most of the others.
+        # The facet of the last visit first: it rules out most of the others.
         for k in range(self.first[v] - 1, self.first[v + 1]):
             at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
             if at < 0 or (at == self.facet[v] and k >= self.first[v]):
