@@ -439,7 +439,7 @@ def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double)
     into all faces, what passes the vertex by less than rounding is not kept: between more than two faces at each of its
     edges, there would be as many such windows as there are ways around the vertex.
     """
-    slack: cython.double = -MARGIN if s.kind[v] == JOINS else s.tolerance
+    slack: cython.double = -MARGIN if not s.is_delaunay and s.kind[v] == JOINS else s.tolerance
     return s.upper[v] + slack * (s.upper[v] + length)
 
 
