@@ -378,42 +378,32 @@ def _insert(
     k: cython.int,
     w: cython.pointer(Window),
     length: cython.double,
-    sliver: cython.double,
 ) -> cython.int:
     """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then.
 
-    The window may stand in the same array, behind the k. Without a `sliver`, it is compared with all of them.
+    The window may stand in the same array, behind the k.
     """
     j: cython.int = k
-    place: cython.int = k
     outcome: cython.int
-    u: cython.pointer(Window)
     moved: Window
     narrow: cython.double = NARROW * length
     while j > 0:
-        u = windows + (j - 1)
-        if sliver <= 0.0 and _goes_on(u, w, length):
-            u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
-            return k
-        outcome = _settle(u, w, sliver)
-        if outcome == 1 or u.stop - u.start <= narrow:
+        outcome = _settle(cython.address(windows[j - 1]), w, SLIVER * length)
+        if outcome == 1 or windows[j - 1].stop - windows[j - 1].start <= narrow:
             # remove j - 1
             if j < k:
                 memmove(windows + (j - 1), windows + j, (k - j) * cython.sizeof(Window))
             k -= 1
             j -= 1
-            place -= 1
             if outcome == 2:
                 return k
             continue
         if outcome == 2 or w.stop - w.start <= narrow:
             return k
-        if outcome == 4 and place == j:
-            place -= 1
-        elif sliver > 0.0:
-            break
-        j -= 1
-    j = place
+        if outcome == 4:
+            j -= 1
+            continue
+        break
     if j < k:
         moved = w[0]
         memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
@@ -425,6 +415,32 @@ def _insert(
         return k
     if w != windows + j:
         windows[j] = w[0]
+    return k + 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _insert_among(
+    windows: cython.pointer(Window), k: cython.int, w: cython.pointer(Window), length: cython.double
+) -> cython.int:
+    """As `_insert`, for k windows in any order: w is compared with all, and is one with those of the same root."""
+    j: cython.int = k
+    outcome: cython.int
+    u: cython.pointer(Window)
+    while j > 0:
+        j -= 1
+        u = windows + j
+        if _goes_on(u, w, length):
+            u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
+            return k
+        outcome = _settle(u, w, 0.0)
+        if outcome == 1 or u.stop - u.start <= NARROW * length:
+            k -= 1
+            memmove(u, u + 1, (k - j) * cython.sizeof(Window))
+        if outcome == 2 or w.stop - w.start <= NARROW * length:
+            return k
+    windows[k] = w[0]
     return k + 1
 
 
@@ -455,7 +471,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     w: cython.pointer(Window)
     length: cython.double = s.length[h]
     # Over an edge of more than two faces windows come in any order, some of them with the same root on several ways.
-    sliver: cython.double = SLIVER * length if s.twin[h] >= 0 else 0.0
+    is_many: cython.bint = s.twin[h] == -2
     from_tail: cython.double = _bound_over(s, s.vertex[next_half_edge(h)], length)
     from_head: cython.double = _bound_over(s, s.vertex[previous_half_edge(h)], length) + length
     for i in range(n):
@@ -464,13 +480,15 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
             continue
         u = windows + (k - 1)
         # The usual case: behind the last, and not a half of it.
-        is_behind = k > 0 and (w.start >= u.start) & (w.start > u.stop - sliver)
-        if is_behind and sliver > 0.0 and fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
+        is_behind = k > 0 and (w.start >= u.start) & (w.start > u.stop - SLIVER * length)
+        if is_behind and not is_many and fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
             if k < i:
                 windows[k] = w[0]
             k += 1
+        elif is_many:
+            k = _insert_among(windows, k, w, length)
         else:
-            k = _insert(windows, k, w, length, sliver)
+            k = _insert(windows, k, w, length)
     return k
 
 
