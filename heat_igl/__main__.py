@@ -6,8 +6,6 @@ import sys
 
 from heat_igl.cli import run
 
-__all__ = ["main"]
-
 
 def main() -> int:
     """Run the command line on ``sys.argv`` and return the exit status."""

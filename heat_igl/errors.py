@@ -17,16 +17,6 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-__all__ = [
-    "AccuracyWarning",
-    "BatchError",
-    "FactorizationError",
-    "MeshError",
-    "MissingExtraError",
-    "ReferenceSolverError",
-    "SourceError",
-]
-
 P = ParamSpec("P")
 R = TypeVar("R")
 

@@ -13,19 +13,6 @@ import numpy as np
 
 from heat_igl.errors import MeshError, is_number, require_choice, shown
 
-__all__ = [
-    "NEAR_RADIUS",
-    "DistanceMethod",
-    "DomainKind",
-    "Engine",
-    "Method",
-    "Plan",
-    "SurfaceMeasures",
-    "distance_plan",
-    "heat_plan",
-    "sweep_plan",
-]
-
 Engine = Literal["windows", "sweep", "lines", "hopf-lax", "heat"]
 Method = Literal["auto", "windows", "exact", "sweep"]
 DistanceMethod = Literal["auto", "windows", "exact", "sweep", "heat"]

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["AnyArray", "ArrayLike", "BoolArray", "FloatArray", "IntArray"]
-
 ArrayLike = npt.ArrayLike
 AnyArray = npt.NDArray[Any]
 BoolArray = npt.NDArray[np.bool_]

@@ -11,8 +11,6 @@ from heat_igl.errors import SourceError, shown
 from heat_igl.mesh import MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["geodesic_bezier"]
-
 _MOST_PIECES = 1_000_000
 
 

@@ -13,8 +13,6 @@ from heat_igl.errors import MeshError, as_array
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
-__all__ = ["CutMesh", "MeshPiece"]
-
 
 @dataclass(frozen=True, eq=False)
 class MeshPiece:

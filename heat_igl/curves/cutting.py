@@ -13,8 +13,6 @@ from heat_igl.intrinsic import lay_out
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, named_entries
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["cut"]
-
 # Corners of curves are put on a grid of this many steps along each side of a face, so that integers hold them exactly.
 _STEPS = 2**50
 # Corners nearer than this to a vertex, an edge or each other, as a share of the face, are the same point.

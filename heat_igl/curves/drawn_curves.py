@@ -15,8 +15,6 @@ from heat_igl.mesh.projection import checked_points
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["curve_on", "curve_through", "signed_distance"]
-
 
 @names_guessed
 def curve_through(mesh: MeshLike, points: Waypoints | ArrayLike, *, closed: bool = False) -> SurfaceCurve:

@@ -17,8 +17,6 @@ import numpy as np
 
 from heat_igl.typing import FloatArray
 
-__all__ = ["Point", "cut_triangle"]
-
 Point = tuple[int, int, int]
 # Two angles opposite an edge that sum to more than pi by less than this are pi, rounded.
 _ROUNDING = 1e-9

@@ -13,8 +13,6 @@ from heat_igl.errors import MeshError, SourceError, names_guessed, truth
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["GeodesicPathSolver", "geodesic_path", "straighten"]
-
 
 def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
     """The locally shortest curve of the class of a curve.

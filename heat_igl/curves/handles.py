@@ -13,8 +13,6 @@ from heat_igl.mesh.connectivity import nonmanifold_vertices
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["handle_loops"]
-
 
 def handle_loops(mesh: MeshLike) -> list[SurfaceCurve]:
     """Closed geodesics that generate all loops of a surface up to its boundary.

@@ -17,8 +17,6 @@ from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices, crossings,
 from heat_igl.sources import Sources
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["enclosed_areas", "isolines", "offset_curves", "sublevel_areas"]
-
 
 def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[SurfaceCurve]]:
     """The curves of constant value, for values linear in each triangle.

@@ -16,8 +16,6 @@ from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import PathDirections, WindowWays, contradicted, in_circle, local_searches
 from heat_igl.windows.tables import MARGIN, Tables, from_triangulation
 
-__all__ = ["LogMapsWithin", "log_maps_within"]
-
 
 @dataclass(frozen=True, eq=False)
 class LogMapsWithin:

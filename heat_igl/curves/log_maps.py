@@ -14,8 +14,6 @@ from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray
 from heat_igl.windows import vectors_from
 
-__all__ = ["LogMapMethod", "log_map"]
-
 LogMapMethod = Literal["exact", "vector-heat"]
 
 

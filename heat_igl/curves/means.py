@@ -16,8 +16,6 @@ from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh, as_simplices
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = ["karcher_mean"]
-
 # A mean inside a face keeps this barycentric distance from its sides, so that all paths leave through this face.
 _INSIDE = 1e-7
 # The search ends with a step below this share of the largest distance from the mean.

@@ -12,8 +12,6 @@ from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import exact_paths
 from heat_igl.windows.tables import MARGIN
 
-__all__ = ["shortest_path", "shortest_paths"]
-
 # A path that is lost among faces without area is looked for again on triangles that are mollified by this share of the
 # mean edge length. Of 36 000 paths on 300 meshes with coincident vertices and needles, 255 were lost at first and none
 # after this.

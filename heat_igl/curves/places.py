@@ -12,8 +12,6 @@ from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["Waypoints", "corners", "mixed_places", "places", "snapped"]
-
 # Vertices, points, or a sequence of both.
 Waypoints = Sources | Sequence[int | SurfacePoints]
 

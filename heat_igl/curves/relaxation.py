@@ -15,8 +15,6 @@ from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["CentroidalSites", "centroidal_voronoi"]
-
 # A site that would raise the energy of its cell is tried at this many shorter steps.
 _SHORTER = 3
 

@@ -12,8 +12,6 @@ from heat_igl.kernels.paths import routes
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Router"]
-
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = routes
 

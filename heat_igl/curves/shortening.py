@@ -18,8 +18,6 @@ from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["FaceSequence", "Shortened", "Shortener", "as_curve", "course_of"]
-
 # The compiled modules, whose signatures are those of Cython.
 kernel: Any = shortening
 tables: Any = strips

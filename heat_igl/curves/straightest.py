@@ -16,8 +16,6 @@ from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = ["Tracer", "exp_map", "trace_geodesic"]
-
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = straightest
 # Fewer geodesics than this are traced on one thread.

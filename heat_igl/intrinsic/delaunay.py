@@ -14,8 +14,6 @@ from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.mesh import DELAUNAY_TOLERANCE
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["intrinsic_delaunay"]
-
 # Relative rounding of the numerator of a cotangent, a difference of squares that for a needle are much larger than the
 # result. An edge is flipped only if the cotangents say so beyond their rounding; else two flips could undo each other
 # for ever.

@@ -15,8 +15,6 @@ from heat_igl.intrinsic.vertex_angles import PolarAngles, polar_angles
 from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_simplices, tangent_surface
 from heat_igl.typing import FloatArray
 
-__all__ = ["tangent_frames"]
-
 # Edges are at least this long, in mean edge lengths: directions are divided by lengths.
 _SHORTEST = 1e-12
 

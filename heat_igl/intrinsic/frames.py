@@ -11,8 +11,6 @@ from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, previous_ha
 from heat_igl.intrinsic.vertex_angles import PolarAngles
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = ["TangentFrames", "checked_vectors"]
-
 
 @dataclass(frozen=True, eq=False)
 class TangentFrames:

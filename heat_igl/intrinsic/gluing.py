@@ -14,8 +14,6 @@ from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, half_edge_h
 from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = ["from_edge_lengths", "from_gluing", "intrinsic_triangulation", "oriented"]
-
 # Two lengths of one edge may differ by this share: digits lost when the lengths were written to a file, for instance.
 _SAME_LENGTH = 1e-9
 

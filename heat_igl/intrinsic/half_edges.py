@@ -14,8 +14,6 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 
-__all__ = ["HalfEdges", "mean_exponent", "mollify"]
-
 # The triangle inequality holds with this margin, in mean edge lengths.
 _MARGIN = 1e-8
 # Edges around corners that coincide, in mean edge lengths.

@@ -15,8 +15,6 @@ from heat_igl.intrinsic.layout import apex
 from heat_igl.kernels.mesh import carrying
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Covered", "Flipped", "Merged", "Refined", "Turned"]
-
 # Faces on the back have the opposite orientation: corners 1 and 2 are swapped.
 BACK_CORNERS = np.array([0, 2, 1])
 

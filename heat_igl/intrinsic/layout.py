@@ -7,8 +7,6 @@ import numpy as np
 
 from heat_igl.typing import FloatArray
 
-__all__ = ["apex", "corner_angles", "lay_out"]
-
 
 def apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Corner opposite the base of triangles whose base runs from the origin along the positive first axis.

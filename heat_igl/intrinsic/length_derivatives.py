@@ -15,8 +15,6 @@ from heat_igl.intrinsic.place_derivatives import PlaceSlopes, carry_place, carry
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.typing import FloatArray
 
-__all__ = ["carry_lengths", "carry_lengths_back"]
-
 
 def carry_lengths_back(
     triangulation: IntrinsicTriangulation,

@@ -9,8 +9,6 @@ from heat_igl.intrinsic.half_edges import HalfEdges
 from heat_igl.intrinsic.history import BACK_CORNERS
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
 
-__all__ = ["double_cover"]
-
 
 def double_cover(triangulation: IntrinsicTriangulation) -> HalfEdges:
     """The oriented double cover: each face as it is on one sheet and turned over on the other, glued along equal sides.

@@ -16,8 +16,6 @@ from heat_igl.intrinsic.layout import apex
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, sides_from
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["PlaceSlopes", "carry_place", "carry_place_back"]
-
 
 class PlaceSlopes(NamedTuple):
     """Points in faces that were given before any change, and the derivative of a number by their places.

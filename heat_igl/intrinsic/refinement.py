@@ -11,8 +11,6 @@ from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.kernels.mesh import carrying, refinement
 from heat_igl.typing import FloatArray
 
-__all__ = ["delaunay_refinement"]
-
 # Degrees. The algorithm ends for certain below 30 degrees if no cone is sharp; close to that it makes many triangles.
 _LEAST_ANGLE = 25.0
 

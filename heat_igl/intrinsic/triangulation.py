@@ -18,15 +18,6 @@ from heat_igl.intrinsic.layout import corner_angles
 from heat_igl.mesh import grouping
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = [
-    "IntrinsicTriangulation",
-    "half_edge_head",
-    "half_edge_tail",
-    "next_half_edge",
-    "previous_half_edge",
-    "sides_from",
-]
-
 
 def next_half_edge(half_edge: IntArray) -> IntArray:
     """The half-edge after each in the same face; of corners, the next corner."""

@@ -19,8 +19,6 @@ from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.mesh import Mesh, grouping
 from heat_igl.typing import FloatArray
 
-__all__ = ["closed_cover", "has_nonmanifold_edges", "tufted_cover"]
-
 
 def has_nonmanifold_edges(mesh: Mesh) -> bool:
     """Whether a triangle mesh has an edge of more than two faces."""

@@ -18,8 +18,6 @@ from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_e
 from heat_igl.kernels.mesh.polar_angles import polar_angles as kernel
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["PolarAngles", "carried_angles", "polar_angles", "transport_angles"]
-
 
 @dataclass(frozen=True, eq=False)
 class PolarAngles:

@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["ascending"]
-
 
 def ascending(key: cython.double[::1]):
     """Indices (n,) int32 in ascending order of `key`, ties and keys within 1e-6 of each other in order of index.

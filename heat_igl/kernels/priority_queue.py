@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["PriorityQueue"]
-
 
 @cython.final
 @cython.cclass

@@ -3,8 +3,6 @@
 import cython  # noqa: F401 - makes this a module of Cython's pure Python mode
 from cython.cimports.heat_igl.kernels.processor import wide_vectors
 
-__all__ = ["vectors"]
-
 
 def vectors():
     """Names of the sets of wide vectors that kernels may use here, widest first, then "" for none."""

@@ -5,8 +5,6 @@ import threading
 import cython
 from cython.cimports.cpython.exc import PyErr_CheckSignals
 
-__all__ = ["obey", "raise_caught"]
-
 # What the handler of a signal raised, until the loop that asked has ended.
 _caught = []
 # What tells a thread to end, see `obey`.

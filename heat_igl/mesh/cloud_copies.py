@@ -6,8 +6,6 @@ import numpy as np
 
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["distinct_points"]
-
 
 def distinct_points(P: FloatArray) -> tuple[IntArray, IntArray]:
     """The points (k,) that are no copy of an earlier one, and which of them each of the n points equals."""

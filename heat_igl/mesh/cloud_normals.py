@@ -15,8 +15,6 @@ from heat_igl.typing import AnyArray, BoolArray, FloatArray
 if TYPE_CHECKING:
     from heat_igl.mesh.neighbourhoods import PointTree
 
-__all__ = ["oriented_normals", "usable_normals"]
-
 _K = 10
 # Largest share of contradicting neighbours of oriented normals. On the vertices of scans and models it is below 0.01,
 # where parts cross up to 0.07; with normals at random 0.5.

@@ -10,8 +10,6 @@ from heat_igl.errors import MeshError
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.typing import AnyArray
 
-__all__ = ["cloud_of_cells", "cloud_of_points", "cloud_of_poly_data", "refuse_other_cells"]
-
 # Classes of trimesh, open3d (two), pyvista and vedo; more objects than theirs have positions and no faces.
 _CLASSES = ("PointCloud", "PointSet", "Points")
 # Cells of points and lines, by the beginnings of their names in meshio and by their numbers in VTK.

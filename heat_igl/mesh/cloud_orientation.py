@@ -14,16 +14,6 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = [
-    "doubtful_points",
-    "is_oriented_manifold",
-    "neighbours_across_edges",
-    "on_one_side",
-    "oriented",
-    "turned_groups",
-    "two_sided_cover",
-]
-
 # Share of the triangles that may be left out for the others to be oriented alike. Clouds of scans had up to 0.0012; at
 # 0.002 and 0.004, on thin and narrow parts of two coarse meshes, distance became up to four times as wrong.
 _MOST_LEFT_OUT = 1.5e-3

@@ -16,21 +16,6 @@ from heat_igl.kernels.mesh import incidence
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = [
-    "Facets",
-    "ascending_rows",
-    "boundary_loops",
-    "connected_components",
-    "duplicate_faces",
-    "edge_distance",
-    "edges",
-    "facets",
-    "longest_paths",
-    "nonmanifold_vertices",
-    "shortest_edge_graph",
-    "unique_rows",
-]
-
 
 class Facets(NamedTuple):
     """The distinct facets of a mesh.

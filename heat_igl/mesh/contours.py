@@ -10,8 +10,6 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.surface_points import SurfaceCurve
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["Crossings", "Segments", "crossings", "joined_segments", "level_segments"]
-
 
 class Crossings(NamedTuple):
     """Crossings of a level with faces and their edges.

@@ -9,8 +9,6 @@ from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import SurfaceCurve, require_triangles
 from heat_igl.typing import ArrayLike
 
-__all__ = ["edge_curve"]
-
 
 def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> SurfaceCurve:
     """The curve along edges of a triangle mesh from vertex to vertex.

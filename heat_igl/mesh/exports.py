@@ -11,8 +11,6 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import AnyArray, ArrayLike
 
-__all__ = ["to_open3d", "to_pyvista", "to_trimesh"]
-
 
 def to_trimesh(mesh: MeshLike, **attributes: ArrayLike) -> Any:
     """A mesh of triangles as a ``trimesh.Trimesh``; vertices keep their numbers.

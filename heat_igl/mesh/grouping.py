@@ -9,8 +9,6 @@ import scipy.sparse as sp
 
 from heat_igl.typing import IntArray
 
-__all__ = ["Groups", "enumerate_runs", "group_by_label", "next_in_run"]
-
 
 class Groups(NamedTuple):
     """Elements sorted by an integer label, as rows of different lengths in one array.

@@ -12,8 +12,6 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.pixel_domain import ImageDomain, checked_spacing
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray
 
-__all__ = ["Terrain", "terrain"]
-
 
 class Terrain(ImageDomain):
     """The surface of a height raster, made by `terrain`: an `ImageDomain` whose pixels are the cells of the raster.

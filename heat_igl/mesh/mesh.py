@@ -23,8 +23,6 @@ from heat_igl.mesh.triangulation import triangulated
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["Mesh", "checked_faces", "checked_positions"]
-
 # Heron's formula multiplies four lengths, and the product must stay inside the double range.
 _LARGEST_EXTENT = 1e60
 _SMALLEST_EXTENT = 1e-60

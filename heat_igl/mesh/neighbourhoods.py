@@ -18,8 +18,6 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-__all__ = ["Neighbourhoods", "PointTree", "neighbourhoods", "one_sheet", "point_tree", "without_noise"]
-
 # Nearest points from which the plane of a point and its triangles are found.
 _K = 30
 # Points at a time: bounds the memory for their neighbours.

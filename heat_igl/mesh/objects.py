@@ -20,15 +20,6 @@ from heat_igl.mesh.seams import copies_apart, place_originals, seam_originals, s
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
-__all__ = [
-    "MeshLike",
-    "as_mesh",
-    "as_simplices",
-    "one_sided",
-    "tangent_surface",
-    "warn_of_seams",
-]
-
 MeshLike = Any
 """`Mesh`, `PolygonMesh`, `PointCloud`, a pair (V, F), a path, or a mesh of another library, see `as_mesh`."""
 

@@ -10,8 +10,6 @@ from heat_igl.errors import MeshError, SourceError, as_array
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import ArrayLike, BoolArray, IntArray
 
-__all__ = ["MeshPart"]
-
 
 @dataclass(frozen=True, eq=False)
 class MeshPart:

@@ -11,8 +11,6 @@ from heat_igl.errors import MeshError, SourceError, as_array, real_numbers, show
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, IntArray
 
-__all__ = ["ImageDomain", "checked_spacing", "image_domain"]
-
 # Triangles around the centre of a pixel, tetrahedra around that of a voxel.
 _FACES_PER_CELL = {2: 4, 3: 12}
 

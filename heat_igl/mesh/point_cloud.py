@@ -14,8 +14,6 @@ from heat_igl.mesh.report import CloudReport
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["PointCloud"]
-
 # Points lie on a line if their second variance is at most this share of the first.
 _ON_A_LINE = 1e-20
 # Above this share they do not, whatever the rounding: singular values, which take longer, need not tell.

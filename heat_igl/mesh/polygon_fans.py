@@ -11,8 +11,6 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.polygons import PolygonMesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["PolygonFans", "virtual_vertices"]
-
 # A triangle whose height over a side is below this share of that side has no orientation, and its polygon gets no fan.
 _FLAT = 1e-12
 

@@ -13,8 +13,6 @@ from heat_igl.mesh.grouping import next_in_run
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["PolygonMesh", "which_repeat_a_vertex"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PolygonMesh:

@@ -13,8 +13,6 @@ from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import ON_SIDE_COMPUTED, SurfacePoints, require_triangles
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["ClosestPoints", "Projector", "checked_points", "closest_points", "rows_in_space"]
-
 # A face is flat when twice its area is at most this share of the square of the longest side.
 _FLAT = 1e-12
 # The square of a larger coordinate, summed over three, may overflow; libigl then returns a face that is none.

@@ -7,8 +7,6 @@ import numpy as np
 
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["first_quadrilateral"]
-
 # Elements whose neighbours are looked at.
 _SAMPLE = 32
 # Volume over that of a regular tetrahedron with the same longest edge. A square that is folded along its diagonal, by

@@ -11,8 +11,6 @@ from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import SurfaceCurve, require_triangles
 from heat_igl.typing import ArrayLike, BoolArray
 
-__all__ = ["region_boundary"]
-
 
 def region_boundary(
     mesh: MeshLike, *, faces: ArrayLike | None = None, vertices: ArrayLike | None = None

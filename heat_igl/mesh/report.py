@@ -17,8 +17,6 @@ from heat_igl.typing import FloatArray, IntArray
 if TYPE_CHECKING:
     from heat_igl.mesh.mesh import Mesh
 
-__all__ = ["DELAUNAY_TOLERANCE", "MeshReport", "mesh_report"]
-
 # An edge is flipped when the two cotangents opposite it sum to less than this. The cotangents of cocircular corners
 # (every quad of a grid, a cylinder or a torus) sum to zero up to rounding; flipping such an edge would improve nothing.
 # Rounding is 1e-9 when a mesh lies 1e7 edge lengths from the origin, so 1e-7 keeps the same diagonals there too.

@@ -13,8 +13,6 @@ from heat_igl.typing import IntArray
 if TYPE_CHECKING:
     from heat_igl.mesh.mesh import Mesh
 
-__all__ = ["copies_apart", "place_originals", "seam_originals", "seam_pairs"]
-
 
 def seam_pairs(mesh: Mesh) -> IntArray:
     """Pairs (k, 4) of boundary edges that lie on each other: ends a, b of one and c, d of the other, a on d, b on c.

@@ -13,17 +13,6 @@ from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = [
-    "ON_SIDE",
-    "ON_SIDE_COMPUTED",
-    "NestedCurves",
-    "SurfaceCurve",
-    "SurfacePoints",
-    "flat_curves",
-    "named_entries",
-    "require_triangles",
-]
-
 # A point lies on a side of the face if a barycentric coordinate is below this. For given coordinates: numbers of
 # order 1, rounded by some 1e-16 in each operation; 1e-12 allows for thousands of these.
 ON_SIDE = 1e-12

@@ -7,8 +7,6 @@ import numpy as np
 from heat_igl.mesh.grouping import enumerate_runs, next_in_run
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["triangulated", "triangle_fans"]
-
 # Twice the area of a triangle is rounded by some 1e-16 of the square of the polygon's extent; below this share of it a
 # triangle has no orientation.
 _ROUNDING = 1e-12

@@ -26,8 +26,6 @@ from heat_igl.operators.matrices import Laplacian, Operators
 from heat_igl.operators.triangles import operators
 from heat_igl.typing import AnyArray
 
-__all__ = ["FaceRotations", "connection_laplacian", "edge_rotations", "face_rotations", "with_rotations"]
-
 
 def connection_laplacian(mesh: MeshLike, laplacian: Laplacian = "intrinsic-delaunay") -> sp.csc_matrix:
     """The connection Laplacian of a triangle mesh, in the frames of `tangent_frames`.

@@ -12,8 +12,6 @@ import scipy.sparse as sp
 from heat_igl.intrinsic import IntrinsicTriangulation, apex
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["EdgeLengths", "TriangleElements"]
-
 
 class EdgeLengths(NamedTuple):
     """Edges, each with the vertices `i`, `j` (k,) at the ends and the `length` (k,).

@@ -18,8 +18,6 @@ from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import ArrayLike
 
-__all__ = ["changed_operators", "edge_length_operators", "intrinsic_operators"]
-
 
 def intrinsic_operators(
     triangulation: IntrinsicTriangulation,

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from heat_igl.operators.metric_simplices import MetricSimplices
     from heat_igl.operators.surface import Surface
 
-__all__ = ["Laplacian", "OnLaplacian", "Operators", "check_laplacian", "divergence_matrix", "laplacian_of_gradient"]
-
 # Which triangulation of a triangle mesh the operators belong to.
 Laplacian = Literal["auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"]
 

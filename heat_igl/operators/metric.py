@@ -18,8 +18,6 @@ from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.simplices import cotan_operators, longest_sides
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-__all__ = ["fibre_metric", "metric_operators", "operators_in_metric", "speed_operators"]
-
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
 # for its length.
 _ONE_LENGTH = 0.1

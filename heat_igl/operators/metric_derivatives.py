@@ -7,8 +7,6 @@ import numpy as np
 from heat_igl.mesh import Mesh
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["MetricSides", "SideLengths", "plane_axes"]
-
 
 def plane_axes(mesh: Mesh) -> FloatArray:
     """Axes (m, 2, 3) of triangles: along the edge from corner 0 to corner 1, and towards corner 2."""

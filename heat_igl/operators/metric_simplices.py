@@ -11,8 +11,6 @@ from heat_igl.mesh import Mesh
 from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["MetricSimplices"]
-
 # Differences between tensors that are taken for rounding.
 _ROUNDING = 1e-9
 

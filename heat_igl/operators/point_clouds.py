@@ -7,8 +7,6 @@ from heat_igl.mesh import PointCloud
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
 from heat_igl.operators.triangles import operators, tufted_operators
 
-__all__ = ["point_cloud_operators"]
-
 
 def point_cloud_operators(
     cloud: PointCloud, laplacian: Laplacian = "intrinsic-delaunay", on_laplacian: OnLaplacian | None = None

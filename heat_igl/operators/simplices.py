@@ -18,8 +18,6 @@ from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.surface import Surface
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["cotan_operators", "cotangent_laplacian", "longest_sides", "padded", "surface_operators"]
-
 
 def cotan_operators(mesh: Mesh, on_laplacian: OnLaplacian | None = None) -> Operators:
     """The operators on the mesh's own triangles or tetrahedra, gradients in space (d = 3).

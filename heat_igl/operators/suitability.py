@@ -31,15 +31,6 @@ from heat_igl.plan import (
 )
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = [
-    "fit_for_heat",
-    "has_negative_boundary",
-    "is_rough_or_narrow",
-    "refined",
-    "share_on_large_triangles",
-    "uneven_components",
-]
-
 _MOST_SAMPLES = 1000
 
 

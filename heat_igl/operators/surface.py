@@ -8,8 +8,6 @@ from functools import cached_property
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["Surface"]
-
 
 @dataclass(frozen=True, eq=False)
 class Surface:

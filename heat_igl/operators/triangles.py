@@ -20,8 +20,6 @@ from heat_igl.operators.simplices import cotan_operators, surface_operators
 from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.operators.surface import Surface
 
-__all__ = ["fan_operators", "operators", "tufted_operators", "unfolding_surface"]
-
 
 def operators(
     mesh: Mesh, laplacian: Laplacian = "intrinsic-delaunay", on_laplacian: OnLaplacian | None = None

@@ -9,8 +9,6 @@ from typing import TypeVar
 
 from heat_igl.runtime.threads import pool
 
-__all__ = ["WORKING_MEMORY", "block_size", "in_blocks", "in_order"]
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 

@@ -6,8 +6,6 @@ of this range.
 
 from __future__ import annotations
 
-__all__ = ["LARGEST_EXPONENT", "LOWEST_HEAT", "RANGE_LIMIT", "SOURCE_HEAT"]
-
 # Largest heat at a source, in units of h. Doubles end at 1.8e308: 18 decades are left for gradients, which are heat
 # divided by the height of a triangle, 1e-8 h at least after mollification, and for sums over faces.
 SOURCE_HEAT = 1e290

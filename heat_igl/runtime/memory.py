@@ -12,8 +12,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-__all__ = ["PeakMemory", "available_memory", "release_free_memory", "resident_memory"]
-
 _SAMPLE_SECONDS = 0.005
 
 

@@ -10,8 +10,6 @@ from typing import Any
 
 from heat_igl.errors import MissingExtraError
 
-__all__ = ["TimeLeft", "progress_bar", "rich_progress"]
-
 # Seconds before the first line on a terminal, and between lines.
 _PATIENCE = 5.0
 

@@ -11,8 +11,6 @@ import numpy.typing as npt
 from heat_igl.errors import shown
 from heat_igl.typing import AnyArray
 
-__all__ = ["float_type", "row_writer"]
-
 
 def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
     """The floating-point type of returned distances; float64 if `dtype` is None.

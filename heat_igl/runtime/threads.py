@@ -11,8 +11,6 @@ from typing import Any, TypeVar
 
 from heat_igl.kernels.signals import obey
 
-__all__ = ["both", "n_threads", "over_rows", "pool", "side_by_side"]
-
 Item = TypeVar("Item")
 First = TypeVar("First")
 Second = TypeVar("Second")

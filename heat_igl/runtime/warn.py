@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["held_warnings", "warn_caller"]
-
 # Cached properties of the package are called by functools.
 _OURS = (str(Path(__file__).parents[1]) + os.sep, functools.__file__)
 _held = threading.local()

@@ -9,8 +9,6 @@ from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.sampling.voronoi import VoronoiCells
 from heat_igl.typing import IntArray
 
-__all__ = ["dual_triangulation"]
-
 
 def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
     """The triangulation dual to Voronoi cells: a vertex for each cell, a triangle for each point of three cells.

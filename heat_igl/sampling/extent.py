@@ -11,8 +11,6 @@ from heat_igl.runtime import TimeLeft
 from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import ArrayLike, FloatArray
 
-__all__ = ["diameter", "distance_matrix"]
-
 
 @names_guessed
 def diameter(solver: Solver | MeshLike, *, start: int = 0, rounds: int = 10) -> tuple[float, int, int]:

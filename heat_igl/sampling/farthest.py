@@ -15,8 +15,6 @@ from heat_igl.sampling.voronoi import VoronoiCells, claim_nearer
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import ArrayLike, IntArray
 
-__all__ = ["farthest_cells", "farthest_points"]
-
 
 @names_guessed
 def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -> IntArray:

@@ -14,8 +14,6 @@ from heat_igl.runtime import TimeLeft
 from heat_igl.sources import named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
-__all__ = ["as_solver", "checked_vertices", "distance_rows"]
-
 # Rows of distances in memory at a time.
 _BLOCK = 8
 

@@ -11,8 +11,6 @@ from heat_igl.mesh import MeshLike
 from heat_igl.sampling.queries import as_solver, checked_vertices, distance_rows
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
-__all__ = ["VoronoiCells", "claim_nearer", "voronoi_cells"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VoronoiCells:

@@ -13,8 +13,6 @@ from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray
 
-__all__ = ["HopfLaxEngine"]
-
 # How far distances settle before they are differentiated, so that the facets are those of the fixed point.
 _SETTLED = 0.9e-9
 

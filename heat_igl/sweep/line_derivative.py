@@ -10,8 +10,6 @@ from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import SimplexDerivative
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["LineDerivative", "line_slopes"]
-
 # The most edges that a way is followed around, sweeps over their places, and steps of Newton's method after these.
 _MOST_BENDS, _SWEEPS, _STEPS = 16, 30, 6
 # A distance that differs from the length of the way by more than this share of it is not that length.

@@ -18,8 +18,6 @@ from heat_igl.sweep.reflex_edges import reflex_edges
 from heat_igl.sweep.simplex_engine import ROUNDING, SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["LineEngine"]
-
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
 _MOST_ROUNDS = 5
 # Up to so many vertices, a body around whose edges ways bend is measured on halved tetrahedra as well: of a long edge,

@@ -7,8 +7,6 @@ import numpy as np
 from heat_igl.mesh import connectivity
 from heat_igl.typing import FloatArray, IntArray
 
-__all__ = ["reflex_edges"]
-
 # Sine of the angle by which a body must exceed half a turn at an edge.
 _FLAT = 1e-6
 

@@ -23,8 +23,6 @@ from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = ["FixedPointDerivative", "SimplexDerivative", "gradient_rows", "velocities"]
-
 # A complex step, whose square is no double.
 _STEP = 1e-100
 # Steps of Newton's methods, and the relative change at which they end.

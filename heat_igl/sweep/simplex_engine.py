@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from heat_igl.operators import MetricSimplices
     from heat_igl.sweep.simplex_derivative import SimplexDerivative
 
-__all__ = ["ROUNDING", "SimplexEngine"]
-
 #: Share of a distance that is rounding.
 ROUNDING = 1e-9
 # With more sources that begin at different values, lines are bounded by the nearest one and the first value.

@@ -10,8 +10,6 @@ from heat_igl.intrinsic import HalfEdges, IntrinsicTriangulation, double_cover
 from heat_igl.kernels.sweep import spokes
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
-__all__ = ["Spokes", "aligned", "numbered_spokes"]
-
 _SPOKE = np.dtype(
     [(name, "f8") for name in ("length", "along", "height", "base", "beyond_along", "beyond_depth")]
     + [(name, "i4") for name in ("neighbour", "next_neighbour", "beyond", "next")]

@@ -25,8 +25,6 @@ from heat_igl.windows.engine import TriangleEngine, Triangles
 from heat_igl.windows.exact import ExactSolution
 from heat_igl.windows.queries import Query, labels_of
 
-__all__ = ["SweepEngine"]
-
 # A curve is swept from as points, at most so many mean edge lengths s apart. At a distance d that is wrong by the
 # fraction (s / d)^2 / 8 at most: by 0.005 % beyond the 6 edges within which windows take the curve itself.
 _SPACING = 0.125

@@ -12,8 +12,6 @@ from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-__all__ = ["Bounds"]
-
 # Less than this fraction is rounding.
 _ROUNDING = 1e-12
 _NO_LABELS = np.empty(0, np.int64)

@@ -17,8 +17,6 @@ from heat_igl.operators import Surface
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows.exact import ExactSolution
 
-__all__ = ["CurveDirections", "PathAngles", "PathDirections", "WindowWays", "first_parts", "in_circle"]
-
 _WHOLE = 2 * np.pi
 
 

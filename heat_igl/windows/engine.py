@@ -27,21 +27,6 @@ if TYPE_CHECKING:
     from heat_igl.windows.directions import CurveDirections, PathAngles, PathDirections
     from heat_igl.windows.path_lengths import PathLengths
 
-__all__ = [
-    "ROUNDING",
-    "Engine",
-    "GuardedEngine",
-    "Invariants",
-    "MeshTriangles",
-    "OperatorTriangles",
-    "TriangleEngine",
-    "Triangles",
-    "WindowEngine",
-    "contradicted",
-    "distances_instead",
-    "guarded_windows",
-]
-
 #: Violations by less than this share of the largest distance are rounding. Answers that are exact to rounding violate
 #: the bounds by up to 1e-9 of it, with coordinates far from the origin.
 ROUNDING = 1e-7

@@ -19,22 +19,6 @@ from heat_igl.sources import Sources, SourceSegments, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows.tables import NO_POINTS, NO_SEGMENTS, Located, Tables, from_mesh, from_triangulation
 
-__all__ = [
-    "NO_STARTS",
-    "TOLERANCE",
-    "ExactSolution",
-    "ExactSurface",
-    "Found",
-    "Leaving",
-    "Origin",
-    "Searched",
-    "Starts",
-    "Targets",
-    "exact_distance",
-    "search",
-    "starts_at",
-]
-
 #: A window is cut where another path is shorter by this fraction of the distance: more than rounding adds up to. A
 #: larger number keeps more windows, all of them paths, and changes no distance.
 TOLERANCE = 1e-11

@@ -16,8 +16,6 @@ from heat_igl.windows.directions import first_parts
 from heat_igl.windows.exact import Leaving, Searched, search, starts_at
 from heat_igl.windows.tables import Tables, from_mesh
 
-__all__ = ["vectors_from"]
-
 # By how much the lengths of an edge before and after mollification may differ, relatively, and two angles.
 _SAME_LENGTH, _SAME_ANGLE = 1e-7, 1e-5
 # So many edges have to tell how the angles around the source count.

@@ -16,8 +16,6 @@ from heat_igl.windows import local_searches
 from heat_igl.windows.engine import distances_instead
 from heat_igl.windows.tables import Tables, from_mesh
 
-__all__ = ["blocks_within", "distances_within", "nearest_vertices", "pair_distances"]
-
 # Bytes that each distance of a sparse array takes while the array is put together.
 _BYTES = 48
 # Where more are asked for than the mesh has vertices, the most entries of the result.

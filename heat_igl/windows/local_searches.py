@@ -17,17 +17,6 @@ from heat_igl.windows.engine import ROUNDING
 from heat_igl.windows.exact import TOLERANCE, Found, Leaving
 from heat_igl.windows.tables import Tables
 
-__all__ = [
-    "CHUNK",
-    "Chunk",
-    "Near",
-    "Workspace",
-    "in_chunks",
-    "nearest",
-    "to_goals",
-    "within",
-]
-
 #: Sources that a thread takes at a time: so few that all threads end at about the same time.
 CHUNK = 64
 # Initial number of results that a thread has room for.

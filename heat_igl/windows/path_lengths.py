@@ -17,8 +17,6 @@ from heat_igl.sources import SourceSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows.exact import ExactSurface, search, starts_at
 
-__all__ = ["Change", "PathLengths"]
-
 
 class Change(NamedTuple):
     """The derivative of a weighted sum of distances by what paths are found on, or how that changes.

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from heat_igl.windows.engine import Triangles
     from heat_igl.windows.exact import ExactSolution, ExactSurface
 
-__all__ = ["Query", "labels_of", "starting_points"]
-
 
 @dataclass(frozen=True, eq=False)
 class Query:

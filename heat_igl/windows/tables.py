@@ -24,8 +24,6 @@ from heat_igl.mesh import Mesh, SurfacePoints, connectivity
 from heat_igl.sources import SourceSegments
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = ["MARGIN", "NO_POINTS", "NO_SEGMENTS", "Located", "Tables", "from_mesh", "from_triangulation"]
-
 #: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
 #: `mollify`, paths across needles were up to 3e-4 of themselves too long.
 MARGIN = 1e-12

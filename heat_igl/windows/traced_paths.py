@@ -15,8 +15,6 @@ from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows.exact import search, starts_at
 from heat_igl.windows.tables import MARGIN, from_triangulation
 
-__all__ = ["ExactPaths", "exact_paths"]
-
 
 class ExactPaths(NamedTuple):
     """Shortest paths from k places to the nearest source.

@@ -18,8 +18,6 @@ from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray
 from heat_igl.windows.local import blocks_within
 
-__all__ = ["read_distances_within", "write_distances_within"]
-
 _FORMAT = "heat_igl distances within a radius, compressed sparse rows, 2"
 _ARRAYS = {"indptr": "int64", "indices": "int32", "data": "float64"}
 # Entries of a chunk of the store, 16 MiB of distances, and of the rows that are in memory at a time.

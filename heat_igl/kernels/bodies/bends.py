@@ -9,8 +9,6 @@ from cython.cimports.heat_igl.kernels.bodies.fitted_bends import FittedBends
 from cython.cimports.heat_igl.kernels.bodies.rays import Ray
 from cython.cimports.libc.math import sqrt
 
-__all__ = ["bend_around"]
-
 _BEND = np.dtype(
     [
         ("at", "f8", 5),

@@ -3,8 +3,6 @@
 import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 
-__all__ = ["BentWays"]
-
 
 @cython.cclass
 class BentWays:

@@ -4,8 +4,6 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import sqrt
 
-__all__ = ["Body"]
-
 
 @cython.final
 @cython.cclass

@@ -4,8 +4,6 @@ import cython
 from cython.cimports.heat_igl.kernels.bodies.bent_ways import BentWays
 from cython.cimports.heat_igl.kernels.bodies.rays import MOST_STEPS, NUDGE
 
-__all__ = ["EdgeSight"]
-
 
 @cython.cclass
 class EdgeSight(BentWays):

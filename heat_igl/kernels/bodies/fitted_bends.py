@@ -6,8 +6,6 @@ from cython.cimports.heat_igl.kernels.bodies.edge_sight import EdgeSight
 from cython.cimports.heat_igl.kernels.bodies.fitted_bends import LEVEL, MISFIT
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-__all__ = ["FittedBends"]
-
 
 @cython.cclass
 class FittedBends(EdgeSight):

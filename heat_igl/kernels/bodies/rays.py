@@ -5,8 +5,6 @@ from cython.cimports.heat_igl.kernels.bodies.bodies import Body
 from cython.cimports.heat_igl.kernels.bodies.rays import MOST_TURNS, ON_SIDE
 from cython.cimports.libc.math import fabs
 
-__all__ = ["Ray"]
-
 
 @cython.final
 @cython.cclass

@@ -8,8 +8,6 @@ from cython.cimports.heat_igl.kernels.bodies.rays import MOST_STEPS, NUDGE, Ray
 from cython.cimports.heat_igl.kernels.bodies.sight import GAIN, MOST_LOOKS, MOST_PASSES
 from cython.cimports.libc.math import INFINITY
 
-__all__ = ["look_around"]
-
 
 def look_around(
     order: cython.const[cython.int][::1],

@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["agreement"]
-
 
 def agreement(
     first: cython.const[cython.longlong][::1],

@@ -5,8 +5,6 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.cloud.empty_balls import ROUNDS, TINY
 from cython.cimports.libc.math import sqrt
 
-__all__ = ["on_one_side", "roomiest_normals"]
-
 
 def roomiest_normals(
     P: cython.const[cython.double][:, ::1],

@@ -6,8 +6,6 @@ from cython.cimports.heat_igl.kernels.cloud.fitting_triangles import ROUNDING, T
 from cython.cimports.heat_igl.kernels.cloud.unrolling import InPlane, in_plane
 from cython.cimports.libc.math import atan2
 
-__all__ = ["fitting_triangles"]
-
 
 def fitting_triangles(
     P: cython.const[cython.double][:, ::1],

@@ -5,8 +5,6 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.cloud.unrolling import InPlane, in_plane
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-__all__ = ["delaunay_stars"]
-
 
 def delaunay_stars(
     P: cython.const[cython.double][:, ::1],

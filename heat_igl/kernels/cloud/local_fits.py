@@ -5,8 +5,6 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.cloud.local_fits import DIAGONAL, LANES, LEAST_WEIGHT, TINY
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["onto_quadrics", "tangent_planes"]
-
 
 def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][:, ::1]):
     """Tangents and normals of points, by principal components of their neighbourhoods.

@@ -4,8 +4,6 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import INFINITY, sqrt
 
-__all__ = ["filling_triangles"]
-
 
 def filling_triangles(
     P: cython.const[cython.double][:, ::1],

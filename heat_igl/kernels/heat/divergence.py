@@ -4,8 +4,6 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["divergence_of_descent"]
-
 
 def divergence_of_descent(
     corners: cython.const[cython.int][:, ::1],

@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["laplacian"]
-
 
 def laplacian(F: cython.const[cython.int][:, ::1], weight: cython.const[cython.double][::1], n: cython.Py_ssize_t):
     """L of triangles: sums of weights off the diagonal, on it minus the sum of the row.

@@ -6,8 +6,6 @@ A graph is given as scipy stores a symmetric matrix: the neighbours of v are ``n
 import cython
 import numpy as np
 
-__all__ = ["dissect_pieces"]
-
 
 def dissect_pieces(
     ends: cython.const[cython.int][::1],

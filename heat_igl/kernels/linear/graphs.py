@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["breadth_first", "subgraph"]
-
 
 def breadth_first(
     ends: cython.const[cython.int][::1],

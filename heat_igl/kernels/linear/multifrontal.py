@@ -5,8 +5,6 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.linear.panels import entries, in_panel, numbers
 from cython.cimports.heat_igl.kernels.signals import is_interrupted
 
-__all__ = ["factor"]
-
 
 def factor(
     ends: cython.const[cython.int][::1],

@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["relax"]
-
 
 def relax(
     indptr: cython.const[cython.int][::1],

@@ -5,8 +5,6 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.linear.panels import entries, in_panel, numbers
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 
-__all__ = ["Substitution", "width"]
-
 width = WIDTH
 
 

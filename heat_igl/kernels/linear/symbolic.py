@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["front_rows", "tree_pieces"]
-
 
 def front_rows(
     ends: cython.const[cython.int][::1],

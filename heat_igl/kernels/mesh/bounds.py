@@ -4,8 +4,6 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import fabs, sqrt
 
-__all__ = ["glued_edges", "incident_edges", "is_longer", "lengthen", "shorten"]
-
 
 def is_longer(
     ends: cython.const[cython.int][:, ::1],

@@ -4,8 +4,6 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import sqrt
 
-__all__ = ["carry", "index_moves"]
-
 
 def index_moves(kind: cython.longlong[:, ::1], n_faces):
     """Which move is the first to change each face, and which is the next to change each face that a move makes.

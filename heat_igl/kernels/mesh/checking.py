@@ -4,16 +4,6 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import INFINITY, fabs, isfinite, sqrt
 
-__all__ = [
-    "below_line",
-    "edge_excess",
-    "largest_finite",
-    "line_shortfall",
-    "steepest_edge",
-    "straight_lines",
-    "wrong_rows",
-]
-
 
 def edge_excess(
     distance: cython.double[::1],

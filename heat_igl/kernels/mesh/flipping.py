@@ -8,8 +8,6 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge, twice_area
 from cython.cimports.libc.math import sqrt
 
-__all__ = ["flip"]
-
 
 def _move(ring: cython.int[::1], old: cython.int, new: cython.int) -> cython.void:
     """Let another half-edge take the place of one that stands among those of an edge of more than two faces."""

@@ -10,8 +10,6 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge
 from cython.cimports.libc.math import INFINITY, sqrt
 
-__all__ = ["glue", "has_needles"]
-
 
 def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double][:, ::1], scale: cython.double):
     """Glue faces along the edges that they share.

@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["components", "components_without", "edges_of_triangles"]
-
 
 def edges_of_triangles(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
     """The distinct edges of triangles, in lexicographic order.

@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["breadth_first", "n_near"]
-
 
 def n_near(twin: cython.int[::1], reach: cython.int) -> int:
     """How many half-edges (3 m,) are glued to one whose number differs from theirs by less than `reach`."""

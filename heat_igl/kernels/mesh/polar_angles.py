@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["polar_angles"]
-
 
 def polar_angles(
     angle: cython.double[::1], twin: cython.longlong[::1], first: cython.longlong[::1], leaving: cython.double[::1]

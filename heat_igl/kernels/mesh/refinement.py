@@ -24,8 +24,6 @@ from cython.cimports.libc.math import atan2, sqrt
 
 from heat_igl.kernels.signals import raise_caught
 
-__all__ = ["refine"]
-
 
 @cython.final
 @cython.cclass

@@ -3,8 +3,6 @@
 import cython
 import numpy as np
 
-__all__ = ["Segments"]
-
 
 @cython.final
 @cython.cclass

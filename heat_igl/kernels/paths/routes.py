@@ -6,8 +6,6 @@ from cython.cimports.heat_igl.kernels.paths.strips import FaceTable
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.libc.math import INFINITY, sqrt
 
-__all__ = ["EdgeRoutes"]
-
 
 @cython.final
 @cython.cclass

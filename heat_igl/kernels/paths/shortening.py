@@ -40,8 +40,6 @@ from cython.cimports.heat_igl.kernels.paths.strips import (
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.libc.math import INFINITY, M_PI, atan2, fabs, hypot, sqrt
 
-__all__ = ["Shortener"]
-
 _JOINT = np.dtype(
     [
         *((name, "f8") for name in ("length", "leave", "arrive")),

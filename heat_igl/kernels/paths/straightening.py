@@ -31,8 +31,6 @@ from cython.cimports.heat_igl.kernels.paths.strips import (
 )
 from cython.cimports.libc.math import INFINITY, M_PI, acos, atan2, cos, fabs, sqrt
 
-__all__ = ["Course", "Passing", "Saved"]
-
 _CHOICE = np.dtype([("saved", "f8"), ("vertex", "i4"), ("first", "i4"), ("last", "i4")], align=True)
 
 

@@ -6,8 +6,6 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import foot
 from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_SIDE, PI
 from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
 
-__all__ = ["trace"]
-
 
 @cython.final
 @cython.cclass

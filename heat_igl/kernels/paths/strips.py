@@ -20,8 +20,6 @@ from cython.cimports.heat_igl.kernels.paths.strips import (
 )
 from cython.cimports.libc.math import hypot, sqrt
 
-__all__ = ["Detour", "Funnel", "Strip", "FaceTable"]
-
 _CROSSING = np.dtype([("leave", "i4"), ("enter", "i4")])
 _AROUND = np.dtype([("enter", "i4"), ("leave", "i4"), ("before", "i4")])
 _TIP = np.dtype([("length", "f8"), ("step", "i4")], align=True)

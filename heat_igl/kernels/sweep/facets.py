@@ -4,8 +4,6 @@ import cython
 from cython.cimports.heat_igl.kernels.sweep.facets import FLAT, MOST_HALVINGS, MOST_STEPS, PLACED
 from cython.cimports.libc.math import INFINITY, exp, fabs, log, sqrt
 
-__all__ = ["Facet"]
-
 
 @cython.cclass
 class Facet:

@@ -28,8 +28,6 @@ from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 from heat_igl.kernels.signals import raise_caught
 
-__all__ = ["HopfLax"]
-
 
 @cython.final
 @cython.cclass

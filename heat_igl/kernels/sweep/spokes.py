@@ -6,8 +6,6 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, prev
 from cython.cimports.heat_igl.kernels.sweep.spokes import Corner, Spoke
 from cython.cimports.libc.math import M_PI, NAN, atan2, fabs, sqrt
 
-__all__ = ["SpokeTable", "fill", "first_spokes"]
-
 _CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("angle", "f8")])
 
 

@@ -33,8 +33,6 @@ from cython.cimports.libc.math import INFINITY, sqrt
 
 from heat_igl.kernels.signals import raise_caught
 
-__all__ = ["sweep"]
-
 
 def sweep(
     spokes,

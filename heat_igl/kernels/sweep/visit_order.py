@@ -5,8 +5,6 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.sweep.band_queue import clear, put, take
 from cython.cimports.libc.math import INFINITY
 
-__all__ = ["VisitOrder"]
-
 _WAITING = np.dtype([("vertex", "i4"), ("following", "i4")])
 
 

@@ -15,8 +15,6 @@ import cython
 from cython.cimports.heat_igl.kernels.windows.paths import AT_SOURCE, LOST, PathTracer
 from cython.cimports.heat_igl.kernels.windows.structures import apart
 
-__all__ = ["pull_back", "push_forward"]
-
 
 @cython.cfunc
 @cython.nogil

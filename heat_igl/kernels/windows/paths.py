@@ -9,8 +9,6 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-__all__ = ["InnerSources", "PathTracer", "trace_back"]
-
 
 @cython.final
 @cython.cclass

@@ -18,8 +18,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
 )
 from cython.cimports.libc.math import fabs
 
-__all__ = ["FLAT_VERTEX", "SEVERAL_FANS", "shapes"]
-
 #: The kind of a vertex whose faces are several fans, or at an edge of more than two faces.
 SEVERAL_FANS = cython.cast(cython.int, JOINS)
 #: The kind of an inner vertex whose angles sum to 2 pi.

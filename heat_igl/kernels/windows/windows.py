@@ -14,8 +14,6 @@ from cython.cimports.heat_igl.kernels.windows.sources import start_at
 from cython.cimports.heat_igl.kernels.windows.structures import Search
 from cython.cimports.libc.stdlib import free
 
-__all__ = ["Front", "search", "search_each", "pair", "part"]
-
 
 class Front:
     """A surface, and the arrays that searches on it write, for `search` or `search_each`.
