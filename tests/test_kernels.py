@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from heat_igl import kernels, shapes
 from heat_igl.kernels.linear import relaxation
 from heat_igl.kernels.ordering import ascending
-from heat_igl.linear import factorize, multifrontal, substitution
+from heat_igl.linear import factorize, multifrontal
 from heat_igl.linear.dissection import dissect
 from heat_igl.operators import operators
 
@@ -79,8 +79,8 @@ def test_every_build_solves_alike(monkeypatch):
     solutions = []
     pairs = zip(kernels.builds("linear.multifrontal"), kernels.builds("linear.substitution"), strict=True)
     for of_factor, of_solve in pairs:
-        monkeypatch.setattr(multifrontal, "_kernel", import_module(of_factor))
-        monkeypatch.setattr(substitution, "_kernel", import_module(of_solve))
+        monkeypatch.setattr(multifrontal, "_elimination", import_module(of_factor))
+        monkeypatch.setattr(multifrontal, "_solves", import_module(of_solve))
         one, again = (factorize(A, "multifrontal").solve(b) for _ in range(2))
         assert (one == again).all()
         np.testing.assert_allclose(A @ one, b, rtol=0, atol=1e-13)
