@@ -16,6 +16,7 @@ from conftest import (
     zoo,
 )
 from scipy.spatial import Delaunay
+from steiner import graph_distance
 from surfaces import (
     COORDINATES,
     bumpy,
@@ -33,7 +34,6 @@ from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, rea
 from heat_igl.intrinsic import HalfEdges, intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.windows.exact import ExactSurface, exact_distance
 from heat_igl.windows.tables import from_mesh
-from tests.steiner import graph_distance
 
 
 def delaunay(mesh: Mesh) -> ExactSurface:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import mean_error, perturbed, zoo
+from steiner import graph_distance, steiner_distance
 from surfaces import moebius_strip
 
 import heat_igl
@@ -42,7 +43,6 @@ from heat_igl.intrinsic import (
 from heat_igl.operators import Operators, cotan_operators, intrinsic_operators, operators, tufted_operators
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import exact_distance
-from tests.steiner import graph_distance, steiner_distance
 
 # --- intrinsic
 

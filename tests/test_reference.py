@@ -16,6 +16,7 @@ import psutil
 import pytest
 from conftest import relative_error, wheel_path, zoo
 from scipy.spatial import Delaunay
+from steiner import graph_distance
 
 from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
@@ -23,7 +24,6 @@ from heat_igl.reference import guarded, measurement, native
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
 from heat_igl.validation import closed_forms
-from tests.steiner import graph_distance
 
 SOLVERS = ("windows", *reference.EXACT_SOLVERS)
 

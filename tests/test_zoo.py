@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from conftest import load_script, mean_error
 
 import heat_igl
 from heat_igl import (
@@ -26,7 +27,6 @@ from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
 from heat_igl.validation.domains import CASES, DomainCase, around_the_wall, by_fermat
 from heat_igl.validation.zoo import FAMILIES, SHAPES
-from tests.conftest import load_script, mean_error
 
 # --- Heat on shapes that no default was tuned for, and the check that every answer gets
 
