@@ -110,7 +110,8 @@ def test_any_public_name_may_be_the_first_to_be_asked_for():
         "        getattr(heat_igl, name); os._exit(0)\n"
         "    assert not os.wait()[1], name"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
 
 
 def test_names_loaded_on_first_use_are_those_of_their_modules():

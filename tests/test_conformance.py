@@ -51,7 +51,7 @@ def sources(name: str) -> list[int]:
     return [3, n // 2, n - 5]
 
 
-def close(found: np.ndarray, expected: np.ndarray, name: str, method: str) -> None:
+def assert_close(found: np.ndarray, expected: np.ndarray, name: str, method: str) -> None:
     """Equal to rounding; by heat as far as linear systems are solved, and the time step of a speed is that of a mean.
 
     A sweep takes vertices at equal distances in the order of their numbers, which single values show.
@@ -87,8 +87,8 @@ def test_infinity_in_other_components(name: str, method: str) -> None:
     solver, n = both.solver(method), one.n
     d = solver.distance(3)
     assert np.isinf(d[n:]).all()
-    close(d[:n], distance(name, method, 3), name, method)
-    close(solver.distance([3, n + 3])[n:], distance(name, method, 3), name, method)
+    assert_close(d[:n], distance(name, method, 3), name, method)
+    assert_close(solver.distance([3, n + 3])[n:], distance(name, method, 3), name, method)
 
 
 @table()
@@ -124,7 +124,7 @@ def test_not_longer_than_a_path_along_edges(name: str, method: str) -> None:
 @table()
 def test_distance_does_not_depend_on_the_order_of_vertices_and_cells(name: str, method: str) -> None:
     other, label = domain(name).renumbered(np.random.default_rng(1))
-    close(other.solver(method).distance(int(label[3]))[label], distance(name, method, 3), name, method)
+    assert_close(other.solver(method).distance(int(label[3]))[label], distance(name, method, 3), name, method)
 
 
 @table()
@@ -139,7 +139,7 @@ def test_distance_does_not_depend_on_the_place(name: str, method: str) -> None:
 @pytest.mark.parametrize("scale", [1e-30, 1e30])
 def test_distance_has_the_unit_of_the_mesh(name: str, method: str, scale: float) -> None:
     scaled = domain(name).moved(np.eye(3), scale=scale)
-    close(scaled.solver(method).distance(3) / scale, distance(name, method, 3), name, method)
+    assert_close(scaled.solver(method).distance(3) / scale, distance(name, method, 3), name, method)
 
 
 @table([(name, method) for name, method in CELLS if name not in ("polygons", *POINTS)])
@@ -148,7 +148,7 @@ def test_a_vertex_in_each_flat_simplex_changes_nothing(name: str, method: str) -
     fine, before = domain(name).subdivided(), distance(name, method, 3)
     found = fine.solver(method).distance(3)[: domain(name).n]
     if is_exact(name, method):
-        close(found, before, name, method)
+        assert_close(found, before, name, method)
     else:
         assert np.abs(found - before).mean() < 2 * largest_mean_error(name, method) * before.mean()
 
@@ -203,16 +203,16 @@ def test_a_cutoff_and_targets_leave_the_values(name: str, method: str) -> None:
     prepared, whole = solver(name, method), distance(name, method, 3)
     cutoff = float(np.median(whole))
     near = np.where(whole <= cutoff, whole, np.inf)
-    close(prepared.distance(3, cutoff=cutoff), near, name, method)
-    close(prepared.distances([3], cutoff=cutoff)[0], near, name, method)
+    assert_close(prepared.distance(3, cutoff=cutoff), near, name, method)
+    assert_close(prepared.distances([3], cutoff=cutoff)[0], near, name, method)
     cells = prepared.voronoi([3], cutoff=cutoff)
     np.testing.assert_array_equal(cells.labels == -1, np.isinf(cells.distance))
     made = domain(name).made()
     if isinstance(made, Operators):  # the front door takes meshes
         return
-    close(heat_igl.geodesic_distance(made, 3, method=method, cutoff=cutoff), near, name, method)
+    assert_close(heat_igl.geodesic_distance(made, 3, method=method, cutoff=cutoff), near, name, method)
     targets = sources(name)[::-1]
-    close(heat_igl.geodesic_distance(made, 3, method=method, targets=targets), whole[targets], name, method)
+    assert_close(heat_igl.geodesic_distance(made, 3, method=method, targets=targets), whole[targets], name, method)
 
 
 @table()
@@ -227,7 +227,7 @@ def test_vertices_move(name: str, method: str) -> None:
     if at.kind == "points":  # the triangles between them stay
         assert np.abs(found - moved.solver(method).distance(3)).mean() < 0.05 * found.mean()
     else:
-        close(found, moved.solver(method).distance(3), name, method)
+        assert_close(found, moved.solver(method).distance(3), name, method)
     np.testing.assert_array_equal(prepared.distance(3), distance(name, method, 3))
 
 
@@ -241,6 +241,6 @@ def test_a_solver_keeps_its_own(name: str, method: str) -> None:
     given.V[:] *= 2
     if given.field is not None:
         given.field[:] *= 3
-    close(prepared.distance(3), distance(name, method, 3), name, method)
+    assert_close(prepared.distance(3), distance(name, method, 3), name, method)
     with pytest.raises(AttributeError):
         prepared.plan = None

@@ -83,8 +83,11 @@ def test_a_block_runs_as_it_is_copied(block: str, monkeypatch: pytest.MonkeyPatc
 class Scene:
     """In place of a picture, which takes a second to draw."""
 
+    n_drawn = 0
+
     def __init__(self, scene: Any, *_: Any) -> None:
         assert np.isfinite(scene.V).all()
+        Scene.n_drawn += 1
 
 
 @pytest.mark.slow
@@ -94,7 +97,11 @@ def test_every_entry_of_the_gallery_runs_as_it_is_shown(monkeypatch: pytest.Monk
     monkeypatch.syspath_prepend(ROOT / "docs")
     gallery = importlib.import_module("gallery")
     for entry in gallery.ENTRIES:
-        exec(compile(gallery._body(entry), entry.__name__, "exec"), {"__name__": "__main__"})
+        before = Scene.n_drawn
+        names: dict[str, Any] = {"__name__": "__main__"}
+        exec(compile(gallery._body(entry), entry.__name__, "exec"), names)
+        is_page = "page(" in gallery._body(entry)
+        assert is_page or Scene.n_drawn == before + 1, entry.__name__
 
 
 def examples() -> Iterator[pytest.param]:

@@ -822,6 +822,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
         more_room(s, n)
         if s.failed:
             return
+    # Only the checked build has assertions. The next needs the windows as they came, in room that is free until then.
     assert memcpy(s.to_left, windows, n * cython.sizeof(Window)) != cython.NULL
     i = n
     n = trim(s, windows, n, h)
