@@ -163,6 +163,11 @@ UNEVEN_SHARE = 0.01
 # With so few vertices a triangle is large beside the distances that are asked for, and a thousand cost nothing.
 FEW_FOR_HEAT = 64
 ENOUGH_FOR_HEAT = 1000
+# Up to so many vertices, a body around whose edges ways bend is measured on halved tetrahedra as well: of a long edge,
+# a part may see the source although neither end does, and then such an edge is too coarse a source itself. Also, every
+# vertex looks for the only source, and for several again after bends, since a vertex may see a source that no vertex
+# around it sees. On finer bodies both are rare, and take time.
+SMALL_BODY = 1000
 # What circumradii of coarse meshes are refined to, in square roots of the area per vertex.
 LARGEST_RADIUS = 1.4
 # Growth by refinement: at most so many times the vertices, and some thousands more.

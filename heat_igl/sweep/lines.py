@@ -12,6 +12,7 @@ from heat_igl.kernels.bodies.bodies import Body
 from heat_igl.kernels.bodies.sight import look_around
 from heat_igl.mesh import connectivity
 from heat_igl.operators import MetricSimplices
+from heat_igl.plan import SMALL_BODY
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.line_derivative import LineDerivative, line_slopes
 from heat_igl.sweep.reflex_edges import reflex_edges
@@ -20,11 +21,6 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
 _MOST_ROUNDS = 5
-# Up to so many vertices, a body around whose edges ways bend is measured on halved tetrahedra as well: of a long edge,
-# a part may see the source although neither end does, and then such an edge is too coarse a source itself. Also, every
-# vertex looks for the only source, and for several again after bends, since a vertex may see a source that no vertex
-# around it sees. On finer bodies both are rare, and take time.
-_FEW = 1000
 # How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
 _BESIDE, _BESIDE_OF_FEW = 0.5, 2.0
 # What the kernel of bends knows of the way to a vertex.
@@ -48,7 +44,7 @@ class LineEngine(SimplexEngine):
     def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
         super().__init__(simplices)
         self._V = np.ascontiguousarray(simplices.place)
-        self._is_small = simplices.n <= _FEW
+        self._is_small = simplices.n <= SMALL_BODY
         is_refined = self._is_small and not is_halved and len(self._reflex_edges[0]) > 0
         self._finer = LineEngine(simplices.halved(), is_halved=True) if is_refined else None
 
