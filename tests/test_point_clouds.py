@@ -813,7 +813,7 @@ def test_triangles_that_contradict_are_left_out_if_they_are_few_and_on_a_fold() 
 
 
 def test_directions_on_a_surface_that_cannot_be_oriented_are_an_error() -> None:
-    """On Klein's bottle, whose triangles are unfolded on a double cover."""
+    """On Klein's bottle."""
     a, b = 60, 40
     u, v = np.meshgrid(2 * np.pi * np.arange(a) / a, 2 * np.pi * np.arange(b) / b, indexing="ij")
     out = 3 + np.cos(u / 2) * np.sin(v) - np.sin(u / 2) * np.sin(2 * v)

@@ -8,11 +8,13 @@ from conftest import perturbed, pygeodesic_distance, relative_error
 from surfaces import COORDINATES, moebius_strip, random_disk, sheared, with_point
 
 from heat_igl import GeodesicSolver, Mesh, OffsetSources, SurfacePoints, shapes
+from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.kernels.sweep import sweeping
 from heat_igl.mesh import connectivity
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import source_set
 from heat_igl.sweep import SweepEngine
+from heat_igl.sweep.spokes import numbered_spokes
 from heat_igl.validation import zoo
 from heat_igl.windows import MeshTriangles
 from heat_igl.windows.bounds import Bounds
@@ -74,6 +76,27 @@ def test_faces_turned_over_change_less_than_the_error(bumpy):
     F = bumpy.F.copy()
     F[::3] = F[::3, [0, 2, 1]]
     np.testing.assert_allclose(swept(Mesh(bumpy.V, F), 5), swept(bumpy, 5), rtol=3e-3)
+
+
+def test_faces_turned_over_have_the_same_spokes():
+    """No orientation suits all faces of a Moebius strip, and none is needed."""
+    mesh = moebius_strip(24, 4)
+
+    def triangles(F):
+        """At each vertex v the side ab of each, a < b, and where v and the corner beyond are over it from a on."""
+        number, (first, spoke, _, _) = numbered_spokes(intrinsic_triangulation(Mesh(mesh.V, F)))
+        spoke, row = spoke[: first[-1]], np.repeat(np.arange(len(number)), np.diff(first))
+        spoke, row = spoke[~np.isnan(spoke["height"])], row[~np.isnan(spoke["height"])]
+        vertex, beyond = np.append(np.argsort(number), -1), spoke["beyond"]
+        a, b = vertex[spoke["neighbour"]], vertex[spoke["next_neighbour"]]
+        along, beyond_along = spoke["along"], np.where(beyond < 0, spoke["base"] / 2, spoke["beyond_along"])
+        places = [np.where(a < b, x, spoke["base"] - x) for x in (along, beyond_along)]
+        columns = vertex[row], np.minimum(a, b), np.maximum(a, b), vertex[beyond], spoke["height"], *places
+        return np.stack(columns, axis=1)[np.lexsort(columns[:3])]
+
+    F = mesh.F.copy()
+    F[::3] = F[::3, [0, 2, 1]]
+    np.testing.assert_allclose(triangles(F), triangles(mesh.F), atol=1e-12)
 
 
 @pytest.mark.parametrize("k", [1, 2, 5])

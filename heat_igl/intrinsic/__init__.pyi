@@ -16,7 +16,6 @@ from heat_igl.intrinsic.history import Turned as Turned
 from heat_igl.intrinsic.layout import apex as apex
 from heat_igl.intrinsic.layout import corner_angles as corner_angles
 from heat_igl.intrinsic.layout import lay_out as lay_out
-from heat_igl.intrinsic.oriented_cover import double_cover as double_cover
 from heat_igl.intrinsic.refinement import delaunay_refinement as delaunay_refinement
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation as IntrinsicTriangulation
 from heat_igl.intrinsic.tufted import closed_cover as closed_cover

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.intrinsic import HalfEdges, IntrinsicTriangulation, double_cover
+from heat_igl.intrinsic import HalfEdges, IntrinsicTriangulation
 from heat_igl.kernels.sweep import spokes
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
@@ -22,7 +22,8 @@ class Spokes(NamedTuple):
     Attributes
     ----------
     first : (n + 1,) int32
-        Spokes of vertex v are ``first[v]`` to ``first[v + 1]``, counter-clockwise, fan after fan.
+        Spokes of vertex v are ``first[v]`` to ``first[v + 1]``, fan after fan, each counter-clockwise as the face of
+        the lowest number there has it.
     spoke : (s,) structures
         `length`. Of the triangle to the left of the spoke: v's place over the opposite side, `along` it from the
         spoke's end and in `height`; the length of that side, `base`; and the place of the vertex beyond it,
@@ -46,12 +47,9 @@ def numbered_spokes(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, Sp
     """The rows (n,) of the vertices, which are numbered breadth-first, and their spokes.
 
     Neighbours on the surface become neighbours in memory: nothing on most meshes, a fifth of the time where vertices
-    come in an arbitrary order. A surface whose faces are not aligned is replaced by its oriented double cover, with
-    2 n rows.
+    come in an arbitrary order. Faces need no common orientation.
     """
-    is_oriented = triangulation.aligned.all()
-    given = HalfEdges.of(triangulation) if is_oriented else double_cover(triangulation)
-    edges, number, _ = given.numbered(triangulation.n if is_oriented else 2 * triangulation.n)
+    edges, number, _ = HalfEdges.of(triangulation).numbered(triangulation.n)
     first = spokes.first_spokes(edges, len(number))
     spoke = aligned(first[-1], _SPOKE)
     total, is_flat = spokes.fill(edges, first, spoke)

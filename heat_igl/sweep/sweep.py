@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
-from heat_igl.intrinsic import lay_out, oriented
+from heat_igl.intrinsic import lay_out
 from heat_igl.kernels.mesh.checking import largest_finite
 from heat_igl.kernels.sweep import sweeping
 from heat_igl.operators import share_on_large_triangles
@@ -44,9 +44,8 @@ _MOVED = 0.02
 class SweepEngine(TriangleEngine):
     """Distance by planar unfolding over the triangles at each vertex, for any number of queries.
 
-    Paths end at the boundary and at edges of more than two faces: they run along such edges, not across. A surface that
-    cannot be oriented is replaced by the oriented double cover, with each source on both sheets. Around points, curves
-    and several vertices the sweep begins with exact distances.
+    Paths end at the boundary and at edges of more than two faces: they run along such edges, not across. Around points,
+    curves and several vertices the sweep begins with exact distances.
 
     Parameters
     ----------
@@ -58,11 +57,8 @@ class SweepEngine(TriangleEngine):
 
     def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
         super().__init__(triangles, originals)
-        triangulation = triangles.surface.unfolding
-        self._triangulation = triangulation if triangulation.aligned.all() else oriented(triangulation)
+        self._triangulation = triangles.surface.unfolding
         self._number, self._spokes = numbered_spokes(self._triangulation)
-        self._n = triangulation.n
-        self._sheets = len(self._number) // self._n
         lengths = self._spokes.spoke["length"]
         self._band = _BAND * float(np.median(lengths[:: len(lengths) // _SAMPLE + 1]))
 
@@ -135,14 +131,14 @@ class SweepEngine(TriangleEngine):
 
     def _swept(self, query: Query, points: SourcePoints, near: ExactSolution | None) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the vertex or point (n,) that it is measured from, counted one after the other."""
-        sources, rows = query.sources, len(self._number)
+        sources, n = query.sources, len(self._number)
         k = len(sources.vertices)
-        distance, label, is_stale = np.full(rows, np.inf), np.full(rows, -1, np.int32), np.ones(rows, bool)
+        distance, label, is_stale = np.full(n, np.inf), np.full(n, -1, np.int32), np.ones(n, bool)
 
         def begin(vertex: IntArray, value: FloatArray, source: IntArray) -> AnyArray:
-            """Set values on all sheets, the smallest of each vertex last."""
+            """Set values, the smallest of each vertex last."""
             order = np.argsort(-value, kind="stable")
-            at = self._number.reshape(self._sheets, -1)[:, vertex[order]]
+            at = self._number[vertex[order]]
             distance[at], label[at] = value[order], source[order]
             return at
 
@@ -165,14 +161,11 @@ class SweepEngine(TriangleEngine):
         )
         if not has_labels:
             label[np.isfinite(distance)] = 0
-        on_sheets = distance[self._number].reshape(self._sheets, -1)
-        nearest = on_sheets.argmin(axis=0)[None]
-        labels = np.take_along_axis(label[self._number].reshape(self._sheets, -1), nearest, axis=0)[0]
-        return on_sheets.min(axis=0), labels.astype(np.int64)
+        return distance[self._number], label[self._number].astype(np.int64)
 
     def _corners_of(self, points: SourcePoints, k: int) -> tuple[IntArray, FloatArray, IntArray]:
         """Corners (3 p,) of the triangles of points, the lengths of the straight lines there, and their sources."""
-        triangulation = self._triangles.surface.unfolding
+        triangulation = self._triangulation
         faces, barycentric = triangulation.locate(points.faces, points.barycentric)
         corners = lay_out(triangulation.l[faces])
         place = np.einsum("pc,pcx->px", barycentric, corners)

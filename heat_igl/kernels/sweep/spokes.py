@@ -28,34 +28,37 @@ def first_spokes(edges, n: cython.int):
     array = np.zeros(n + 1, np.int32)
     first: cython.int[::1] = array
     with cython.nogil:
+        # Twice as many: an open fan has two outer sides.
         for h in range(twin.shape[0]):
-            first[vertex[h] + 1] += 2 if twin[next_half_edge(h)] < 0 else 1
+            first[vertex[h] + 1] += 2 + (twin[next_half_edge(h)] < 0) + (twin[previous_half_edge(h)] < 0)
         for v in range(n):
-            first[v + 1] += first[v]
+            first[v + 1] = first[v] + first[v + 1] // 2
     return array
 
 
 def fill(edges, first: cython.const[cython.int][::1], spoke: Spoke[::1]):
     """Fill the spokes; returns the total angle (k,) of each fan, and whether each vertex (n,) is flat.
 
-    A vertex is flat if the first fan of it has no curvature, or is open; or if it has none.
+    A vertex is flat if the first fan of it has no curvature, or is open; or if it has none. Around a vertex, faces that
+    run the other way than the first of the fan are seen turned over, so the surface needs no orientation.
     """
     vertex: cython.const[cython.int][::1] = edges.vertex
     twin: cython.const[cython.int][::1] = edges.twin
+    aligned: cython.const[cython.uchar][::1] = edges.aligned
     length: cython.const[cython.double][::1] = edges.length
     total_array, flat_array = np.empty(twin.shape[0]), np.ones(first.shape[0] - 1, np.uint8)
     is_flat: cython.uchar[::1] = flat_array
     total: cython.double[::1] = total_array
     corner: Corner[::1] = np.empty(twin.shape[0], _CORNER)
-    # The corner to the left of each spoke, -1 past the end of an open fan.
+    # The corner to the left of each spoke, twice, and one more if it is turned over; -1 past the end of an open fan.
     left: cython.int[::1] = np.empty(spoke.shape[0], np.int32)
     end: cython.int[::1] = np.array(first)
     is_done: cython.uchar[::1] = np.zeros(twin.shape[0], np.uint8)
     n_fans: cython.int
     with cython.nogil:
         _shapes(length, corner)
-        n_fans = _fans(vertex, twin, corner, first, total, is_flat, spoke, left, end, is_done)
-        _fill_spokes(vertex, length, twin, corner, spoke, left)
+        n_fans = _fans(vertex, twin, aligned, corner, first, total, is_flat, spoke, left, end, is_done)
+        _fill_spokes(vertex, length, twin, aligned, corner, spoke, left)
     return total_array[:n_fans].copy(), flat_array.view(bool)
 
 
@@ -79,11 +82,41 @@ def _shapes(length: cython.const[cython.double][::1], corner: Corner[::1]) -> cy
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _side(k: cython.int, is_left: cython.bint) -> cython.int:
+    """The side at the left of corner k // 2, or at its right: they change places if k is odd, the face turned over."""
+    return next_half_edge(k // 2) if is_left != (k & 1) else previous_half_edge(k // 2)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _beyond(
+    twin: cython.const[cython.int][::1],
+    aligned: cython.const[cython.uchar][::1],
+    k: cython.int,
+    is_left: cython.bint,
+) -> cython.int:
+    """The corner of the same vertex beyond a side of corner k // 2, as `_side` has them; -1 if there is none."""
+    h: cython.int = _side(k, is_left)
+    t: cython.int = twin[h]
+    if t < 0:
+        return -1
+    is_turned: cython.bint = (k & 1) != (not aligned[h])
+    # Of the face beyond, the side is at the right if it is at the left here.
+    return 2 * (next_half_edge(t) if is_left != is_turned else previous_half_edge(t)) + is_turned
+
+
+@cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
 def _fans(
     vertex: cython.const[cython.int][::1],
     twin: cython.const[cython.int][::1],
+    aligned: cython.const[cython.uchar][::1],
     corner: Corner[::1],
     first: cython.const[cython.int][::1],
     total: cython.double[::1],
@@ -95,39 +128,35 @@ def _fans(
 ) -> cython.int:
     """Glue corners to fans, in rows of spokes from ``end[v]`` on; returns how many fans there are."""
     h: cython.int
-    t: cython.int = -1
+    k: cython.int = -1
     n_fans: cython.int = 0
     for h in range(twin.shape[0]):
         if is_done[h]:
             continue
-        start: cython.int = h
-        is_open: cython.bint = False
+        start: cython.int = 2 * h
         while True:  # clockwise, to the boundary or once around
-            t = twin[previous_half_edge(start)]
-            if t < 0:
-                is_open = True
+            k = _beyond(twin, aligned, start, False)
+            if k < 0:
                 break
-            start = previous_half_edge(t)
-            if start == h:
+            start = k
+            if k == 2 * h:
                 break
+        is_open: cython.bint = k < 0
         v: cython.int = vertex[h]
         row: cython.int = end[v]
         begin: cython.int = row
         angle: cython.double = 0.0
-        k: cython.int = start
+        k = start
         while True:  # counter-clockwise
-            is_done[k] = True
+            is_done[k // 2] = True
             left[row] = k
             spoke[row].next = row + 1
             row += 1
-            angle += corner[k].angle
-            t = twin[next_half_edge(k)]
-            if t < 0:
+            angle += corner[k // 2].angle
+            k = _beyond(twin, aligned, k, True)
+            if k < 0 or k == start:
                 break
-            k = next_half_edge(t)
-            if k == start:
-                break
-        if t < 0:  # the last side, which has no triangle to its left
+        if is_open:  # the last side, which has no triangle to its left
             left[row] = -1
             spoke[row].next = row
             row += 1
@@ -148,29 +177,33 @@ def _fill_spokes(
     vertex: cython.const[cython.int][::1],
     length: cython.const[cython.double][::1],
     twin: cython.const[cython.int][::1],
+    aligned: cython.const[cython.uchar][::1],
     corner: Corner[::1],
     spoke: Spoke[::1],
     left: cython.int[::1],
 ) -> cython.void:
     """What a spoke knows of the triangle to its left, and of the one beyond."""
-    k: cython.int
-    h: cython.int = -1
-    for k in range(spoke.shape[0]):
-        s = cython.address(spoke[k])
+    row: cython.int
+    k: cython.int = -1
+    for row in range(spoke.shape[0]):
+        s = cython.address(spoke[row])
         s.beyond = -1
-        if left[k] < 0:  # past the end of the fan of the spoke before
-            s.length = length[next_half_edge(h)]
+        if left[row] < 0:  # past the end of the fan of the spoke before
+            s.length = length[_side(k, True)]
             s.height = NAN
-            s.neighbour = s.next_neighbour = vertex[previous_half_edge(h)]
+            s.neighbour = s.next_neighbour = vertex[_side(k, False)]
             continue
-        h = left[k]
+        k = left[row]
+        h: cython.int = k // 2
         # The spoke is the side opposite the corner at the left neighbour.
         base: cython.double = length[h]
-        s.length, s.base = length[previous_half_edge(h)], base
-        s.along, s.height = corner[h].x * base, corner[h].y * base
-        s.neighbour, s.next_neighbour = vertex[next_half_edge(h)], vertex[previous_half_edge(h)]
+        s.length, s.base = length[_side(k, False)], base
+        s.along, s.height = (1.0 - corner[h].x if k & 1 else corner[h].x) * base, corner[h].y * base
+        s.neighbour, s.next_neighbour = vertex[_side(k, True)], vertex[_side(k, False)]
         t: cython.int = twin[h]
         if t >= 0:
-            # Seen from beyond, the side runs the other way.
-            s.beyond_along, s.beyond_depth = (1.0 - corner[t].x) * base, corner[t].y * base
+            # Seen from beyond, the side mostly runs the other way.
+            is_turned: cython.bint = (k & 1) != (not aligned[h])
+            s.beyond_along = (corner[t].x if is_turned else 1.0 - corner[t].x) * base
+            s.beyond_depth = corner[t].y * base
             s.beyond = vertex[t]
