@@ -49,7 +49,7 @@ from heat_igl import (
     speed_operators,
 )
 from heat_igl.operators import MetricSimplices, Operators
-from heat_igl.sweep.reflex_edges import reflex_edges
+from heat_igl.sweep import LineEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.domains import around_the_edge, by_fermat, delaunay, moved_inside, straight, without
 
@@ -262,7 +262,8 @@ def in_walls(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     for name, make in (given or WALLS).items():
         mesh = make(rng)
         sources = rng.choice(np.unique(mesh.F), options.sources, replace=False).tolist()
-        row: Row = {"body": name, "n": mesh.n_vertices, "edges": len(reflex_edges(mesh.F, mesh.V)[0])}
+        edges = LineEngine(MetricSimplices.in_space(mesh)).reflex_edges[0]
+        row: Row = {"body": name, "n": mesh.n_vertices, "edges": len(edges)}
         found, took = {}, {}
         for method in ("default", "heat"):
             query = METHODS[method](mesh)

@@ -24,7 +24,7 @@ class MetricSimplices:
     corners : (m, p + 1) int64
         Vertices of each triangle (p = 2) or tetrahedron (p = 3).
     lengths : (m, p + 1, p + 1) float64
-        Distances between the corners of each, in its own metric.
+        Distances between the corners of each, in its own metric; empty if they are those between positions `V`.
     n : int
         Number of vertices.
     V : (n, 3) float64 or None
@@ -53,9 +53,7 @@ class MetricSimplices:
     @classmethod
     def in_space(cls, mesh: Mesh) -> MetricSimplices:
         """The faces of a mesh, by the positions of its vertices."""
-        X = mesh.V[mesh.F]
-        lengths = np.linalg.norm(X[:, :, None] - X[:, None], axis=3)
-        return cls(mesh.F, lengths, mesh.n_vertices, mesh.V, mesh.V, is_given=True)
+        return cls(mesh.F, np.empty(0), mesh.n_vertices, mesh.V, mesh.V, is_given=True)
 
     @classmethod
     def in_metric(cls, mesh: Mesh, tensors: FloatArray) -> MetricSimplices:
@@ -113,7 +111,10 @@ class MetricSimplices:
     def edges(self) -> tuple[IntArray, FloatArray]:
         """Edges (e, 2) of each simplex one after the other, and their lengths (e,) there."""
         i, j = np.triu_indices(self.corners.shape[1], 1)
-        return self.corners[:, np.stack([i, j], axis=1)].reshape(-1, 2), self.lengths[:, i, j].ravel()
+        ends = self.corners[:, np.stack([i, j], axis=1)].reshape(-1, 2)
+        if self.V is not None:
+            return ends, np.linalg.norm(self.V[ends[:, 0]] - self.V[ends[:, 1]], axis=1)
+        return ends, self.lengths[:, i, j].ravel()
 
     def halved(self) -> MetricSimplices:
         """Tetrahedra in space, each cut into eight at the middles of the edges; the vertices keep their numbers.

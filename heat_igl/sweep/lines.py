@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -45,22 +46,30 @@ class LineEngine(SimplexEngine):
         super().__init__(simplices)
         self._V = np.ascontiguousarray(simplices.place)
         self._is_small = simplices.n <= SMALL_BODY
-        is_refined = self._is_small and not is_halved and len(self._reflex_edges[0]) > 0
+        is_refined = self._is_small and not is_halved and len(self.reflex_edges[0]) > 0
         self._finer = LineEngine(simplices.halved(), is_halved=True) if is_refined else None
 
     @cached_property
-    def _reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
+    def reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
         """Edges around which ways bend (e, 2), directions out of the body (e, 3), and cosines to the walls (e,)."""
-        edges, outward, wall = reflex_edges(self._simplices.corners, self._V)
+        edges, outward, wall = reflex_edges(self._corners, self._body.sides_behind(), self._V)
         return edges.astype(np.int32), outward, wall
 
     @cached_property
-    def _body(self) -> Body:
-        return Body(self._corners, self._first, self._incident, self._V)
+    def _body(self) -> Any:
+        body: Any = Body
+        return body(self._corners, self._first, self._incident, self._V)
+
+    @cached_property
+    def _edges(self) -> tuple[AnyArray, FloatArray]:
+        """Each edge once."""
+        ends = self._body.edges()
+        return ends, np.linalg.norm(self._V[ends[:, 0]] - self._V[ends[:, 1]], axis=1)
 
     @cached_property
     def _edge_graph(self) -> sp.csr_array:
-        return connectivity.shortest_edge_graph(*self._simplices.edges, self._simplices.n)
+        ends, lengths = self._edges
+        return sp.csr_array((lengths, tuple(ends.T)), shape=(self._simplices.n, self._simplices.n))
 
     def _order(self, vertices: AnyArray, straight: bool = False) -> AnyArray:
         """All vertices, from near to far: by the straight line from the only source, or by edges."""
@@ -117,7 +126,7 @@ class LineEngine(SimplexEngine):
         """As `_lower`; returns edges (e, 2), and the edge (n,) around which the way to each vertex bends last."""
         begin = distance.copy()
         order = self._order(vertices, straight=len(vertices) == 1)
-        edges, outward, wall = self._reflex_edges
+        edges, outward, wall = self.reflex_edges
         if len(edges):
             rank = np.empty(len(order), np.int64)
             rank[self._order(vertices)] = np.arange(len(order))
@@ -154,7 +163,9 @@ class LineEngine(SimplexEngine):
 
     def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
         """Give vertices that nothing has reached a distance along edges; returns whether there were any."""
-        pairs, lengths = self._simplices.edges
+        if np.isfinite(distance).all():
+            return False
+        pairs, lengths = self._edges
         start, end = np.concatenate([pairs, pairs[:, ::-1]]).T
         lengths = np.concatenate([lengths, lengths])
         reached = len(distance) - np.count_nonzero(np.isinf(distance))

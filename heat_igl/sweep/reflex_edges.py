@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.mesh import connectivity
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.mesh.connectivity import unique_rows
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Sine of the angle by which a body must exceed half a turn at an edge.
 _FLAT = 1e-6
 
 
-def reflex_edges(corners: IntArray, V: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+def reflex_edges(corners: AnyArray, behind: AnyArray, V: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Boundary edges at which the inside takes more than half a turn, and edges where more than two walls meet.
 
     Parameters
     ----------
     corners : (m, 4) int
         Tetrahedra.
+    behind : (m, 4) int
+        The tetrahedron behind the side opposite each corner, -1 on the boundary.
     V : (n, 3) float64
         Positions of the vertices.
 
@@ -31,9 +33,8 @@ def reflex_edges(corners: IntArray, V: FloatArray) -> tuple[IntArray, FloatArray
         Cosine of the angle between that vector and the walls.
     """
     n = len(V)
-    found = connectivity.facets(corners, n)
-    tetrahedron, corner = np.nonzero(found.n_faces[found.of_face] == 1)
-    walls = found.vertices[found.of_face[tetrahedron, corner]]
+    tetrahedron, corner = np.nonzero(behind < 0)
+    walls = np.sort(corners[tetrahedron[:, None], (corner[:, None] + [1, 2, 3]) % 4].astype(np.int64), axis=1)
     inner = V[corners[tetrahedron, corner]]
     # The sides of all walls, each with the wall's third corner and its normal that points inside.
     normal = np.cross(V[walls[:, 1]] - V[walls[:, 0]], V[walls[:, 2]] - V[walls[:, 0]])
@@ -41,7 +42,7 @@ def reflex_edges(corners: IntArray, V: FloatArray) -> tuple[IntArray, FloatArray
     sides = np.concatenate([walls[:, [0, 1]], walls[:, [0, 2]], walls[:, [1, 2]]])
     third = np.concatenate([walls[:, 2], walls[:, 1], walls[:, 0]])
     wall = np.tile(np.arange(len(walls)), 3)
-    first, of_side, counts = connectivity.unique_rows(sides, n)
+    first, of_side, counts = unique_rows(sides, n)
     edges = sides[first]
     tangent = _unit(V[edges[:, 1]] - V[edges[:, 0]])[of_side]
     along_wall = V[third] - V[sides[:, 0]]

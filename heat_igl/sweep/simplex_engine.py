@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.kernels.mesh import bounds
+from heat_igl.mesh.grouping import group_by_label
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Share of a distance that is rounding.
 ROUNDING = 1e-9
-# With more sources that begin at different values, lines are bounded by the nearest one and the first value.
+# With more sources, lines are bounded by the nearest one and the first value.
 _MANY = 100
 
 
@@ -35,9 +36,8 @@ class SimplexEngine(Engine):
     def __init__(self, simplices: MetricSimplices) -> None:
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
-        used = simplices.corners.ravel()
-        self._incident = np.argsort(used, kind="stable").astype(np.int32)
-        self._first = np.concatenate([[0], np.cumsum(np.bincount(used, minlength=simplices.n))]).astype(np.int32)
+        by_vertex = group_by_label(simplices.corners.ravel(), simplices.n)
+        self._first, self._incident = (np.asarray(part, np.int32) for part in by_vertex)
 
     @abstractmethod
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
@@ -70,7 +70,7 @@ class SimplexEngine(Engine):
         """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""
         place, least = self._simplices.place, self._simplices.least
         if place is not None:
-            if np.ptp(offset) == 0 or len(offset) > _MANY:
+            if len(offset) > _MANY:
                 from scipy.spatial import cKDTree
 
                 line = least * cKDTree(place[vertices]).query(place)[0] + offset.min()

@@ -1,3 +1,8 @@
+cdef enum:
+    # What lies behind a side that has not been looked at.
+    UNKNOWN = -2
+
+
 cdef class Body:
     cdef readonly object _arrays
     cdef const int[:, ::1] corners

@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.bodies.bodies import UNKNOWN
 from cython.cimports.libc.math import sqrt
 
 
@@ -35,7 +36,7 @@ class Body:
         self.corners, self.first, self.incident, self.positions = corners, first, incident, positions
         n: cython.Py_ssize_t = positions.shape[0]
         m: cython.Py_ssize_t = corners.shape[0]
-        self.behind, self.reach = np.empty((m, 4), np.int32), np.zeros(n)
+        self.behind, self.reach = np.full((m, 4), UNKNOWN, np.int32), np.zeros(n)
         counts, all_marks = np.zeros(n + 1, np.int32), np.full(n, -1, np.int32)
         n_around: cython.int[::1] = counts
         mark: cython.int[::1] = all_marks
@@ -43,7 +44,8 @@ class Body:
         i: cython.Py_ssize_t
         with cython.nogil:
             for i in range(4 * m):
-                self.behind[i // 4, i % 4] = self.across(i // 4, i % 4)
+                if self.behind[i // 4, i % 4] == UNKNOWN:
+                    self.behind[i // 4, i % 4] = self.across(i // 4, i % 4)
             for i in range(n):
                 n_around[i + 1] = self.list_around(i, mark, one_list, 0)
         all_marks[:] = -1
@@ -58,8 +60,18 @@ class Body:
         """What it was made of."""
         return Body, self._arrays
 
+    def sides_behind(self):
+        """`behind`, as an array."""
+        return np.asarray(self.behind)
+
+    def edges(self):
+        """The ends (e, 2) int32 of each edge, the smaller one first."""
+        first, head = np.asarray(self.first_neighbour), np.asarray(self.neighbours)
+        tail = np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first))
+        return np.stack([tail, head], axis=1)[tail < head]
+
     def across(self, t: cython.int, o: cython.int) -> cython.int:
-        """The first other tetrahedron at the side of t opposite corner o, or -1."""
+        """The first other tetrahedron at the side of t opposite corner o, or -1; that one is told as well."""
         a: cython.int = self.corners[t, (o + 1) % 4]
         b: cython.int = self.corners[t, (o + 2) % 4]
         c: cython.int = self.corners[t, (o + 3) % 4]
@@ -69,10 +81,17 @@ class Body:
             other: cython.int = self.incident[k] // 4
             if other != t:
                 n_shared: cython.int = 0
+                beside: cython.int = 0
                 for i in range(4):
                     u: cython.int = self.corners[other, i]
-                    n_shared += u in (b, c)
-                if n_shared == 2:
+                    if u in (a, b, c):
+                        n_shared += 1
+                    else:
+                        beside = i
+                if n_shared == 3:
+                    # The first other one of that is t, unless an earlier one has been there.
+                    if self.behind[other, beside] == UNKNOWN:
+                        self.behind[other, beside] = t
                     return other
         return -1
 
