@@ -8,7 +8,7 @@ theory_sweep  a source that is placed through two triangles
 theory_strip  a shortest path on a torus, and its faces laid out in the plane
 theory_cone   a cone and its sector, and a vertex with more than the full angle
 
-Needs the extra ``view``. `scripts/paper_figures.py` draws those of docs/paper.md.
+Needs the extra ``view``. `scripts/paper.py` draws those of docs/paper.md.
 """
 
 from __future__ import annotations

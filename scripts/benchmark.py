@@ -225,14 +225,6 @@ def floors(rows: Sequence[Row]) -> Iterator[Row]:
                          "query": 1e3 * row["later"], "share": row["later"] / floor}  # fmt: skip
 
 
-def break_even(rows: Sequence[Row]) -> Iterator[Row]:
-    """From how many queries on a mesh the precomputation of heat has paid, against methods without one."""
-    for row in (row for row in rows if row["method"] == "heat"):
-        for other in (o for o in rows if o["mesh"] == row["mesh"] and o.get("precomputation") is None):
-            gain = other["first"] - row["later"]
-            yield other | {"queries": max(1, int(np.ceil(row["precomputation"] / gain))) if gain > 0 else None}
-
-
 def imports(repeats: int = 7) -> Iterator[Row]:
     """Median seconds of a new interpreter, what heat_igl is built on first."""
     base = "import numpy, scipy.sparse, igl"
@@ -280,19 +272,12 @@ def main(argv: Sequence[str] | None = None) -> None:
         rows = collected(timings(options, options.meshes or ([bunny] if bunny else [])))
         own = [row for row in rows if row["method"].startswith("heat")]
         moved = {"mesh": "{mesh}", "a new solver": "{precomputation:.3f}", "with_vertices": "{moved:.3f}"}
-        paid = {
-            "mesh": "{mesh}",
-            "against": "{method}",
-            "its query": "{first:.3f}",
-            "heat pays from query": "{queries}",
-        }
         tables = {
             "timings": Table(rows, COST),
             **{f"ratios {peer}": Table(own, ratios(peer)) for peer in PEERS},
             "exponents": Table(list(exponents(rows)), FIT),
             "floor": Table(list(floors(rows)), FLOOR),
             "moved": Table(own, moved),
-            "break-even": Table(list(break_even(rows)), paid),
             "import": Table(list(imports()), {"new interpreter": "{statement}", "seconds": "{seconds:.3f}"}),
         }
         publish(options, tables)

@@ -1,26 +1,23 @@
-"""Exact distance by windows: agreement with others, windows per edge, time and memory, and what local queries cost.
+"""Exact distance by windows: agreement with VTP, windows per edge and time, and what local queries cost.
 
     python scripts/exact_table.py bunny.obj cow.obj --docs docs/exact.md    # 4 sources on each
     python scripts/exact_table.py --shapes                 # generated shapes of 5000 to 130 000 vertices instead
     python scripts/exact_table.py --shapes --only "plane"  # some of them
-    python scripts/exact_table.py MESH --threads           # and the gain of two threads, on idle machines
     python scripts/exact_table.py --matrix 10000           # rows of the 5 % nearest vertices, into a store
 
 Where the variable HEAT_IGL_VTP names the program of VTP (Qin et al. 2016), it takes turns with exact distance from
 arrays; its seconds are those of the propagation alone, as it prints them, ours those of the processor with validation
-and preparation (one thread with HEAT_IGL_NUM_THREADS=1). Where both differ, pygeodesic is a third opinion. Local
-queries are a share of a full query. The shapes are smooth, where a window is carried far, and rough, where there are
-few windows and preparation counts most. The matrix is that of a torus of 100 000 vertices.
+and preparation (one thread with HEAT_IGL_NUM_THREADS=1). ``benchmark.py --peers`` has memory and other exact solvers.
+Local queries are a share of a full query. The shapes are smooth, where a window is carried far, and rough, where there
+are few windows and preparation counts most. The matrix is that of a torus of 100 000 vertices.
 """
 
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -34,31 +31,16 @@ from heat_igl import (
     geodesic_distance,
     nearest_vertices,
     pair_distances,
-    reference,
     shapes,
     write_distances_within,
 )
-from heat_igl.errors import ReferenceSolverError
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo.registry import hull
 from heat_igl.windows.exact import ExactSurface
 
-from harness import (
-    METHODS,
-    Row,
-    Table,
-    collected,
-    drawn,
-    named,
-    on_sphere,
-    paired,
-    parsed,
-    publish,
-    ratio,
-    seconds,
-)
+from harness import METHODS, Row, Table, collected, drawn, named, on_sphere, paired, parsed, publish, seconds
 from harness import vtp as run_vtp
 
 # Local queries: how many, the share of the vertices that a radius holds, mean edges between the ends of a pair, and how
@@ -66,8 +48,6 @@ from harness import vtp as run_vtp
 LOCAL, SHARE, APART, NEAREST = 1000, 0.01, 2.0, 32
 # The share of the vertices in each row of a matrix.
 IN_ROW = 0.05
-# Where VTP differs by more, relative to the distance, pygeodesic is asked too.
-AGREE = 1e-10
 
 
 def points_on_sphere(n: int, semi_axes: Sequence[float] = (1.0, 1.0, 1.0)) -> Mesh:
@@ -112,8 +92,8 @@ def difference(distance: FloatArray, other: FloatArray) -> float:
     return float((np.abs(distance - other)[known] / other[known]).max())
 
 
-def measured(name: str, mesh: Mesh, n_sources: int, repeats: int, has_threads: bool) -> Row:
-    """Windows, seconds, memory, and differences to pygeodesic and VTP."""
+def measured(name: str, mesh: Mesh, n_sources: int, repeats: int) -> Row:
+    """Windows, seconds, and the difference to VTP."""
     sources = drawn(mesh, n_sources)
     surface = ExactSurface(intrinsic_delaunay(intrinsic_triangulation(mesh)))
     windows = [surface.solve(np.array([source])).n_windows / len(mesh.edges) for source in sources]
@@ -121,29 +101,15 @@ def measured(name: str, mesh: Mesh, n_sources: int, repeats: int, has_threads: b
     calls = {"from arrays": lambda: from_arrays(mesh, sources[0])}
     calls["query"] = lambda: surface.solve(np.array([sources[0]]))
     row |= {key: np.median(times) for key, times in paired(calls, repeats).items()}
-    with PeakMemory() as peak:
-        found = from_arrays(mesh, sources[0])
-    row["MiB"] = peak.bytes and peak.bytes / 2**20
-    others = {}
-    if mesh.n_vertices <= METHODS["pygeodesic"].most:
-        with contextlib.suppress(ReferenceSolverError):  # it refuses some meshes
-            theirs = reference.measured("pygeodesic", mesh, sources[0])
-            others["pygeodesic"], row["their MiB"] = theirs.distance, (theirs.peak_memory or 0) / 2**20
-            row["memory"] = row["MiB"] and row["MiB"] / row["their MiB"]
     if METHODS["VTP"].is_there:
         # It ends in an error at edges of more than two faces.
         with contextlib.suppress(subprocess.CalledProcessError):
             times = [beside_vtp(mesh, source, repeats) for source in sources]
-            row |= {"vtp": np.median([theirs for theirs, _ in times])}
             shares = [share for _, share in times]
+            row |= {"vtp": np.median([theirs for theirs, _ in times])}
             row |= {"share": np.median(shares), "largest share": max(shares)}
-            others["VTP"] = run_vtp(mesh, sources[0])[1]
-            row["lost"] = int(np.isinf(others["VTP"]).sum())
-    row |= {f"to {name}": difference(found, distance) for name, distance in others.items()}
-    if len(others) == 2 and row["to VTP"] > AGREE:
-        row["VTP to pygeodesic"] = difference(others["VTP"], others["pygeodesic"])
-    if has_threads:
-        row["speedup"] = speedup(mesh, sources[0], 5 * repeats)
+            theirs = run_vtp(mesh, sources[0])[1]
+            row |= {"lost": int(np.isinf(theirs).sum()), "to VTP": difference(from_arrays(mesh, sources[0]), theirs)}
     return row
 
 
@@ -154,22 +120,6 @@ def beside_vtp(mesh: Mesh, source: int, repeats: int) -> tuple[float, float]:
         theirs.append(run_vtp(mesh, source)[0])
         shares.append(np.median([seconds(lambda: from_arrays(mesh, source)) for _ in range(3)]) / theirs[-1])
     return float(np.median(theirs)), float(np.median(shares))
-
-
-def speedup(mesh: Mesh, source: int, repeats: int) -> float:
-    """By how much two threads are faster than one, from arrays, by the clock."""
-
-    def on(threads: str) -> Callable[[], FloatArray]:
-        def call() -> FloatArray:
-            os.environ["HEAT_IGL_NUM_THREADS"] = threads
-            return from_arrays(mesh, source)
-
-        return call
-
-    before = os.environ.get("HEAT_IGL_NUM_THREADS", "")
-    times = paired({"1": on("1"), "2": on("2")}, repeats, time.perf_counter)
-    os.environ["HEAT_IGL_NUM_THREADS"] = before
-    return ratio(times["1"], times["2"])
 
 
 def local(name: str, mesh: Mesh, repeats: int) -> Row:
@@ -213,11 +163,8 @@ def streamed(n_rows: int) -> str:
 EXACT = {
     "mesh": "mesh", "vertices": "{n}", "windows per edge": "{windows:.2f}", "from arrays, s": "{from arrays:.4f}",
     "per query, s": "{query:.4f}", "VTP, s": "{vtp:.3g}", "from arrays / VTP": "{share:.2f}",
-    "largest": "{largest share:.2f}", "difference to pygeodesic": "{to pygeodesic:.1e}", "to VTP": "{to VTP:.1e}",
-    "VTP to pygeodesic": "{VTP to pygeodesic:.1e}", "VTP without distance": "{lost}", "two threads": "{speedup:.2f}",
+    "largest": "{largest share:.2f}", "difference to VTP": "{to VTP:.1e}", "VTP without distance": "{lost}",
 }  # fmt: skip
-MEMORY = {"mesh": "mesh", "from arrays, MiB": "{MiB:.1f}", "pygeodesic, MiB": "{their MiB:.1f}",
-          "peak / pygeodesic's": "{memory:.2f}"}  # fmt: skip
 OF_LOCAL = {
     "mesh": "mesh", "query, s": "{query:.4f}", "vertices within": "{held:.0f}", "within": "1/{parts[within]:.0f}",
     "pair": "1/{parts[pair]:.0f}", "pair, µs": "{pair, us:.1f}", f"{NEAREST} nearest of all, s": "{nearest:.2f}",
@@ -225,16 +172,14 @@ OF_LOCAL = {
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    switches = {"shapes": False, "threads": False}
-    options = parsed(__doc__, argv, "*", sources=4, repeats=3, matrix=0, only=[*SHAPES], **switches)
+    options = parsed(__doc__, argv, "*", sources=4, repeats=3, matrix=0, only=[*SHAPES], shapes=False)
     tables: dict[str, Table | str] = {}
     meshes = named(options.meshes)
     generated = {name: SHAPES[name]() for name in options.only} if options.shapes else {}
     for part, chosen in (("exact", meshes), ("shapes", generated)):
-        options_of = (options.sources, options.repeats, options.threads)
-        rows = collected(measured(name, mesh, *options_of) for name, mesh in chosen.items())
+        rows = collected(measured(name, mesh, options.sources, options.repeats) for name, mesh in chosen.items())
         if rows:
-            tables |= {part: Table(rows, EXACT), "memory" * (part == "exact") or "memory, shapes": Table(rows, MEMORY)}
+            tables[part] = Table(rows, EXACT)
     if meshes:
         text = f"Local queries as shares of a full one, of {LOCAL}, preparation included."
         rows = collected(local(name, mesh, options.repeats) for name, mesh in meshes.items())

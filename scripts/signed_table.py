@@ -1,9 +1,7 @@
-"""Signed distance on surfaces and in space: errors from broken curves, circles and holed surfaces, signs, and times.
+"""Signed distance on surfaces and in space: errors from broken curves, circles and holed surfaces, and times.
 
     python scripts/signed_table.py circles [--finest 160]        # circles against closed forms; how near 0 curves are
     python scripts/signed_table.py broken MESH ... [--cases 40]  # curves with gaps, beside potpourri3d
-    python scripts/signed_table.py steps MESH ...                # time steps of the heat
-    python scripts/signed_table.py signs MESH ... [--cases 100]  # signs against the pieces of the cut mesh
     python scripts/signed_table.py times MESH ... [--repeats 5]  # shares of potpourri3d's times
     python scripts/signed_table.py volumes [--points 33] [--boxes 14] [--holed 3]   # in space, from surfaces with holes
 
@@ -12,9 +10,7 @@ error in percent of the mean distance, and the order to which it falls. Then the
 linear in each triangle, in mean edge lengths, in the root of the mean square.
 broken: a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
 curves removed in one to six pieces. Truth is exact distance from the whole curves with the sign of the function; errors
-are means over the vertices, as a share of the square root of the area inside, in percent. Those of steps likewise.
-signs: curves around regions, across faces, through vertices, along edges and through midpoints of edges in turn, at the
-vertices farther than half a mean edge from them.
+are means over the vertices, as a share of the square root of the area inside, in percent.
 times: medians of paired runs by the clock; potpourri3d's precomputation includes its first query, which factors.
 volumes: a sphere, a box and a torus in a unit cube: closed, with 20 % of the faces removed one by one, or 20 % of the
 area in patches. Truth is libigl's distance with the winding number. Mean error in cells within a cell of the surface,
@@ -39,14 +35,12 @@ from heat_igl import (
     SurfaceCurve,
     VoxelBox,
     curve_on,
-    cut,
     geodesic_distance,
     isolines,
     shapes,
     volume_signed_distance,
 )
 from heat_igl.curves import sublevel_areas
-from heat_igl.mesh import region_boundary
 from heat_igl.typing import FloatArray
 
 from harness import Row, Table, as_they_are, collected, geometric_mean, named, paired, parsed, publish, ratio
@@ -56,8 +50,6 @@ COARSEST = 20
 # spacing, leaves none that the curve could follow.
 MOVED = 0.2
 GAPS = (0.1, 0.3, 0.5)
-T_COEFS = (0.25, 0.5, 1.0, 2.0)
-KINDS = ("across faces", "through vertices", "along edges", "through midpoints")
 Curves = list[SurfaceCurve]
 Case = tuple[Mesh, Curves, FloatArray]
 
@@ -207,15 +199,15 @@ def smooth_function(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
     return np.asarray(np.sin(mesh.V @ waves + rng.uniform(0, 2 * np.pi, 4)) @ rng.normal(size=4))
 
 
-def whole_and_pieces(mesh: Mesh, share: float, gaps: int, rng: np.random.Generator) -> tuple[Curves, Curves, Any]:
-    """A level, what is left of it, and a function to the error in percent of the square root of the area inside."""
+def pieces_and_error(mesh: Mesh, share: float, gaps: int, rng: np.random.Generator) -> tuple[Curves, Any]:
+    """What is left of a level, and a function to the error in percent of the square root of the area inside."""
     values = smooth_function(mesh, rng)
     level = float(np.quantile(values, rng.uniform(0.3, 0.7)))
-    whole = isolines(mesh, values, level)[0]
+    whole = isolines(mesh, values, [level])[0]
     pieces = [piece for curve in whole for piece in broken(mesh, curve, share, gaps, rng)]
     truth = np.where(values < level, -1, 1) * geodesic_distance(mesh, whole)
     size = float(np.sqrt(sublevel_areas(mesh, values, level)[0]))
-    return whole, pieces, lambda found: float(100 * np.abs(found - truth).mean() / size)
+    return pieces, lambda found: float(100 * np.abs(found - truth).mean() / size)
 
 
 def broken_rows(meshes: dict[str, Mesh], options: argparse.Namespace) -> Iterator[Row]:
@@ -224,7 +216,7 @@ def broken_rows(meshes: dict[str, Mesh], options: argparse.Namespace) -> Iterato
     peers = {name: Peer(mesh) for name, mesh in meshes.items()}
     for case in range(options.cases):
         name, share = list(meshes)[case % len(meshes)], GAPS[case // len(meshes) % len(GAPS)]
-        _, pieces, error = whole_and_pieces(meshes[name], share, int(rng.integers(1, 7)), rng)
+        pieces, error = pieces_and_error(meshes[name], share, int(rng.integers(1, 7)), rng)
         row: Row = {"mesh": name, "removed": share}
         row |= {way: error(solver.distance(pieces)) for way, solver in solvers[name].items()}
         nodes = peers[name].nodes(pieces)
@@ -249,53 +241,6 @@ def summary(rows: Sequence[Row]) -> Iterator[Row]:
     yield {"removed": "of its error, at most", "n": ""} | {k: np.nanmax(r) for k, r in ratios.items()}
     means = {k: geometric_mean(r[~np.isnan(r)]) for k, r in ratios.items()}
     yield {"removed": "in the geometric mean", "n": ""} | means
-
-
-def steps(name: str, mesh: Mesh, rng: np.random.Generator) -> Row:
-    """Mean error of the heat for each time step: of whole levels, and with 30 % of their length removed."""
-    found: dict[str, list[float]] = {}
-    solvers = {f"t = {t_coef:g} h^2": SignedHeatSolver(mesh, t_coef=t_coef) for t_coef in T_COEFS}
-    for _ in range(3):
-        whole, pieces, error = whole_and_pieces(mesh, 0.3, 3, rng)
-        for what, curves in (("whole", whole), ("30 % removed", pieces)):
-            for step, solver in solvers.items():
-                found.setdefault(f"{what}, {step}", []).append(error(solver.distance(curves)))
-    return {"mesh": name, "vertices": mesh.n_vertices} | {key: np.mean(each) for key, each in found.items()}
-
-
-def around_region(kind: str, mesh: Mesh, values: FloatArray, level: float) -> Curves:
-    """Closed curves around a region of low values, with the region on their left."""
-    if kind == "along edges":
-        return region_boundary(mesh, faces=values[mesh.F].mean(axis=1) < level)
-    if kind == "through midpoints":
-        return region_boundary(mesh, vertices=values < level)
-    if kind == "through vertices":
-        level = float(values[np.argmin(np.abs(values - level))])
-    return isolines(mesh, values, level)[0]
-
-
-def signs(name: str, mesh: Mesh, options: argparse.Namespace) -> Row:
-    """Regions with a wrong sign, and vertices compared; the truth is a flood fill of the cut mesh."""
-    solvers = {way: SignedHeatSolver(mesh, **kept) for way, kept in WAYS.items()}
-    rng = np.random.default_rng(options.seed)
-    row: Row = {"mesh": name, "regions": options.cases, "curves": 0, "vertices compared": 0} | dict.fromkeys(solvers, 0)
-    for case in range(options.cases):
-        values = smooth_function(mesh, rng)
-        curves = around_region(
-            KINDS[case % len(KINDS)], mesh, values, float(np.quantile(values, rng.uniform(0.1, 0.9)))
-        )
-        pieces = cut(mesh, curves)
-        left, right = (set(side[side >= 0].tolist()) for side in pieces.pieces[pieces.sides].T)
-        if left & right:
-            raise RuntimeError(f"case {case}: the curves do not separate the mesh")
-        is_left = np.zeros(pieces.mesh.n_vertices, bool)
-        is_left[pieces.mesh.F[np.isin(pieces.pieces, sorted(left))]] = True
-        far = geodesic_distance(mesh, curves) > mesh.edge_lengths.mean() / 2
-        row["curves"] += len(curves)
-        row["vertices compared"] += int(far.sum())
-        for way, solver in solvers.items():
-            row[way] += bool(((solver.distance(curves) < 0) != is_left[: mesh.n_vertices])[far].any())
-    return row
 
 
 def times(name: str, mesh: Mesh, repeats: int) -> Iterator[Row]:
@@ -387,14 +332,12 @@ def volumes(options: argparse.Namespace) -> Iterator[Row]:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    names = ("circles", "broken", "steps", "signs", "times", "volumes")
+    names = ("circles", "broken", "times", "volumes")
     options = parsed(__doc__, argv, "*", names, finest=160, cases=40, repeats=5, points=33, boxes=14, holed=3)
-    meshes, rng = named(options.meshes), np.random.default_rng(options.seed)
+    meshes = named(options.meshes)
     make: dict[str, Callable[[], Iterator[Row]]] = {
         "circles": lambda: circles(options),
         "broken": lambda: summary(collected(broken_rows(meshes, options))),
-        "steps": lambda: (steps(name, mesh, rng) for name, mesh in meshes.items()),
-        "signs": lambda: (signs(name, mesh, options) for name, mesh in meshes.items()),
         "times": lambda: (row for name, mesh in meshes.items() for row in times(name, mesh, options.repeats)),
         "volumes": lambda: volumes(options),
     }

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 import pytest
 from conftest import (
     flat_perturbed,
-    load_script,
     perturbed,
     pygeodesic_distance,
     relative_error,
@@ -349,20 +346,6 @@ def test_paths_across_needles_are_no_longer_than_in_the_plane():
     truth = np.linalg.norm(V - point.positions(Mesh(V, F)), axis=1)
     for found in (solver.distance(point), geodesic_distance((V, F), point, method="exact")):
         np.testing.assert_allclose(found, truth, rtol=1e-10)
-
-
-@pytest.mark.slow  # pygeodesic runs in a process of its own for each
-def test_random_coarse_meshes():
-    """The script compares thousands; some kinds have a difference, and each has a cause."""
-    pytest.importorskip("pygeodesic")
-    script = load_script("random_exact")
-    found = [script.compared(seed) for seed in range(100)]
-    assert sum(bool(one.refused) for one in found) < 5
-    assert sum(one.n_values for one in found) > 10_000
-    causes = sum((one.causes for one in found), Counter())
-    assert causes["unexplained"] == 0
-    assert 0 < sum(causes.values()) < 50
-    assert {one.kind for one in found if one.causes} == {"needles"}
 
 
 def test_compiled_flips_are_those_of_the_triangulation():

@@ -39,20 +39,20 @@ def test_pairs_on_a_cylinder_in_single_precision():
     np.testing.assert_allclose(found, truth[goals], rtol=1e-12)
 
 
-def test_random_nearly_flat_surfaces():
+def test_random_surfaces_against_straight_lines():
     """The script compares thousands."""
-    script = load_script("random_coverage")
-    found = [script.compared(seed) for seed in range(60)]
-    assert {one[0] for one in found} == set(script.NAMES)
-    assert sum(0 < one[1] <= 60 for one in found) > 15
-    for seed, (_, _, *differences) in enumerate(found):
-        assert max(differences) < 1e-9, seed
+    script = load_script("random_members")
+    found = [script.exact(seed) for seed in range(44)]
+    assert {name for name, _, _ in found} == set(script.EXACT)
+    assert sum("straight lines" in figures for _, figures, _ in found) > 20
+    for seed, (_, figures, explained) in enumerate(found):
+        assert max(figures.values()) < max(1e-9, explained), seed
 
 
 def test_straight_lines_agree_with_the_plane():
     """The reference of the script, on a grid whose lines pass through many vertices."""
     mesh = shapes.grid(5)
-    found = load_script("random_coverage").straight_lines(mesh, [0, 7])
+    found = load_script("random_members").straight_lines(mesh, [0, 7])
     truth = np.linalg.norm(mesh.V[[0, 7], None] - mesh.V, axis=2)
     np.testing.assert_allclose(found, truth, atol=1e-14)
 

@@ -11,10 +11,8 @@ from heat_igl import shapes
 from heat_igl.operators import operators
 from heat_igl.steps import diffuse, integrate, normalize
 
-paper_claims, paper_figures, paper_formulas = (
-    load_script(f"paper_{name}") for name in ("claims", "figures", "formulas")
-)
-Square, mean_error = paper_formulas.Square, paper_formulas.mean_error
+paper = load_script("paper")
+Square, mean_error = paper.Square, paper.mean_error
 
 
 # The jump at i = 56.
@@ -69,10 +67,10 @@ def test_squared_gradients_underflow_in_the_far_corner() -> None:
     assert lost[56].sum(axis=1).min() > 1.7  # x + y, at most 2
 
 
-@pytest.mark.parametrize("suspect", ["heat_tolerance", "threshold", "per_row"])
+@pytest.mark.parametrize("suspect", ["threshold", "per_row"])
 def test_other_suspects_spoil_the_curve_long_before(suspect: str) -> None:
-    options = {"heat_tolerance": 1e-5, "threshold": 1e-8, "per_row": 1}[suspect]
-    found = [paper_claims.suspect_error(Square(i), {suspect: options}) for i in (20, 40)]
+    options = {"threshold": 1e-8, "per_row": 1}[suspect]
+    found = [paper.suspect_error(Square(i), {suspect: options}) for i in (20, 40)]
     right = [mean_error(Square(i)) for i in (20, 40)]
     assert found[1] > 5 * right[1]
     assert found[1] > found[0]
@@ -80,7 +78,7 @@ def test_other_suspects_spoil_the_curve_long_before(suspect: str) -> None:
 
 def test_truncated_one_over_eps_jumps_at_56_and_elsewhere() -> None:
     def jumps(i: int, real: type) -> bool:
-        return paper_claims.suspect_error(Square(i), {"truncated": real}) > 0.1
+        return paper.suspect_error(Square(i), {"truncated": real}) > 0.1
 
     assert [i for i in (51, 52, 55, 56, 57, 60) if jumps(i, np.float32)] == [52, 56, 60]
     assert not any(jumps(i, np.float64) for i in (51, 52, 55, 56, 57, 60))
@@ -97,13 +95,13 @@ def test_formulas_agree_with_the_steps() -> None:
     u0 = np.zeros(domain.n)
     u0[0] = 1
     phi = integrate(domain, normalize(domain, diffuse(domain, u0, 1.3 / 400)))
-    np.testing.assert_allclose(paper_formulas.distance(square), phi - phi.min(), atol=1e-11)
+    np.testing.assert_allclose(paper.distance(square), phi - phi.min(), atol=1e-11)
 
 
 def test_printed_triangulation_goes_around() -> None:
     """With n vertices to a row, n - 1 rows end in two faces to the next row's start, and 2 (n - 1)^2 do not."""
     n = 6
-    V, F = paper_formulas.printed_triangulation(5, n)
+    V, F = paper.printed_triangulation(5, n)
     across = np.ptp(V[F, 0], axis=1) > 0.5
     assert across.sum() == 2 * (n - 1)
     assert (~across).sum() == 2 * (n - 1) ** 2
@@ -111,16 +109,9 @@ def test_printed_triangulation_goes_around() -> None:
     assert inside == {tuple(sorted(face)) for face in shapes.grid(5).F.tolist()}
 
 
-def test_mean_edge_length_of_the_square() -> None:
-    """2 i (i + 1) edges of length eps and i^2 of length sqrt(2) eps."""
-    for row, i in zip(paper_claims.edge_length((3, 50)), (3, 50), strict=False):
-        expected = (2 * (i + 1) + np.sqrt(2) * i) / (3 * i + 2)
-        assert row["h / eps"] == pytest.approx(expected, rel=1e-12)
-
-
 def test_signs_and_factors() -> None:
-    found = {row["what"][:5].strip(": "): row["value"] for row in paper_claims.signs(12)}
-    values = [row["value"] for row in paper_claims.signs(12)]
+    found = {row["what"][:5].strip(": "): row["value"] for row in paper.signs(12)}
+    values = [row["value"] for row in paper.signs(12)]
     assert found["(5) a"] < 1e-13
     assert values[2] < 1e-13
     # M - t Lap is positive definite with one sign of (10) alone.
@@ -130,7 +121,7 @@ def test_signs_and_factors() -> None:
 
 
 def test_varadhan_without_the_half() -> None:
-    line = paper_claims.varadhan(20)[0]
+    line = paper.varadhan(20)[0]
     assert line["-sqrt(t) log v / d"] == pytest.approx(1, abs=0.002)
     assert line["-sqrt(t) / 2 log v / d"] == pytest.approx(0.5, abs=0.001)
 
@@ -138,38 +129,9 @@ def test_varadhan_without_the_half() -> None:
 def test_expected_accuracy() -> None:
     """The mean of x + y - hypot(x, y) over the unit square is 1 - (sqrt 2 + asinh 1) / 3, whatever the step."""
     limit = 1 - (np.sqrt(2) + np.arcsinh(1)) / 3
-    coarse, fine = paper_claims.expected_accuracy((20, 40))
+    coarse, fine = paper.accuracy(20), paper.accuracy(40)
     assert fine["edges"] == pytest.approx(limit, abs=0.005)
     assert fine["edges"] > coarse["edges"]
     assert fine["heat"] < 0.65 * coarse["heat"]
     assert fine["sweep"] < 1e-14
     assert fine["largest (eps phi - d) / (eps phi)"] == pytest.approx(1 - np.sqrt(0.5), rel=1e-12)
-
-
-# The fits.
-
-
-def test_points_left_out_are_predicted_by_fits_without_them() -> None:
-    rng = np.random.default_rng(0)
-    i = np.arange(10.0, 130, 10)
-    seconds = 1e-4 * i**2 + rng.normal(0, 0.02, len(i))
-    for row in paper_figures.polynomial_errors(i, seconds, (1, 2, 4)):
-        missed = [
-            np.polynomial.Polynomial.fit(np.delete(i, k), np.delete(seconds, k), row["degree"])(i[k]) - seconds[k]
-            for k in range(len(i))
-        ]
-        assert row["left_out"] == pytest.approx(np.sqrt(np.mean(np.square(missed))) / seconds.mean(), rel=1e-8)
-        fit = np.polynomial.Polynomial.fit(i, seconds, row["degree"])
-        assert row["in_sample"] == pytest.approx(np.sqrt(np.mean((fit(i) - seconds) ** 2)) / seconds.mean(), rel=1e-8)
-
-
-def test_a_power_law_is_recovered_and_noise_is_measured() -> None:
-    i = np.arange(10.0, 310, 10)
-    law = paper_figures.power_law(i, 3e-6 * i**2.3)
-    assert law["exponent"] == pytest.approx(2.3, rel=1e-8)
-    assert law["left_out"] < 1e-8
-    noisy = paper_figures.power_law(i, 3e-6 * i**2.3 * (1 + 0.1 * np.cos(i)))
-    assert noisy["left_out"] > noisy["in_sample"] > 0.03
-
-
-# The scripts.

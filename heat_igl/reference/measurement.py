@@ -89,7 +89,7 @@ def measured(
     solver : str
         "exact" or "windows" for the windows of this package, one of `EXACT_SOLVERS`, or the name of another function of
         `heat_igl.reference`: "meshlab", "meshlab_border", "meshlab_heat", "igl_heat", "potpourri3d_heat"; or
-        "potpourri3d_marching" for `baselines.fast_marching`.
+        "potpourri3d_marching" for fast marching by potpourri3d.
     mesh, sources
         As for `exact`.
     timeout, memory
