@@ -21,8 +21,8 @@ between the old vertices are from those before, and 0 where triangles are so thi
 characteristic, boundary loops and orientation.
 
 log-maps: hulls stretched by up to 100, spiky spheres, tori, cylinders and rough squares, from vertices, edges and
-faces, also from 1e-12 to 1e-3 of an edge beside vertices: the largest distance between a vertex and `exp_map` of its
-log map, over the vertices whose shortest path is straight, as a share of the largest distance.
+faces, also from 1e-12 to 1e-3 of an edge beside vertices and edges: the largest distance between a vertex and `exp_map`
+of its log map, over the vertices whose shortest path is straight, as a share of the largest distance.
 
 signed: Delaunay triangulations of 2000 unevenly spread points in the plane, and discs of their faces with faces taken
 out and others put in at random: how far the size is from the exact distance, as a share of the largest distance; 1 for
@@ -323,10 +323,20 @@ BODIES: dict[str, Callable[[Random], Mesh]] = {
     "cylinder": rough(shapes.cylinder(12, 12)),
     "square": rough(shapes.grid(10)),
 }
+
+
+def near(corners: FloatArray, rng: Random) -> FloatArray:
+    """A place in a face, `corners` but for shares of 1e-12 to 1e-3 at those where it is 0."""
+    place = np.where(corners > 0, 0, 10 ** rng.uniform(-12, -3, 3))
+    return place + (1 - place.sum()) * corners
+
+
 PLACES: dict[str, Callable[[Random], FloatArray]] = {
     "vertex": lambda rng: np.eye(3)[rng.integers(3)],
     "edge": lambda rng: np.append(rng.dirichlet([1, 1]), 0),
     "edge, near a vertex": lambda rng: np.array([1 - (share := 10 ** rng.uniform(-12, -3)), share, 0]),
+    "face, near a vertex": lambda rng: near(np.eye(3)[0], rng),
+    "face, near an edge": lambda rng: near(np.append(rng.dirichlet([1, 1]), 0), rng),
     "face": lambda rng: rng.dirichlet([1, 1, 1]),
 }
 

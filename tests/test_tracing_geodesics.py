@@ -103,6 +103,23 @@ def test_geodesics_end_on_the_boundary():
     np.testing.assert_allclose(corner.positions(mesh)[-1], [1, 1, 0], atol=1e-13)
 
 
+@pytest.mark.parametrize("share", [1e-4, 1e-8, 1e-12])
+def test_lines_along_the_boundary_end_at_its_vertices(share):
+    """From beside a vertex to the next one: what they meet first is the vertex, not the side that they graze."""
+    mesh = shapes.grid(6)
+    mesh = Mesh(mesh.V * [1, 3, 0], mesh.F)
+    for face in np.flatnonzero(mesh.boundary[mesh.F].sum(axis=1) == 2):
+        corner = np.argsort(~mesh.boundary[mesh.F[face]], kind="stable")
+        first, following, inside = mesh.F[face, corner]
+        weights = np.zeros((1, 3))
+        weights[0, corner] = 1 - share, 0.3 * share, 0.7 * share
+        vector = (1 - 0.3 * share) * (mesh.V[following] - mesh.V[first]) - 0.7 * share * (
+            mesh.V[inside] - mesh.V[first]
+        )
+        end = exp_map(mesh, SurfacePoints([face], weights), [vector]).positions(mesh)[0]
+        np.testing.assert_allclose(end, mesh.V[following], atol=1e-12)
+
+
 def test_lines_pass_a_corner_that_they_touch():
     """A line along one side of an L-shaped domain goes on across the domain."""
     grid = shapes.grid(2)

@@ -56,8 +56,7 @@ def log_map(
     If the shortest path to a vertex is straight, `exp_map` of the vector leads back to the vertex, to 1e-14 of the
     largest distance. It may not if the path passes another vertex as closely as numbers are rounded, since those on its
     two sides differ in direction by its curvature: from a point at the distance d from that vertex, in edge lengths,
-    these are paths within 1e-14 / d of a radian of it. Nor if the path grazes the boundary: then it may end up to 1e-14
-    / d before the vertex, as a share of its length. Where a path bends, at a vertex of negative curvature or on the
+    these are paths within 1e-14 / d of a radian of it. Where a path bends, at a vertex of negative curvature or on the
     boundary, the vector has the whole length, and the direction in which the path leaves the source: no straightest
     geodesic from the source need lead there. At the cut locus there are several shortest paths, and the vector is that
     of one of them.

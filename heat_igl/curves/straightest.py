@@ -61,11 +61,11 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     -----
     The geodesic is straight in each face, and across each edge in the plane of the two faces unfolded. At a vertex
     inside it goes on so that the angles on both sides, as sums of angles in faces, are equal; this defines a unique
-    continuation also if the angles do not sum to 2 pi. A geodesic is at a vertex if it meets a side within 1e-10 of
-    the length of the side from an end. It ends when it meets the boundary, and has length 0 if it starts on the
-    boundary and points off the surface. At a vertex of the boundary it goes on if the faces have an angle of pi or more
-    on exactly one side of it: then it leaves at pi on this side, as a straight line in the plane does along a straight
-    boundary or past a corner. It is not the shortest path in general.
+    continuation also if the angles do not sum to 2 pi. A geodesic meets a vertex ahead that it would pass by less than
+    1e-10 of the way to it, and of the length of the side that it would cross there. It ends when it meets the boundary,
+    and has length 0 if it starts on the boundary and points off the surface. At a vertex of the boundary it goes on if
+    the faces have an angle of pi or more on exactly one side of it: then it leaves at pi on this side, as a straight
+    line in the plane does along a straight boundary or past a corner. It is not the shortest path in general.
 
     Examples
     --------

@@ -3,14 +3,14 @@ from heat_igl.kernels.mesh.segments cimport Segments
 cdef extern from *:
     """
     #define PI 3.14159265358979323846
-    /* A geodesic that crosses a side so near its end, as a share of the side, passes the vertex: across 10000 faces
-       rounding moves it by some 1e-12. */
-    #define ON_SIDE 1e-10
+    /* A geodesic meets a vertex that it would pass by less than this share of the way to it, or of the side that it
+       crosses if that is shorter: across 10000 faces rounding moves it by some 1e-12. */
+    #define ON_RAY 1e-10
     /* Angles that differ by less are equal: those of the faces around a vertex are rounded, and the direction is. */
     #define LEAST_ANGLE 1e-10
     """
     const double PI
-    const double ON_SIDE
+    const double ON_RAY
     const double LEAST_ANGLE
 
 cdef enum:
@@ -27,14 +27,14 @@ cdef struct Heading:
     double s, dx, dy
     bint is_inside, is_at_tail
 
-# Face `f` in the plane, with its corners (x, y) from the tail of side `side` on; the ray starts at (start_x, start_y),
-# and leaves at the share `share` of the side from point `k` to the next.
+# Face `f` in the plane, with its corners (x, y) from the tail of side `side` on; the ray starts in the origin, and leaves
+# at the share `share` of the side from point `k` to the next.
 cdef struct FaceInPlane:
     long long f
     int side, k
     double x[3]
     double y[3]
-    double start_x, start_y, share
+    double share
 
 
 cdef class _Tracer:
@@ -58,7 +58,6 @@ cdef class _Tracer:
     cdef bint leave_corner(self, long long corner, double turn) noexcept nogil
     cdef void lay_out(self) noexcept nogil
     cdef double find_exit(self, double travelled) noexcept nogil
-    cdef double along(self, int c, double share) noexcept nogil
     cdef bint pass_vertex(self) noexcept nogil
     cdef bint cross_side(self) noexcept nogil
     cdef int store(self, long long f) except -1 nogil

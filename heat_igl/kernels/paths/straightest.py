@@ -3,8 +3,8 @@
 import cython
 from cython.cimports.heat_igl.kernels.mesh.segments import Segments
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot
-from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_SIDE, PI
-from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
+from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_RAY, PI
+from cython.cimports.libc.math import INFINITY, atan2, cos, fabs, hypot, sin
 
 
 @cython.final
@@ -128,23 +128,27 @@ class _Tracer:
         return True
 
     def lay_out(self) -> cython.void:
-        """Lay the face out: the tail of the base in the origin (0), the head on the first axis (1), the apex (2)."""
+        """Lay the face out around the start of the ray in it: the tail (0) and the head (1) of the base, the apex (2).
+
+        The base runs along the first axis. Near a corner, the vector to it keeps its digits: it is a sum of sides.
+        """
         p = cython.address(self.face)
         f: cython.longlong = self.ray.h // 3
         side: cython.int = self.ray.h % 3
         base: cython.double = self.l[f, side]
+        x: cython.double = foot(base, self.l[f, (side + 2) % 3], self.l[f, (side + 1) % 3])
+        y: cython.double = 2.0 * self.area[f] / base
         p.f, p.side = f, side
-        p.x[0], p.y[0], p.x[1], p.y[1] = 0.0, 0.0, base, 0.0
-        p.x[2] = foot(base, self.l[f, (side + 2) % 3], self.l[f, (side + 1) % 3])
-        p.y[2] = 2.0 * self.area[f] / base
-        if self.ray.is_inside:
-            p.start_x = self.entry[1] * base + self.entry[2] * p.x[2]
-            p.start_y = self.entry[2] * p.y[2]
-        else:
-            p.start_x, p.start_y = self.ray.s * base, 0.0
+        if not self.ray.is_inside:
             self.entry[side] = 0.0
             self.entry[(side + 1) % 3] = 1.0 - self.ray.s
             self.entry[(side + 2) % 3] = self.ray.s
+        tail: cython.double = self.entry[(side + 1) % 3]
+        head: cython.double = self.entry[(side + 2) % 3]
+        apex: cython.double = self.entry[side]
+        p.x[0], p.y[0] = -head * base - apex * x, -apex * y
+        p.x[1], p.y[1] = tail * base + apex * (base - x), -apex * y
+        p.x[2], p.y[2] = tail * x + head * (x - base), (tail + head) * y
 
     def find_exit(self, travelled: cython.double) -> cython.double:
         """Find the point at which the ray leaves the face; returns the length of the segment up to there.
@@ -155,57 +159,43 @@ class _Tracer:
         p = cython.address(self.face)
         dx: cython.double = self.ray.dx
         dy: cython.double = self.ray.dy
-        a: cython.double
-        b: cython.double
         c: cython.int
+        # How far left of the ray, and how far ahead, each corner is.
+        left: cython.double[3]
+        ahead: cython.double[3]
+        for c in range(3):
+            left[c] = dx * p.y[c] - dy * p.x[c]
+            ahead[c] = dx * p.x[c] + dy * p.y[c]
         # The tail of the side is right of the ray, and the head left of it.
         k: cython.int = 1
         if self.ray.is_inside:
-            best: cython.double = -1e300
+            best: cython.double = -INFINITY
             for c in range(3):
-                a = dx * (p.y[c] - p.start_y) - dy * (p.x[c] - p.start_x)
-                b = dx * (p.y[(c + 1) % 3] - p.start_y) - dy * (p.x[(c + 1) % 3] - p.start_x)
-                between: cython.double = min(-a, b)
-                if fabs(a) + fabs(b) < ON_SIDE * self.l[p.f, (p.side + c) % 3]:
-                    # It runs along this side, and leaves at the end: a crossing would be rounding.
-                    between -= 1e200
-                if between > best:
-                    best = between
-                    k = c
-        elif not self.ray.is_at_tail and not dx * (p.y[2] - p.start_y) - dy * (p.x[2] - p.start_x) > 0.0:
+                if min(-left[c], left[(c + 1) % 3]) > best:
+                    best, k = min(-left[c], left[(c + 1) % 3]), c
+        elif not self.ray.is_at_tail and not left[2] > 0.0:
             k = 2
         c = (k + 1) % 3
-        a = min(dx * (p.y[k] - p.start_y) - dy * (p.x[k] - p.start_x), 0.0)
-        b = max(dx * (p.y[c] - p.start_y) - dy * (p.x[c] - p.start_x), 0.0)
-        # Of a face without height that the ray runs along, it takes the end that lies ahead.
-        share: cython.double = 1.0 if dx * (p.x[c] - p.x[k]) + dy * (p.y[c] - p.y[k]) > 0.0 else 0.0
-        if b - a > 0.0:
-            share = -a / (b - a)
-        p.k = k
-        # Rounding moves a ray by a share of the way that it has come: near its start it may pass a vertex close by.
-        come: cython.double = travelled + self.along(c, share)
-        near: cython.double = ON_SIDE * min(come / self.l[p.f, (p.side + k) % 3], 1.0)
-        if share < near:
-            share = 0.0
-        elif share > 1.0 - near:
-            share = 1.0
-        p.share = share
+        a: cython.double = max(-left[k], 0.0)
+        b: cython.double = max(left[c], 0.0)
+        # Rounding moves a ray by a share of its length: what it misses by less, it meets, also if it grazes the side.
+        length: cython.double = self.l[p.f, (p.side + k) % 3]
+        meets_tail: cython.bint = a < ON_RAY * min(travelled + ahead[k], length)
+        meets_head: cython.bint = b < ON_RAY * min(travelled + ahead[c], length)
+        share: cython.double
+        if meets_tail == meets_head and (meets_tail or a + b == 0.0):
+            # It runs along the side, and takes the end that lies farther ahead.
+            share = 1.0 if ahead[c] > ahead[k] else 0.0
+        elif meets_tail or meets_head:
+            share = 1.0 if meets_head else 0.0
+        else:
+            share = a / (a + b)
+        p.k, p.share = k, share
         # The corner of the face at point 0 of the layout is the one after the side.
         self.leave[(p.side + 1 + k) % 3] = 1.0 - share
         self.leave[(p.side + 1 + c) % 3] = share
         self.leave[(p.side + k) % 3] = 0.0
-        return self.along(c, share)
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def along(self, c: cython.int, share: cython.double) -> cython.double:
-        """How far ahead of the start of the segment a share of the side from point `face.k` to point c lies."""
-        p = cython.address(self.face)
-        x: cython.double = p.x[p.k] + share * (p.x[c] - p.x[p.k]) - p.start_x
-        y: cython.double = p.y[p.k] + share * (p.y[c] - p.y[p.k]) - p.start_y
-        return max(x * self.ray.dx + y * self.ray.dy, 0.0)
+        return max(ahead[k] + share * (ahead[c] - ahead[k]), 0.0)
 
     def pass_vertex(self) -> cython.bint:
         """Go on past the vertex that the ray meets, with equal angles on both sides; false if the surface ends."""
