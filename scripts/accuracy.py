@@ -2,6 +2,7 @@
 
     python scripts/accuracy.py --methods heat potpourri3d --output results     # the zoo, or parts: --shapes spike maze
     python scripts/accuracy.py FOLDER MESH --methods heat sweep meshlab        # meshes instead
+    python scripts/accuracy.py --shapes none --members 10 --seed 1100           # random members of the zoo's kinds
     python scripts/accuracy.py MESH --variants                                 # the ways to run the heat method
     python scripts/accuracy.py MESH --in-faces                                 # points in faces as sources
 
@@ -32,7 +33,7 @@ from heat_igl.errors import AccuracyWarning, MeshError, MissingExtraError, Refer
 from heat_igl.operators import operators
 from heat_igl.steps import HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.validation.zoo import SHAPES
+from heat_igl.validation.zoo import FAMILIES, SHAPES
 
 from harness import Query, Row, Table, collected, errors, geometric_mean, mean_error, ours, parsed, publish
 
@@ -40,6 +41,8 @@ SUFFIXES = {".off", ".obj", ".ply", ".stl", ".mesh", ".msh"}
 FAILURES = (MeshError, MissingExtraError, ReferenceSolverError, ImportError, RuntimeError, ValueError)
 # Errors below this many percent count as this much in geometric means: rounding is no merit.
 LEAST = 0.01
+# An answer that is off by more percent in the mean has to be warned about, one that is off by less has not.
+WRONG, RIGHT = 5, 2
 
 
 def native(function: Callable[[Mesh, int], FloatArray]) -> Callable[[Mesh], Query]:
@@ -129,20 +132,26 @@ def meshes(options: argparse.Namespace) -> Iterator[tuple[str, str, Callable[[],
         if any(part in shape.name for part in options.shapes):
             kind, star = ("held out", " *") if shape.held_out else ("not held out", "")
             yield kind, shape.name + star, shape.make
+    for family, make in FAMILIES.items():
+        for seed in range(options.seed, options.seed + options.members):
+            yield "random members", f"{family} {seed}", lambda make=make, seed=seed: make(seed)
 
 
 def measured(query: Query, sources: IntArray, truths: Sequence[FloatArray]) -> Row:
     """Mean and largest error, the largest excess below exact, and the number of warned answers."""
-    found, n_warned = [], 0
+    found, n_warned, n_silent, n_in_vain = [], 0, 0, 0
     for source, truth in zip(sources.tolist(), truths, strict=True):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             distance = np.asarray(query(source), float)
-        n_warned += any(issubclass(warning.category, AccuracyWarning) for warning in caught)
+        is_warned = any(issubclass(warning.category, AccuracyWarning) for warning in caught)
         found.append(errors(distance, truth))
+        n_warned += is_warned
+        n_silent += not is_warned and found[-1]["mean"] > WRONG
+        n_in_vain += is_warned and found[-1]["mean"] < RIGHT
     mean, largest, below = ([one[key] for one in found] for key in ("mean", "largest", "below"))
     row = {"mean": np.mean(mean), "largest": max(largest), "below": max(below)}
-    return row | {"warned": f" {n_warned}w" if n_warned else ""}
+    return row | {"warned": f" {n_warned}w" if n_warned else "", "silent": n_silent, "in vain": n_in_vain}
 
 
 def over_meshes(
@@ -180,7 +189,9 @@ def summary(rows: Sequence[Row], methods: Sequence[str]) -> Iterator[str]:
                 if share and method != "potpourri3d":
                     most = max(share, key=lambda mesh: share[mesh])
                     line += f"; {geometric_mean(share.values()):.3g} of potpourri3d, at most {share[most]:.3g} ({most})"
-                yield line
+                own = [row[method] for row in rows if row["kind"] == kind and method in row]
+                silent, in_vain = (sum(each[key] for each in own) for key in ("silent", "in vain"))
+                yield f"{line}; above {WRONG} % without a warning {silent}, below {RIGHT} % with one {in_vain}"
 
 
 def of_variants(rows: Sequence[Row]) -> list[Row]:
@@ -225,7 +236,7 @@ def exact_from(mesh: Mesh, point: SurfacePoints) -> FloatArray:
 
 def main(argv: Sequence[str] | None = None) -> None:
     switches = {"variants": False, "in_faces": False}
-    options = parsed(__doc__, argv, "*", shapes=[""], methods=list(METHODS), sources=3, **switches)
+    options = parsed(__doc__, argv, "*", shapes=[""], members=0, methods=list(METHODS), sources=3, **switches)
     reasons: list[str] = []
     if options.in_faces:
         rows = collected(in_faces(path, options.sources, options.seed) for path in options.meshes)

@@ -402,6 +402,6 @@ class GeodesicSolver(BatchedSolver):
             require_resolved(chosen, h)
         return chosen
 
-    def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[str | None]]:
+    def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[None]]:
         rows = [self._engine.distance(sources, cutoff) for sources in source_sets]
         return np.stack(rows), [None] * len(rows)

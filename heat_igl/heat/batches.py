@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence, Sized
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,9 @@ from heat_igl.runtime import (
 )
 from heat_igl.sources import Sources, SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from heat_igl.heat.checking import AnswerCheck  # loads the sweep
 
 
 class LabelledDistance(NamedTuple):
@@ -65,16 +68,18 @@ class BatchedSolver(ABC):
     def _source_set(self, sources: Sources) -> SourceSet:
         """`sources`, checked."""
 
-    def _drawn(self, source_sets: list[SourceSet]) -> list[SourceSet]:
-        """The sets of the next block, in their order and on the caller's thread: before `_answers`."""
-        return source_sets
-
     @abstractmethod
-    def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[str | None]]:
-        """Distances (k, n) from k sets of sources, and for each the text of a warning, if one is due; on any thread.
+    def _answers(
+        self, source_sets: list[SourceSet], cutoff: float = np.inf
+    ) -> tuple[FloatArray, Sequence[AnswerCheck | None]]:
+        """Distances (k, n) from k sets of sources, and by how much each violates bounds; on any thread.
 
         What is beyond the cutoff may be left ``inf``.
         """
+
+    def _complaint(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck | None) -> str | None:  # noqa: ARG002
+        """The text of a warning about an answer (n,), if one is due; in the order of the sets, on one thread."""
+        return None
 
     @names_guessed
     def distances(
@@ -190,20 +195,20 @@ class BatchedSolver(ABC):
     ) -> Iterator[FloatArray]:
         """Distances of a block of sets after the other."""
 
-        def solved(block: list[SourceSet]) -> tuple[FloatArray, list[tuple[str, type[Warning]]], list[str | None]]:
+        def solved(block: list[SourceSet]) -> tuple[list[SourceSet], FloatArray, Any, list[tuple[str, type[Warning]]]]:
             with held_warnings() as held:
-                rows, complaints = self._answers(block, cutoff)
-                return rows, held, complaints
+                return block, *self._answers(block, cutoff), held
 
         size, threads = block_size(self._n_faces, n_sets, n_threads())
         solved_before, has_complained = 0, False
-        for rows, held, complaints in in_order(solved, map(self._drawn, in_blocks(source_sets, size)), threads):
+        for block, rows, checks, held in in_order(solved, in_blocks(source_sets, size), threads):
             # The caller's line is on this thread.
             for warning in held:
                 warn_caller(*warning)
-            for i, complaint in enumerate(complaints):
+            for i, answer in enumerate(zip(rows, block, checks, strict=True)):
                 # Once for the batch: if one answer is wrong, many are.
-                if complaint is not None and not has_complained:
+                complaint = None if has_complained else self._complaint(*answer)
+                if complaint is not None:
                     has_complained = True
                     warn_caller(f"source_sets[{solved_before + i}]: {complaint}", AccuracyWarning)
             solved_before += len(rows)

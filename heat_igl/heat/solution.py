@@ -38,8 +38,8 @@ class Diagnostics:
     check : AnswerCheck or None
         Of a `HeatSolution`, by how much the distance left bounds that need no reference. None for the solver.
     compared : Comparison or None
-        How far first answers were from those of a sweep, of the kind of sources for which that is most; None before
-        the first answer, and where answers are not compared, see `AnswerCheck`.
+        How far the answer that was farthest off on average is from that of a sweep; None before the first answer, and
+        where answers are not compared, see `AnswerCheck`.
 
     Examples
     --------

@@ -71,8 +71,6 @@ class SourceSet:
         Points and curves in faces. The ends of segments are not among the points.
     n_labels : int
         How many sources there are, as the user counts them.
-    is_first : bool
-        Whether a solver that compares first answers has not had sources of this kind before.
     """
 
     vertices: IntArray
@@ -81,7 +79,6 @@ class SourceSet:
     points: SourcePoints
     segments: SourceSegments
     n_labels: int
-    is_first: bool = False
 
     @property
     def on_vertices_alone(self) -> bool:
