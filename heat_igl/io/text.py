@@ -115,17 +115,20 @@ class Text:
         change[end - begin[0]] = -1
         codes = np.where(np.cumsum(change[:-1], dtype=np.int8), codes, np.uint8(_SPACE))
         if up_to_slash and (codes == _SLASH).any():
-            place = np.arange(len(codes))
-            slash = np.maximum.accumulate(np.where(codes == _SLASH, place, -1))
-            blank = np.maximum.accumulate(np.where(codes <= _SPACE, place, -1))
-            codes[slash > blank] = _SPACE
-        try:
-            values = np.fromstring(codes.tobytes(), np.float64, sep=" ")
-        except (ValueError, DeprecationWarning):  # the exception depends on the version of numpy
-            values = np.empty(0)
-        if len(values) != count.sum():
-            raise self._not_a_number(filled, skip, up_to_slash)
-        return values, start
+            # From the first slash of a token to its end.
+            stop = np.flatnonzero((codes == _SLASH) | (codes <= _SPACE))
+            turn = np.diff((codes[stop] == _SLASH).view(np.int8), prepend=np.int8(0))
+            change = np.zeros(len(codes), np.int8)
+            change[stop] = turn
+            codes[np.cumsum(change, dtype=np.int8).view(bool)] = _SPACE
+        for kind in (np.int64, np.float64)[not up_to_slash :]:  # integers are read in an eighth of the time
+            try:
+                values = np.fromstring(codes.tobytes(), kind, sep=" ")
+            except (ValueError, DeprecationWarning):  # the exception depends on the version of numpy
+                continue
+            if len(values) == count.sum():
+                return values.astype(np.float64, copy=False), start
+        raise self._not_a_number(filled, skip, up_to_slash)
 
     def all_numbers(self) -> FloatArray:
         """The numbers of all lines, for formats in which line breaks have no meaning."""
