@@ -57,6 +57,7 @@ nb_execution_in_temp = True
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
+nb_output_stderr = "warn"  # a story has no warnings
 bibtex_bibfiles = ["literature.bib"]
 bibtex_default_style = "plain"
 bibtex_reference_style = "author_year"
