@@ -154,6 +154,23 @@ def test_paths_in_a_region():
         heat_igl.shortest_path(mesh, [0, 1], 2)
 
 
+def test_what_takes_no_region_takes_its_faces_with_all_vertices():
+    mesh = bumpy()
+    region = mesh.V[:, 2] < 0.4
+    whole, (part, used, _) = Mesh(mesh.V, mesh.F[region[mesh.F].all(axis=1)]), cut_out(mesh, region)
+    source = int(used[50])
+    for call in (
+        lambda m, at: heat_igl.log_map(m, at),
+        lambda m, at: heat_igl.VectorHeatSolver(m).transport([at], [[1.0, 0.0]]),
+        lambda m, _: heat_igl.SignedHeatSolver(m).distance(heat_igl.isolines(m, m.V[:, 2], [-0.3])),
+    ):
+        np.testing.assert_allclose(call(whole, source)[used], call(part, 50), rtol=1e-12, atol=1e-12)
+    with pytest.raises(
+        heat_igl.MeshError, match="not of PointCloud: pass a mesh of triangles, or of a cloud the points"
+    ):
+        GeodesicSolver(heat_igl.PointCloud(mesh.V), region=region)
+
+
 def test_the_command_takes_a_region(tmp_path, capsys):
     mesh = shapes.grid(6)
     region = mesh.V[:, 0] < 0.6

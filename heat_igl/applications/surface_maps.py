@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, as_array, names_guessed, positive, real_numbers, require_choice, truth
+from heat_igl.geodesic import GeodesicSolver
 from heat_igl.linear import factorize
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
-from heat_igl.operators import operators
+from heat_igl.operators import Surface, operators
+from heat_igl.plan import Method
 from heat_igl.runtime import progress_bar
-from heat_igl.sampling import as_solver
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows import pair_distances
 
@@ -30,6 +31,7 @@ def parcel_distances(
     labels: ArrayLike,
     *,
     statistic: Statistic = "mean",
+    method: Method = "auto",
     region: ArrayLike | None = None,
     progress: bool = False,
 ) -> FloatArray:
@@ -45,6 +47,8 @@ def parcel_distances(
         "mean" is the mean distance over all pairs of a vertex of one parcel and a vertex of the other, by one query for
         each vertex. "min" is the distance between the nearest vertices, by one query for each parcel. "centre" is the
         distance between the vertices with the smallest mean distance to those of their parcels.
+    method : {"auto", "windows", "exact", "sweep"}
+        As of `GeodesicSolver`. "sweep" takes a part of the time, for an error of some tenths of a percent.
     region : (n,) or (m,) array_like of bool, optional
         Vertices, or faces, that paths may enter. Vertices outside count in no parcel.
     progress : bool
@@ -75,7 +79,7 @@ def parcel_distances(
     triangles, part = _part(mesh, region)
     names, vertices, parcel = _parcels(labels, triangles.n_vertices, part)
     p, n = len(names), triangles.n_vertices
-    solver = as_solver(triangles)
+    solver = GeodesicSolver(triangles, method=method)
     if statistic == "min":
         rows = solver.distances([vertices[parcel == i] for i in range(p)], progress=progress)
         found = np.full((p, p), np.inf)
@@ -165,9 +169,9 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
     Notes
     -----
     Heat flow on the intrinsic Delaunay triangulation for the time ``fwhm**2 / (16 log 2)``, in eight steps of second
-    order that damp all frequencies (Alexander 1977: two stages, one matrix, which is factored once). In the plane the
-    width is then .4 % too large. Of a narrow Gaussian the mesh makes a narrower one: on an icosphere and a scan, the
-    width of a smoothed delta was 7.5 % too small for four mean edge lengths, 2.7 % for six and .5 % for ten.
+    order that damp all frequencies (Alexander 1977: two stages, one matrix, which is factored once), with a
+    mass matrix between the lumped and the consistent one, whose errors cancel on regular triangles. A Gaussian narrower
+    than four mean edge lengths comes out narrower still, and dips below 0 by less than 1e-4 of its height.
 
     Examples
     --------
@@ -197,12 +201,19 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
 def _diffused(mesh: Mesh, values: FloatArray, time: float) -> FloatArray:
     """Values (..., k) at the k vertices that faces use after a time of heat flow, from values (..., n)."""
     domain = operators(mesh, "intrinsic-delaunay")
-    inner = domain.referenced
-    mass, u = domain.M.diagonal(), np.where(inner, values, 0.0).T
+    inner, faces = domain.referenced, cast(Surface, domain.surface).triangulation.F
+    u = np.where(inner, values, 0.0).T
+    # Half of what a consistent mass matrix adds to a lumped one: on regular triangles errors of order h^2 cancel. Its
+    # rows sum to 0, so the total stays that of M; and M, at least a quarter of a face for each corner, outweighs it.
+    corners = sp.csr_array(
+        (np.ones(faces.size), faces.ravel(), 3 * np.arange(len(faces) + 1)), (len(faces), len(inner))
+    )
+    shared = corners.T @ (corners * (domain.weights / 24)[:, None])
+    mass = domain.M + shared - sp.diags_array(shared.sum(axis=0))
     # w = 1 / (1 - z / root) for z = t lambda: the step is (1 + sqrt 2) w^2 - sqrt 2 w, of order 2, and 0 for z = -inf.
     step = time / _STEPS * (1 - np.sqrt(0.5))
-    factor = factorize((domain.M - step * domain.L).tocsc(), free=inner)
+    factor = factorize((mass - step * domain.L).tocsc(), free=inner)
     for _ in range(_STEPS):
-        v = factor.solve((mass * u.T).T)
-        u = (1 + np.sqrt(2)) * factor.solve((mass * v.T).T) - np.sqrt(2) * v
+        v = factor.solve(mass @ u)
+        u = (1 + np.sqrt(2)) * factor.solve(mass @ v) - np.sqrt(2) * v
     return np.asarray(u[inner].T)

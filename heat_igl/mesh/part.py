@@ -49,7 +49,10 @@ class MeshPart:
             If `mesh` is no `Mesh`, or `region` is no such mask or selects no face.
         """
         if not isinstance(mesh, Mesh):
-            raise MeshError(f"region selects faces of a mesh, not of {type(mesh).__name__}: pass a mesh of triangles")
+            raise MeshError(
+                f"region selects faces of a mesh, not of {type(mesh).__name__}: pass a mesh of triangles, or of a "
+                "cloud the points inside"
+            )
         mask = as_array("region", region, MeshError)
         n, m = mesh.n_vertices, mesh.n_faces
         if mask.dtype.kind != "b" or mask.shape not in ((n,), (m,)):
