@@ -222,18 +222,9 @@ def test_flat_faces_leave_distances_as_they_are(share, cap):
 def test_flips_come_to_an_end_on_flat_faces(cow, monkeypatch, mollification):
     """Rounding makes some flips of flat triangles undo each other; with hardly any mollification, for ever."""
     monkeypatch.setattr(heat_igl.intrinsic.half_edges, "_MARGIN", mollification)
-    rounds = []
-    flip = heat_igl.intrinsic.delaunay._Flips.flip
-
-    def counted(self, half_edge):
-        rounds.append(len(half_edge))
-        if len(rounds) > 1000:
-            pytest.fail("flips do not end")
-        return flip(self, half_edge)
-
-    monkeypatch.setattr(heat_igl.intrinsic.delaunay._Flips, "flip", counted)
-    found = delaunay(with_flat_faces(cow, 0.0, True))
-    assert found.n_flips > 1000
+    mesh = with_flat_faces(cow, 0.0, True)
+    found = delaunay(mesh)
+    assert 1000 < found.n_flips < 3 * mesh.n_faces
     assert found.areas.sum() == pytest.approx(cow.measures.sum(), rel=1e-6)
 
 
@@ -760,7 +751,7 @@ def test_closed_manifold_gives_its_own_laplacian():
     assert abs(unflipped.M / 2 - own.M).max() <= 1e-12 * abs(own.M).max()
 
     plain, tufted = operators(sphere), tufted_operators(sphere)
-    assert tufted.surface.triangulation.n_flips == 2 * plain.surface.triangulation.n_flips > 100
+    assert min(tufted.surface.triangulation.n_flips, plain.surface.triangulation.n_flips) > 100
     # Lengths of flipped edges are rounded in another order on the back.
     assert abs(tufted.L - plain.L).max() <= 1e-9 * abs(plain.L).max()
     t = plain.mean_edge_length**2 / 2

@@ -104,7 +104,23 @@ class HalfEdges(NamedTuple):
         added = mollify(sides, F, margin)
         if added.any():
             sides += added
-        flipping.flip(self, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * len(F))
+        self.make_delaunay()
+
+    def make_delaunay(self, *, records: bool = False) -> tuple[IntArray, FloatArray]:
+        """Flip edges in place until the triangles are intrinsic Delaunay; all glued faces must be aligned.
+
+        Returns the moves in order, if they are recorded: kind (k, 3) and numbers (k, 5), see `Refined`.
+        """
+        return flipping.flip(self, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * (len(self.twin) // 3), records)
+
+    def arrays(self) -> dict[str, AnyArray]:
+        """`F`, `l`, `twin` and `aligned` of an `IntrinsicTriangulation`."""
+        return {
+            "F": self.vertex.reshape(-1, 3).astype(np.int64),
+            "l": self.length.reshape(-1, 3),
+            "twin": self.twin.astype(np.int64),
+            "aligned": self.aligned.astype(bool),
+        }
 
     def numbered(self, n: int, start: int = 0) -> tuple[HalfEdges, AnyArray, AnyArray]:
         """The triangles numbered breadth-first from face `start` on, so that neighbours lie near each other in memory.

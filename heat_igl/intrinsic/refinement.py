@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from heat_igl.intrinsic.half_edges import HalfEdges
 from heat_igl.intrinsic.history import Refined
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.kernels.mesh import carrying, refinement
+from heat_igl.mesh import DELAUNAY_TOLERANCE
 from heat_igl.typing import FloatArray
 
 # Degrees. The algorithm ends for certain below 30 degrees if no cone is sharp; close to that it makes many triangles.
@@ -52,25 +54,22 @@ def delaunay_refinement(
     """
     if (triangulation.twin < 0).any() or not triangulation.aligned.all():
         raise ValueError("refinement needs a closed and oriented surface: take the tufted cover")
-    F, lengths, twin, n, kind, numbers = refinement.refine(
-        triangulation.F,
-        triangulation.l,
-        triangulation.twin,
+    vertex, twin, length, n, kind, numbers = refinement.refine(
+        HalfEdges.of(triangulation),
         triangulation.n,
         np.ones(len(triangulation.F)) if unit is None else unit,
         np.radians(_LEAST_ANGLE),
         largest_radius,
         most_vertices,
+        -DELAUNAY_TOLERANCE,
     )
     if n == triangulation.n:
         return triangulation
-    first, following = carrying.index_moves(kind, len(F))
+    edges = HalfEdges(vertex, twin, np.arange(len(twin), dtype=np.int32), np.ones(len(twin), np.uint8), length)
+    first, following = carrying.index_moves(kind, len(twin) // 3)
     return replace(
         triangulation,
-        F=F,
-        l=lengths,
-        twin=twin,
-        aligned=np.ones(F.size, bool),
+        **edges.arrays(),
         n=n,
         n_flips=triangulation.n_flips + int(kind[:, 0].sum()),
         history=(*triangulation.history, Refined(kind, numbers, first, following)),

@@ -6,10 +6,9 @@ goes through these modules, as far as its use needs:
 1. `incidence` finds the edges and components of a mesh.
 2. `gluing` joins the half-edges that share an edge and takes their lengths, without the edges of a mesh;
    `numbering` brings neighbours near each other in memory.
-3. `flipping` makes the triangulation Delaunay where nobody asks for the history of the flips, as windows from vertices.
-   Flips with a history are in `heat_igl.intrinsic`.
-4. `refinement` splits faces of a Delaunay triangulation and flips edges until no angle is small, and records the moves;
-   `carrying` finds the faces that points are in after them.
+3. `flipping` makes the triangulation Delaunay, and records the flips if their history is needed.
+4. `refinement` splits faces of a Delaunay triangulation and flips edges until no angle is small; `carrying` finds the
+   faces that points are in after these moves.
 5. `polar_angles` sums the angles around vertices for tangent frames.
 
 `bounds` and `checking` are about distances: what edges and straight lines say of them without a search.

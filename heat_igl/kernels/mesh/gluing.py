@@ -1,8 +1,7 @@
 """Triangles by their edge lengths, made from positions: gluing along the edges that faces share.
 
-Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corner has the same number. This module,
-`flipping` and `numbering` serve a single query on a mesh; `heat_igl.intrinsic` glues with numpy, and keeps the history
-of flips.
+Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corner has the same number. This module
+and `numbering` serve a single query on a mesh; `heat_igl.intrinsic` glues with numpy.
 """
 
 import cython
