@@ -14,8 +14,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import Merged
-from heat_igl.intrinsic.length_derivatives import carry_lengths, carry_lengths_back
-from heat_igl.intrinsic.place_derivatives import PlaceSlopes
+from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import MetricSides, SideLengths, Surface
 from heat_igl.sources import SourceSet
@@ -174,7 +173,7 @@ class DistanceDerivative:
                 velocity = velocities("points", points, by_place.shape, "source point")
                 by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
             given = PlaceSlopes(places.faces, places.barycentric, by_place)
-        change = carry_lengths(self._paths.triangulation, by_side, len(self._faces.history), given)
+        change = carry_lengths(self._paths.triangulation, by_side, given)
         result = self._paths.push_forward(Change(*change))
         result[self.unreachable] = 0.0
         return result
@@ -212,7 +211,7 @@ class DistanceDerivative:
         """The derivative (m, 3) by the sides of the faces before any flip, and (p, 3) by the points in given faces."""
         change, points = self._paths.pull_back(row), self._sources.points
         places = None if change.by_place is None else PlaceSlopes(points.faces, points.barycentric, change.by_place)
-        return carry_lengths_back(self._paths.triangulation, change.by_side, len(self._faces.history), places)
+        return carry_lengths_back(self._paths.triangulation, change.by_side, places)
 
     @cached_property
     def _merged(self) -> Merged | None:

@@ -35,14 +35,13 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
     # An edge of a seam keeps its place as those of more than two faces do, with its other half-edge next in the ring.
     seam = np.flatnonzero(~given.aligned)
     edges.ring[seam] = edges.twin[seam]
-    edges.twin[seam] = -2
+    edges.twin[seam], edges.aligned[seam] = -2, True
     kind, lengths = edges.make_delaunay(records=True)
     if not len(kind):
         return triangulation
     if len(seam):
         seam = np.flatnonzero((edges.twin == -2) & (edges.ring[edges.ring] == np.arange(len(edges.ring))))
-        edges.twin[seam] = edges.ring[seam]
-        edges.aligned[seam] = False
+        edges.twin[seam], edges.aligned[seam] = edges.ring[seam], False
     of_flip = rounds(kind, len(given.F))
     in_order = np.argsort(of_flip, kind="stable")
     parts = np.split(in_order, np.flatnonzero(np.diff(of_flip[in_order])) + 1)
