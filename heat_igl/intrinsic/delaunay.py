@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from heat_igl.intrinsic.gluing import oriented
@@ -45,5 +43,5 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
     of_flip = rounds(kind, len(given.F))
     in_order = np.argsort(of_flip, kind="stable")
     parts = np.split(in_order, np.flatnonzero(np.diff(of_flip[in_order])) + 1)
-    flipped = (Flipped(*kind[part, 1:].T, lengths[part].T) for part in parts)
-    return replace(given, **edges.arrays(), n_flips=given.n_flips + len(kind), history=(*given.history, *flipped))
+    flipped = (Flipped(kind[part, 1], kind[part, 2], lengths[part].T) for part in parts)
+    return edges.replacing(given, n_flips=given.n_flips + len(kind), history=(*given.history, *flipped))

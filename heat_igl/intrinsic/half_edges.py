@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -111,16 +112,21 @@ class HalfEdges(NamedTuple):
 
         Returns the moves in order, if they are recorded: kind (k, 3) and numbers (k, 5), see `Refined`.
         """
-        return flipping.flip(self, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * (len(self.twin) // 3), records)
+        found: tuple[IntArray, FloatArray] = flipping.flip(
+            self, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * (len(self.twin) // 3), records
+        )
+        return found
 
-    def arrays(self) -> dict[str, AnyArray]:
-        """`F`, `l`, `twin` and `aligned` of an `IntrinsicTriangulation`."""
-        return {
-            "F": self.vertex.reshape(-1, 3).astype(np.int64),
-            "l": self.length.reshape(-1, 3),
-            "twin": self.twin.astype(np.int64),
-            "aligned": self.aligned.astype(bool),
-        }
+    def replacing(self, given: IntrinsicTriangulation, **changes: Any) -> IntrinsicTriangulation:
+        """These triangles in place of those of a triangulation, with other changes of its fields."""
+        return replace(
+            given,
+            F=self.vertex.reshape(-1, 3).astype(np.int64),
+            l=self.length.reshape(-1, 3),
+            twin=self.twin.astype(np.int64),
+            aligned=self.aligned.astype(bool),
+            **changes,
+        )
 
     def numbered(self, n: int, start: int = 0) -> tuple[HalfEdges, AnyArray, AnyArray]:
         """The triangles numbered breadth-first from face `start` on, so that neighbours lie near each other in memory.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from heat_igl.intrinsic.half_edges import HalfEdges
@@ -67,9 +65,8 @@ def delaunay_refinement(
         return triangulation
     edges = HalfEdges(vertex, twin, np.arange(len(twin), dtype=np.int32), np.ones(len(twin), np.uint8), length)
     first, following = carrying.index_moves(kind, len(twin) // 3)
-    return replace(
+    return edges.replacing(
         triangulation,
-        **edges.arrays(),
         n=n,
         n_flips=triangulation.n_flips + int(kind[:, 0].sum()),
         history=(*triangulation.history, Refined(kind, numbers, first, following)),
