@@ -7,13 +7,14 @@
     python scripts/clouds_table.py scans [--sizes 1000 5000 20000] [--sources 3]   # noise, outliers, uneven density
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4, a cylinder of radius 1 and height 3, and a square
-with sides of length 1; noise is Gaussian in all coordinates, of the given standard deviation. distances: the mean of
-|d - exact| / exact in percent, and seconds of all processors together to make the solver and for a query. clock: both
+with sides of length 1; noise is Gaussian in all coordinates, of the given standard deviation. distances: the share of
+doubtful points that is held to a bound, with a star where the cloud warned, the mean of |d - exact| / exact in percent,
+and seconds of all processors together to make the solver and for a query. clock: both
 solvers take turns; medians of ratios, of the solver with the first query, for which potpourri3d factors, of the solver,
 and of a later query. log-maps: on the vertices of meshes, against the exact one of the mesh: the median angle between
 them in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in percent at the points of the
 surface, of default / potpourri3d / the shortest path in the graph of 8 neighbours, which is what there is without a
-solver. Needs the extra ``bench``; docs/clouds.md shows the tables.
+solver; a star follows where the cloud warned. Needs the extra ``bench``; docs/clouds.md shows the tables.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
@@ -39,6 +41,7 @@ from heat_igl import (
     shapes,
     tangent_frames,
 )
+from heat_igl.mesh.cloud_orientation import doubtful_points
 from heat_igl.typing import FloatArray, IntArray
 
 from harness import Query, Row, Table, collected, drawn, mean_error, on_sphere, parsed, publish, seconds
@@ -93,6 +96,15 @@ def _graph(P: FloatArray) -> Query:
     return lambda i: np.asarray(dijkstra(graph, directed=False, indices=i))
 
 
+def _surface(P: FloatArray) -> tuple[IntArray, str]:
+    """The points of a cloud that may make it warn, and a star if it warned."""
+    cloud = PointCloud(P)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        surface, is_beside = cloud._made
+    return doubtful_points(surface, is_beside, with_folds=False), "*" * bool(caught)
+
+
 METHODS: dict[str, Callable[[FloatArray], Query]] = {
     "heat": lambda P: HeatMethodSolver(PointCloud(P)).distance,
     "default": lambda P: GeodesicSolver(PointCloud(P)).distance,
@@ -128,6 +140,13 @@ def with_copies(P: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, In
     return np.concatenate([P, P[rng.choice(len(P), len(P) // 10, replace=False)]]), np.arange(len(P))
 
 
+def with_patches_missing(P: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
+    """The points that are left if five balls of a twelfth of the extent, about points, were not scanned."""
+    middles = P[rng.choice(len(P), 5, replace=False)]
+    chosen = np.flatnonzero(KDTree(middles).query(P)[0] > np.ptp(P, axis=0).max() / 12)
+    return P[chosen], chosen
+
+
 # From points of a surface, a scan of them, and which of them its first points are.
 SCANS: dict[str, Scan] = {
     "clean": noisy(0.0),
@@ -136,6 +155,7 @@ SCANS: dict[str, Scan] = {
     "outliers 2 %": with_outliers,
     "density 1:100": graded,
     "copies 10 %": with_copies,
+    "patches missing": with_patches_missing,
 }
 
 
@@ -148,7 +168,7 @@ def scans(options: argparse.Namespace) -> Iterator[Row]:
             P, truth = SHAPES[shape](5 * n if name.startswith("density") else n, rng)
             points, kept = scan(P, rng)
             sources = rng.choice(len(kept), options.sources, replace=False)
-            row[shape] = {}
+            row[shape] = {"warned": _surface(points)[1]}
             for method in ("default", "potpourri3d", "graph"):
                 query, errors = (_graph if method == "graph" else METHODS[method])(points), []
                 for i in sources.tolist():
@@ -174,6 +194,8 @@ def clouds(options: argparse.Namespace) -> Iterator[tuple[Row, FloatArray, Query
 def distances(options: argparse.Namespace) -> Iterator[Row]:
     for row, P, truth in clouds(options):
         sources = np.random.default_rng(options.seed).choice(len(P), options.sources, replace=False).tolist()
+        doubtful, row["warned"] = _surface(P)
+        row["doubtful"] = 100 * len(doubtful) / len(P)
         for method in options.methods:
             start = time.process_time()
             query = METHODS[method](P)
@@ -228,14 +250,19 @@ def main(argv: Sequence[str] | None = None) -> None:
     options = parsed(__doc__, argv, "*", ("distances", "clock", "log-maps", "scans"), sources=6, repeats=15, **several)
     head = {"points on": "{points on}", "number": "{number}", "noise": "{noise:g}"}
     if options.table == "distances":
-        columns = head | {f"{m}, %": f"{{{m}[error]:.2g}}" for m in options.methods}
+        columns = (
+            head
+            | {"doubtful, %": "{doubtful:.2f}{warned}"}
+            | {f"{m}, %": f"{{{m}[error]:.2g}}" for m in options.methods}
+        )
         columns |= {f"{m}, s + s": f"{{{m}[made]:.2g}} + {{{m}[asked]:.2g}}" for m in options.methods}
         table = Table(collected(distances(options)), columns)
     elif options.table == "clock":
         columns = {"solver and first query": "{both:.2f}", "solver": "{solver:.2f}", "later query": "{later:.2f}"}
         table = Table(collected(clock(options)), head | columns)
     elif options.table == "scans":
-        columns = {s: f"{{{s}[default]:.2g}} / {{{s}[potpourri3d]:.2g}} / {{{s}[graph]:.2g}}" for s in options.shapes}
+        cell = "{{{0}[default]:.2g}} / {{{0}[potpourri3d]:.2g}} / {{{0}[graph]:.2g}}{{{0}[warned]}}"
+        columns = {shape: cell.format(shape) for shape in options.shapes}
         table = Table(collected(scans(options)), {"scan": "{scan}", "number": "{number}"} | columns)
     else:
         columns = {f"{m}, degrees, %": f"{{{m}[0]:.2g}}, {{{m}[1]:.2g}}" for m in ("heat", "paths", "potpourri3d")}

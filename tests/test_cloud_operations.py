@@ -18,7 +18,7 @@ A, B = 3, 40
 
 @cache
 def domain(name: str) -> Mesh | PointCloud:
-    """A sphere, points of it with normals, of a Moebius strip, and of a sphere with noise of half a spacing."""
+    """A sphere, points of it with normals, of a Moebius strip, and of a sphere with noise of a third of the spacing."""
     if name == "mesh":
         return heat_igl.shapes.icosphere(3)
     rng = np.random.default_rng(0)
@@ -28,7 +28,7 @@ def domain(name: str) -> Mesh | PointCloud:
         return PointCloud(np.stack([out * np.cos(turn), out * np.sin(turn), side * np.sin(turn / 2)], axis=1))
     P = rng.standard_normal((800, 3))
     P /= np.linalg.norm(P, axis=1, keepdims=True)
-    return PointCloud(P, P) if name == "oriented cloud" else PointCloud(P + 0.05 * rng.standard_normal(P.shape))
+    return PointCloud(P, P) if name == "oriented cloud" else PointCloud(P + 0.04 * rng.standard_normal(P.shape))
 
 
 def surface(name: str) -> Mesh:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -96,7 +97,7 @@ def test_nothing_depends_on_where_how_large_or_in_which_order() -> None:
     distance = GeodesicSolver(PointCloud(P)).distance(0)
     np.testing.assert_allclose(GeodesicSolver(PointCloud(P + 1e6)).distance(0), distance, atol=1e-8)
     # With noise, which triangles fit together depends on the order in which they are taken.
-    P = P + 0.05 * np.random.default_rng(3).standard_normal(P.shape)
+    P = P + 0.04 * np.random.default_rng(3).standard_normal(P.shape)
     distance, numbered = GeodesicSolver(PointCloud(P)).distance(0), np.argsort(order)
     renumbered = GeodesicSolver(PointCloud(P[order])).distance(int(numbered[0]))
     np.testing.assert_allclose(renumbered[numbered], distance, atol=1e-12)
@@ -184,7 +185,8 @@ def test_noise_is_taken_away_and_clean_points_stay() -> None:
 def test_noise_of_many_spacings_is_taken_away() -> None:
     """Where all neighbours lie within the noise, some of the points show the surface."""
     P, noise = plane(10_000), 0.05
-    triangles = PointCloud(P + noise * np.random.default_rng(1).standard_normal(P.shape)).triangles
+    with pytest.warns(AccuracyWarning, match="noise of the points is 0.05 across the surface, .* 17 % off in the mean"):
+        triangles = PointCloud(P + noise * np.random.default_rng(1).standard_normal(P.shape)).triangles
     assert triangles.V[:, 2].std() < 0.2 * noise
     assert np.unique(triangles.components).size == 1
 
@@ -213,8 +215,23 @@ def test_noise_is_smoothed_over_no_more_neighbours_than_are_flat() -> None:
     expected, noise = GeodesicSolver(mesh).distance(int(chosen[0]))[chosen], rng.standard_normal((500, 3))
     found = GeodesicSolver(PointCloud(mesh.V[chosen] + 0.014 * noise)).distance(0)
     assert mean_error(found, expected) < 0.04
-    with pytest.warns(AccuracyWarning, match="too few to tell noise from detail"):
+    with pytest.warns(AccuracyWarning, match="too few to tell noise from detail|noise of the points is") as caught:
         PointCloud(mesh.V[chosen] + 0.07 * noise).report()
+    assert len(caught) == 2
+
+
+@pytest.mark.parametrize("n", [500, 3000])
+def test_noise_that_makes_distance_wrong_by_more_than_a_twentieth_is_said(n: int) -> None:
+    """What the warning says is the mean error, with as much noise along the surface as across it."""
+    P, noise = sphere(n), np.random.default_rng(5).standard_normal((n, 3))
+    PointCloud(P + 0.03 * noise).report()
+    with pytest.warns(AccuracyWarning, match="noise of the points") as caught:
+        solver = GeodesicSolver(PointCloud(P + 0.08 * noise))
+    said = float(re.search(r"distances are (\d+) % off", str(caught[0].message))[1]) / 100
+    sources = range(0, n, n // 10)
+    assert said == pytest.approx(
+        mean_error(solver.distances(list(sources)), np.stack([on_sphere(P, i) for i in sources])), rel=0.3
+    )
 
 
 def test_an_outlier_is_unreachable_and_changes_nothing_else() -> None:
@@ -384,8 +401,8 @@ def test_two_sheets_nearer_than_the_spacing_are_said_to_be_one(gap: float) -> No
     with pytest.warns(AccuracyWarning, match=r"two sheets 0.0\d+ apart, .* pass PointCloud\(P, normals\)"):
         assert PointCloud(P).report().n_components == 1
     assert PointCloud(P, normals).report().n_components == 2
-    noisy = PointCloud(plane(1500) + 0.5 / np.sqrt(1500) * np.random.default_rng(0).standard_normal((1500, 3)))
-    assert noisy.report().noise == pytest.approx(0.5 / np.sqrt(1500), rel=0.1)
+    noisy = PointCloud(plane(1500) + 0.4 / np.sqrt(1500) * np.random.default_rng(0).standard_normal((1500, 3)))
+    assert noisy.report().noise == pytest.approx(0.4 / np.sqrt(1500), rel=0.1)
 
 
 def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined() -> None:
@@ -403,7 +420,13 @@ def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined() ->
     assert len(doubtful) > 5
 
 
-# The solver's other questions need no special case.
+def test_borders_at_which_a_thin_part_is_torn_are_doubtful() -> None:
+    """Of a plate two and a half spacings thick, whose rim is closed in some places and open in others."""
+    P, _ = two_sheets(1500, 2.5 / np.sqrt(1500))
+    with pytest.warns(AccuracyWarning, match="or end at another sheet"):
+        doubtful = PointCloud(P).report().doubtful_points
+    assert len(doubtful) > 30
+    assert (np.abs(P[doubtful, :2] - 0.5).max(axis=1) > 0.5 - 3 / np.sqrt(1500)).all()
 
 
 # Bad arguments.
@@ -732,7 +755,7 @@ def test_exact_distance_on_noisy_points() -> None:
     """Its bounds are those of the points where they were moved to: the given ones are not on the surface."""
     P = np.random.default_rng(0).standard_normal((800, 3))
     P /= np.linalg.norm(P, axis=1, keepdims=True)
-    cloud = PointCloud(P + 0.05 * np.random.default_rng(1).standard_normal(P.shape))
+    cloud = PointCloud(P + 0.04 * np.random.default_rng(1).standard_normal(P.shape))
     assert not np.array_equal(cloud.triangles.V, cloud.P)
     found = GeodesicSolver(cloud, method="exact").distance(0)
     np.testing.assert_allclose(found, GeodesicSolver(cloud.triangles, method="exact").distance(0), rtol=1e-9)
@@ -755,6 +778,7 @@ def test_principal_axes() -> None:
 # Sheets, and the orientation of the triangles.
 
 
+@pytest.mark.filterwarnings("ignore:the points do not tell their surface")  # at the borders of both
 @pytest.mark.parametrize("gap", [2.0, 3.0, 5.0])
 def test_sheets_without_normals_stay_apart(gap: float) -> None:
     """In spacings; in the neighbourhoods of 30 points there are points of both sheets."""
@@ -803,13 +827,13 @@ def test_triangles_that_contradict_are_left_out_if_they_are_few_and_on_a_fold() 
     P, F = moebius_strip(1000)
     creased = P.copy()
     creased[[0, 1000], 2] += 0.1  # across the strip: the two sides of this rung nearly lie on each other
-    found = oriented(creased, F, None)
+    found, _ = oriented(creased, F, None)
     assert len(F) - 2 <= len(found) < len(F)
     sides = np.concatenate([found[:, [0, 1]], found[:, [1, 2]], found[:, [2, 0]]])
     assert len(np.unique(sides, axis=0)) == len(sides)
     assert len(np.unique(found)) == len(P)
     for flat in ((P, F), moebius_strip(50)):
-        np.testing.assert_array_equal(np.sort(oriented(*flat, None), axis=1), np.sort(flat[1], axis=1))
+        np.testing.assert_array_equal(np.sort(oriented(*flat, None)[0], axis=1), np.sort(flat[1], axis=1))
 
 
 def test_directions_on_a_surface_that_cannot_be_oriented_are_an_error() -> None:

@@ -22,6 +22,11 @@ _BESIDE_A_LINE = 1e-9
 # one maximum and two like sides (a Gaussian has 2 / pi), and 1 for two sheets; two planes and shells .3 to 1.3 spacings
 # apart have .84 to .97.
 _NO_NOISE = 0.8
+# Noise of standard deviation s along the surface, of both ends, changes a distance by 2 s / sqrt(pi) in the mean, and
+# the mean of 1 / distance is 2 sqrt(pi) over the root of the area, as in a disc: the product is the mean error.
+_ERROR_OF_NOISE = 4.0
+# Clouds with a larger one warn: the accuracy that others count as a failure, too.
+_LARGE_ERROR = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,7 +131,7 @@ class PointCloud:
         """Whether two of the points are equal."""
         return len(self._distinct[0]) < len(self.P)
 
-    @cached_property
+    @property
     def triangles(self) -> Mesh:
         """The surface on which distance is measured: a mesh whose vertices are the points, with a boundary or without.
 
@@ -146,11 +151,17 @@ class PointCloud:
         Warns
         -----
         AccuracyWarning
-            If normals are left out, or if without normals two sheets that are nearer than the points in them are taken
-            for one with noise.
+            If normals are left out; if the points do not tell their surface, see `CloudReport`; if noise makes distance
+            wrong by more than 5 % in the mean; or if without normals two sheets that are nearer than the points in them
+            are taken for one with noise.
         """
+        return self._made[0]
+
+    @cached_property
+    def _made(self) -> tuple[Mesh, BoolArray]:
+        """The triangles, and at which points (n,) neighbours were left out since they lie on another sheet."""
         from heat_igl.mesh.cloud_normals import oriented_normals
-        from heat_igl.mesh.cloud_orientation import oriented
+        from heat_igl.mesh.cloud_orientation import oriented, warn_of_doubtful_points
         from heat_igl.mesh.cloud_triangles import cloud_triangles
         from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
 
@@ -161,16 +172,21 @@ class PointCloud:
         number = distinct[tree.order]
         normals, has_side = oriented_normals(tree, None if self.normals is None else self.normals[number])
         given, tree = tree, without_noise(tree)
-        if normals is None:
-            _warn_of_two_sheets(given.P, tree.P)
-        triangles = cloud_triangles(tree.P, neighbourhoods(tree, normals), has_side)
+        near = neighbourhoods(tree, normals)
+        triangles = cloud_triangles(tree.P, near, has_side)
         if not len(triangles):
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
             )
-        F, V = number[oriented(tree.P, triangles, normals)], np.empty_like(self.P)
-        V[number] = tree.P
-        return Mesh(V[distinct[original]], F).with_originals(distinct[original])
+        F, contradicts = oriented(tree.P, triangles, normals)
+        V, is_beside = np.empty_like(self.P), np.zeros(len(self.P), bool)
+        V[number], is_beside[number] = tree.P, near.index[:, -1] < 0
+        found = Mesh(V[distinct[original]], number[F]).with_originals(distinct[original])
+        if tree is not given:
+            _warn_of_noise(np.linalg.norm(tree.P - given.P, axis=1), normals is None, float(found.measures.sum()))
+        if contradicts or (found.boundary & is_beside).any():
+            warn_of_doubtful_points(found, is_beside)
+        return found, is_beside
 
     @cached_property
     def cover(self) -> Mesh | None:
@@ -214,7 +230,7 @@ class PointCloud:
         return CloudReport(
             **{field.name: getattr(report, field.name) for field in fields(report)},
             boundary_points=np.flatnonzero(self.boundary),
-            doubtful_points=doubtful_points(self.triangles.V, self.triangles.F),
+            doubtful_points=doubtful_points(*self._made),
             n_copies=self.n_vertices - len(self._distinct[0]),
             noise=float(np.sqrt(np.square(moved).sum(axis=1).mean())),
         )
@@ -278,12 +294,19 @@ def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
     return directions
 
 
-def _warn_of_two_sheets(given: FloatArray, moved: FloatArray) -> None:
-    """Warn if points (n, 3) were not moved by noise, but from two sheets to the middle between them."""
-    way = np.linalg.norm(moved - given, axis=1)
-    if way.mean() ** 2 > _NO_NOISE * np.square(way).mean():
+def _warn_of_noise(way: FloatArray, may_be_sheets: bool, area: float) -> None:
+    """Warn if points were moved, each by a way (n,), from two sheets to the middle between them, or by much noise."""
+    noise = float(np.sqrt(np.square(way).mean()))
+    if may_be_sheets and way.mean() ** 2 > _NO_NOISE * noise**2:
         warn_caller(
             f"the points look like two sheets {2 * way.mean():.3g} apart, nearer than the points in them, and are "
             "measured as one sheet with noise: pass PointCloud(P, normals) to keep the sheets apart",
+            AccuracyWarning,
+        )
+    elif _ERROR_OF_NOISE * noise > _LARGE_ERROR * np.sqrt(area):
+        warn_caller(
+            f"the noise of the points is {noise:.2g} across the surface, and as much along it: distances are "
+            f"{100 * _ERROR_OF_NOISE * noise / np.sqrt(area):.0f} % off in the mean, between near points by more. Give "
+            "points with less noise, as the means of several scans",
             AccuracyWarning,
         )

@@ -123,8 +123,9 @@ class CloudReport(MeshReport):
     boundary_points : (k,) int64
         Points at a border of the triangles: of the surface, of a hole, or of a part that was not scanned.
     doubtful_points : (k,) int64
-        Points at which the triangles may join sheets that are apart: at an edge of two triangles that contradict
-        each other's orientation or fold back, with less than 60 degrees between them.
+        Points at which the triangles may join sheets that are apart, or tear one: at an edge of two triangles that
+        contradict each other's orientation or fold back, with less than 60 degrees between them; or at a border beside
+        another sheet, more than four edges away from a point nearby.
     n_copies : int
         Points that are copies of earlier ones.
     noise : float
