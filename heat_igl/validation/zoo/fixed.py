@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import igl
 import numpy as np
 
 from heat_igl.mesh import Mesh
-from heat_igl.typing import FloatArray
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.validation.shapes import book, cone, cylinder, disk, grid, icosphere, lattice_faces, strip, torus
 from heat_igl.validation.zoo.registry import (
+    SHAPES,
+    Shape,
     boxes,
     caps,
     compact,
@@ -26,12 +32,129 @@ from heat_igl.validation.zoo.registry import (
     tube,
 )
 
+# Shapes that are one expression: family -> name -> mesh; those with a star are held out.
+
+
+def _stretched(mesh: Mesh, factors: ArrayLike) -> Mesh:
+    """The mesh with its vertices multiplied by factors (3,), (n, 1) or (n, 3), or by a matrix (3, 3) from the right."""
+    by = np.asarray(factors)
+    return Mesh(mesh.V @ by if by.shape == (3, 3) else mesh.V * by, mesh.F)
+
+
+def _noisy(mesh: Mesh, amount: float, seed: int) -> Mesh:
+    return Mesh(mesh.V + amount * seeded(seed).standard_normal(mesh.V.shape), mesh.F)
+
+
+def _heights(mesh: Mesh, height: AnyArray) -> Mesh:
+    return Mesh(raised(mesh.V[:, :2], height), mesh.F)
+
+
+def _scattered(n: int, seed: int) -> Mesh:
+    points = seeded(seed).random((n, 2))
+    return Mesh(raised(points), delaunay(points))
+
+
+def _on_sphere(n: int, seed: int) -> FloatArray:
+    points = seeded(seed).standard_normal((n, 3))
+    return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
+
+
+def _bumps(V: FloatArray) -> FloatArray:
+    return 1 + 0.15 * np.sin(6 * V[:, :1]) * np.cos(7 * V[:, 1:2]) * np.cos(5 * V[:, 2:])
+
+
+def _capped(around: int) -> Mesh:
+    """Two rings, each capped by a fan around one of its own vertices."""
+    side = cylinder(around, 1, 4.0)
+    return Mesh(side.V, np.concatenate([side.F, caps(2, around)]))
+
+
+def _spheres(ratio: float) -> Mesh:
+    one = icosphere(3)
+    return joined(one, Mesh(one.V * ratio + [2 * ratio + 2, 0, 0], one.F))
+
+
+def _shear(by: float) -> FloatArray:
+    return np.array([[1, 0, 0], [by, 1, 0], [0, 0, 1.0]])
+
+
+def _cells(n: int, where: Callable[[IntArray], Any]) -> Mesh:
+    """Of n^3 cells those that a function of their indices (3, n, n, n) chooses."""
+    return boxes(np.argwhere(where(np.indices((n, n, n)))))
+
+
+_EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
+    "smooth": {
+        "sphere": lambda: icosphere(4),
+        "ellipsoid": lambda: _stretched(icosphere(4), [1, 1, 8]),
+        "torus": lambda: torus(30, 60),
+        "thin torus *": lambda: torus(12, 240, 0.05),
+        "bumpy sphere": lambda: _stretched(icosphere(4), _bumps(icosphere(4).V)),
+        "monkey saddle *": lambda: _heights(
+            disk(20), disk(20).V[:, 0] ** 3 - 3 * disk(20).V[:, 0] * disk(20).V[:, 1] ** 2
+        ),
+        "cone": lambda: cone(40, 30),
+        "regular grid": lambda: grid(40),
+        "long strip": lambda: strip(1500, 3),
+    },
+    "topology": {"book": lambda: book(5, 12)},
+    "CAD": {
+        "capped cylinder 128": lambda: _capped(64),
+        "capped cylinder 512": lambda: _capped(256),
+        "box cube": lambda: boxes(np.zeros((1, 3), int)),
+        "box long": lambda: boxes(np.zeros((1, 3), int), np.array([1.0, 1.0, 30.0])),
+    },
+    "scattered": {
+        "scattered square 1000": lambda: _scattered(1000, 3),
+        "scattered square 100": lambda: _scattered(100, 4),
+        "sheared grid by 3": lambda: _stretched(grid(30), _shear(3.0)),
+        "sheared grid by 10": lambda: _stretched(grid(30), _shear(10.0)),
+        "stretched grid *": lambda: _stretched(grid(30), [40, 1, 1]),
+    },
+    "terrain": {
+        "noise 10 times": lambda: _heights(grid(30), 10 / 30 * seeded(10).random(31**2)),
+        "noise 100 times": lambda: _heights(grid(30), 100 / 30 * seeded(10).random(31**2)),
+        "cliff": lambda: _heights(grid(40), 2.0 * (grid(40).V[:, 0] > 0.5)),
+    },
+    "hull": {
+        "hull of 12": lambda: hull(_on_sphere(12, 12)),
+        "hull of 35": lambda: hull(_on_sphere(35, 13)),
+        "hull of 100": lambda: hull(_on_sphere(100, 14)),
+        "hull of 400": lambda: hull(_on_sphere(400, 15)),
+        "flat hull *": lambda: hull(_on_sphere(150, 16) * [1, 1, 0.03]),
+        "hull of a cloud *": lambda: hull(seeded(17).standard_normal((300, 3))),
+    },
+    "voxels": {
+        "cube less one": lambda: _cells(2, lambda i: (i < 1).any(axis=0)),
+        # A lattice of square beams between 4 by 4 by 4 nodes, of genus 81.
+        "beams": lambda: _cells(7, lambda i: (i % 2 == 0).sum(axis=0) >= 2),
+        "voxel ball": lambda: _cells(15, lambda i: ((i - 7) ** 2).sum(axis=0) <= 42),
+    },
+    "rough": {
+        "spiky sphere": lambda: _stretched(icosphere(3), np.where(seeded(20).random(642) < 0.05, 3.0, 1.0)[:, None]),
+        "noisy sphere": lambda: _noisy(icosphere(4), 0.05, 21),
+        "crumpled *": lambda: _noisy(disk(18), 0.04, 22),
+    },
+    "components": {f"two spheres 1 to {ratio}": partial(_spheres, float(ratio)) for ratio in (1, 10, 100)},
+    "small": {
+        "triangle": lambda: Mesh([[0, 0, 0], [3, 0, 0], [0, 2, 0]], [[0, 1, 2]]),
+        "needle *": lambda: Mesh(
+            np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-4, 0], [0.5, -1e-4, 0]]), [[0, 1, 2], [1, 0, 3]]
+        ),
+        "tetrahedron": lambda: Mesh(
+            [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
+        ),
+        "octahedron *": lambda: hull(np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3]),
+    },
+}
+SHAPES += [
+    Shape(name.removesuffix(" *"), family, make, name.endswith("*"))
+    for family, members in _EXPRESSIONS.items()
+    for name, make in members.items()
+]
+
+
 # Smooth surfaces.
-
-
-@shape("smooth")
-def _sphere() -> Mesh:
-    return icosphere(4)
 
 
 @shape("smooth", held_out=True)
@@ -40,51 +163,6 @@ def _latitudes() -> Mesh:
     theta, phi = np.meshgrid(np.linspace(0, np.pi, 31), np.linspace(0, 2 * np.pi, 61)[:-1], indexing="ij")
     V = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1).reshape(-1, 3)
     return merged(V, lattice_faces(31, 60, wrap_columns=True))
-
-
-@shape("smooth")
-def _ellipsoid() -> Mesh:
-    """A sphere stretched to 1 : 1 : 8 with the triangles that it has."""
-    mesh = icosphere(4)
-    return Mesh(mesh.V * [1, 1, 8], mesh.F)
-
-
-@shape("smooth")
-def _torus() -> Mesh:
-    return torus(30, 60)
-
-
-@shape("smooth", held_out=True)
-def _thin_torus() -> Mesh:
-    return torus(12, 240, 0.05)
-
-
-@shape("smooth")
-def _bumpy_sphere() -> Mesh:
-    V, F = icosphere(4).V, icosphere(4).F
-    return Mesh(V * (1 + 0.15 * np.sin(6 * V[:, :1]) * np.cos(7 * V[:, 1:2]) * np.cos(5 * V[:, 2:])), F)
-
-
-@shape("smooth", held_out=True)
-def _monkey_saddle() -> Mesh:
-    V = disk(20).V
-    x, y = V[:, 0], V[:, 1]
-    return Mesh(raised(V[:, :2], x**3 - 3 * x * y**2), disk(20).F)
-
-
-@shape("smooth")
-def _cone() -> Mesh:
-    return cone(40, 30)
-
-
-@shape("smooth")
-def _regular_grid() -> Mesh:
-    return grid(40)
-
-
-@shape("smooth")
-def _long_strip() -> Mesh:
-    return strip(1500, 3)
 
 
 # Surfaces without an orientation, or with edges of many faces.
@@ -114,11 +192,6 @@ def _klein_bottle() -> Mesh:
 
 
 @shape("topology")
-def _book() -> Mesh:
-    return book(5, 12)
-
-
-@shape("topology")
 def _pinched() -> Mesh:
     """Two cones that meet in their tips."""
     one = cone(24, 8)
@@ -126,13 +199,6 @@ def _pinched() -> Mesh:
 
 
 # Parts as they leave a CAD program: few vertices, long triangles, fans.
-
-
-@shape("CAD", _128=64, _512=256)
-def _capped_cylinder(around: int) -> Mesh:
-    """Two rings, each capped by a fan around one of its own vertices."""
-    side = cylinder(around, 1, 4.0)
-    return Mesh(side.V, np.concatenate([side.F, caps(2, around)]))
 
 
 @shape("CAD", held_out=True)
@@ -200,12 +266,6 @@ def _stairs() -> Mesh:
     return Mesh(V, lattice_faces(2, 25))
 
 
-@shape("CAD", cube=(1.0, 1.0), long=(1.0, 30.0))
-def _box(width: float, length: float) -> Mesh:
-    """Eight vertices and twelve triangles."""
-    return boxes(np.array([[0, 0, 0]]), np.array([width, width, length]))
-
-
 @shape("CAD", held_out=True)
 def _wide_funnel() -> Mesh:
     """A cone whose rings come closer and closer to the tip, with 24 vertices each."""
@@ -214,12 +274,6 @@ def _wide_funnel() -> Mesh:
 
 
 # Scattered points.
-
-
-@shape("scattered", _1000=(1000, 3), _100=(100, 4))
-def _scattered_square(n: int, seed: int) -> Mesh:
-    points = seeded(seed).random((n, 2))
-    return Mesh(raised(points), delaunay(points))
 
 
 @shape("scattered", held_out=True)
@@ -250,19 +304,6 @@ def _slivers_at_the_rim() -> Mesh:
     return Mesh(raised(points), delaunay(points))
 
 
-@shape("scattered", by_3=3.0, by_10=10.0)
-def _sheared_grid(shear: float) -> Mesh:
-    mesh = grid(30)
-    return Mesh(mesh.V @ np.array([[1, 0, 0], [shear, 1, 0], [0, 0, 1.0]]), mesh.F)
-
-
-@shape("scattered", held_out=True)
-def _stretched_grid() -> Mesh:
-    """Cells of 1 : 40."""
-    mesh = grid(30)
-    return Mesh(mesh.V * [40, 1, 1], mesh.F)
-
-
 @shape("scattered", held_out=True)
 def _graded_square() -> Mesh:
     """Edges from 1 to 1 / 1000 towards a corner."""
@@ -278,13 +319,6 @@ def _height_field(n: int, height: float, seed: int) -> Mesh:
     points = seeded(seed).random((n, 2))
     z = height * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1])
     return Mesh(raised(points, z), delaunay(points))
-
-
-@shape("terrain", _10_times=10.0, _100_times=100.0)
-def _noise(factor: float) -> Mesh:
-    """A grid with independent heights of a multiple of the spacing."""
-    mesh = grid(30)
-    return Mesh(raised(mesh.V[:, :2], factor / 30 * seeded(10).random(mesh.n_vertices)), mesh.F)
 
 
 @shape("terrain", held_out=True)
@@ -313,47 +347,7 @@ def _ridges() -> Mesh:
     return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), lattice_faces(41, 11))
 
 
-@shape("terrain")
-def _cliff() -> Mesh:
-    mesh = grid(40)
-    return Mesh(raised(mesh.V[:, :2], 2.0 * (mesh.V[:, 0] > 0.5)), mesh.F)
-
-
-# Convex hulls.
-
-
-@shape("hull", _12=(12, 12), _35=(35, 13), _100=(100, 14), _400=(400, 15))
-def _hull_of(n: int, seed: int) -> Mesh:
-    points = seeded(seed).standard_normal((n, 3))
-    return hull(points / np.linalg.norm(points, axis=1, keepdims=True))
-
-
-@shape("hull", held_out=True)
-def _flat_hull() -> Mesh:
-    points = seeded(16).standard_normal((150, 3))
-    return hull(points / np.linalg.norm(points, axis=1, keepdims=True) * [1, 1, 0.03])
-
-
-@shape("hull", held_out=True)
-def _hull_of_a_cloud() -> Mesh:
-    return hull(seeded(17).standard_normal((300, 3)))
-
-
 # Voxels and fractals.
-
-
-@shape("voxels")
-def _cube_less_one() -> Mesh:
-    where = np.ones((2, 2, 2), bool)
-    where[1, 1, 1] = False
-    return boxes(np.argwhere(where))
-
-
-@shape("voxels")
-def _beams() -> Mesh:
-    """A lattice of square beams between 4 by 4 by 4 nodes, of genus 81."""
-    i = np.indices((7, 7, 7))
-    return boxes(np.argwhere((i % 2 == 0).sum(axis=0) >= 2))
 
 
 @shape("voxels", held_out=True)
@@ -362,12 +356,6 @@ def _sponge() -> Mesh:
     i = np.indices((9, 9, 9))
     level = [((i // step % 3) == 1).sum(axis=0) < 2 for step in (1, 3)]
     return boxes(np.argwhere(level[0] & level[1]))
-
-
-@shape("voxels")
-def _voxel_ball() -> Mesh:
-    i = np.indices((15, 15, 15)) - 7
-    return boxes(np.argwhere((i**2).sum(axis=0) <= 42))
 
 
 @shape("voxels", held_out=True)
@@ -417,25 +405,6 @@ def _labyrinth() -> Mesh:
 # Rough and thin surfaces.
 
 
-@shape("rough")
-def _spiky_sphere() -> Mesh:
-    mesh = icosphere(3)
-    out = np.where(seeded(20).random(mesh.n_vertices) < 0.05, 3.0, 1.0)
-    return Mesh(mesh.V * out[:, None], mesh.F)
-
-
-@shape("rough")
-def _noisy_sphere() -> Mesh:
-    mesh = icosphere(4)
-    return Mesh(mesh.V + 0.05 * seeded(21).standard_normal(mesh.V.shape), mesh.F)
-
-
-@shape("rough", held_out=True)
-def _crumpled() -> Mesh:
-    mesh = disk(18)
-    return Mesh(mesh.V + 0.04 * seeded(22).standard_normal(mesh.V.shape), mesh.F)
-
-
 @shape("rough", _40_by_400=(40, 400), _12_by_60=(12, 60))
 def _lantern(around: int, along: int) -> Mesh:
     """Schwarz's lantern: rings of a cylinder, every other one turned by half a step."""
@@ -477,12 +446,6 @@ def _dense_pole() -> Mesh:
 # Several components.
 
 
-@shape("components", _1_to_1=1.0, _1_to_10=10.0, _1_to_100=100.0)
-def _two_spheres(ratio: float) -> Mesh:
-    one = icosphere(3)
-    return joined(one, Mesh(one.V * ratio + [2 * ratio + 2, 0, 0], one.F))
-
-
 @shape("components", held_out=True)
 def _part_and_plate() -> Mesh:
     """A small torus beside a square of two triangles, a thousand times larger."""
@@ -501,30 +464,6 @@ def _dust() -> Mesh:
         parts.append(Mesh(size * part.V + [at, 0, 0], part.F))
         at += 3 * size
     return joined(*parts)
-
-
-# The smallest meshes.
-
-
-@shape("small")
-def _triangle() -> Mesh:
-    return Mesh([[0, 0, 0], [3, 0, 0], [0, 2, 0]], [[0, 1, 2]])
-
-
-@shape("small", held_out=True)
-def _needle() -> Mesh:
-    return Mesh(np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-4, 0], [0.5, -1e-4, 0]]), [[0, 1, 2], [1, 0, 3]])
-
-
-@shape("small")
-def _tetrahedron() -> Mesh:
-    return Mesh([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
-
-
-@shape("small", held_out=True)
-def _octahedron() -> Mesh:
-    V = np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3]
-    return hull(V)
 
 
 # Made after every default had been chosen, all held out.
