@@ -294,6 +294,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_workers_have_settings_of_their_own(tmp_path):
     """Not Dask's profiler, which takes 5 % of a worker, nor its malloc, which makes a solver half as slow again.
 

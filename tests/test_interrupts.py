@@ -115,6 +115,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_long_calls(tmp_path):
     """Within some seconds, which nothing else here would do: no call is as short, and some take minutes."""
     late = {}

@@ -13,7 +13,7 @@ from heat_igl import shapes
 from heat_igl.drawing import camera, figure, raster, shading
 from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.plots import Picture, picture, plot, plot_field, plot_labels
-from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, colours
+from heat_igl.drawing.scene import LINE_INK, STRIPE_INK
 from heat_igl.drawing.surface_image import LINE
 
 
@@ -131,19 +131,6 @@ def test_stripes_too_narrow_to_be_seen_become_an_even_tone() -> None:
     fine = values[:, None] + 0.15 * (np.arange(2000) + 0.5 - 1000) / 2000
     slow = (np.floor(fine / 0.2) % 2 == 1).mean(axis=1)
     np.testing.assert_allclose(shading.stripe_coverage(values, np.full(500, 0.15), 0.2), slow, atol=2e-3)
-
-
-@pytest.mark.parametrize("name", ["viridis_r", "magma_r"])
-def test_default_colours_are_perceptually_uniform(name: str) -> None:
-    """Equal steps look equally large (CAM02-UCS), also after the darkest end was cut off; those of jet do not."""
-    colorspacious = pytest.importorskip("colorspacious")
-
-    def steps(of: str) -> np.ndarray:
-        seen = colorspacious.cspace_convert(colours(of)(np.linspace(0, 1, 33))[:, :3], "sRGB1", "CAM02-UCS")
-        return np.linalg.norm(np.diff(seen, axis=0), axis=1)
-
-    assert steps(name).max() < 1.5 * steps(name).min()
-    assert steps("jet").max() > 3 * steps("jet").min()
 
 
 def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not() -> None:

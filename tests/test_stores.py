@@ -24,7 +24,7 @@ from heat_igl import cluster  # noqa: E402
 from heat_igl.cluster.store import locked  # noqa: E402
 from heat_igl.windows import within_store  # noqa: E402
 
-BALL = shapes.icosphere(3)
+BALL = shapes.icosphere(2)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def near(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sparse matrix in three chunks of each array."""
     path = tmp_path_factory.mktemp("within") / "near.zarr"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(within_store, "_CHUNK", 5000)
+        patch.setattr(within_store, "_CHUNK", 600)
         write_distances_within(path, BALL, 0.5)
     return path
 
@@ -220,7 +220,7 @@ def test_a_writer_that_is_killed_leaves_no_matrix(tmp_path: Path, monkeypatch: p
         await plain(self, key, value)
 
     with monkeypatch.context() as patch:
-        patch.setattr(within_store, "_CHUNK", 8000)
+        patch.setattr(within_store, "_CHUNK", 500)
         patch.setattr(zarr.storage.LocalStore, "set", set_or_die)
         patch.setattr(within_store, "_remove", lambda _: None)
         with pytest.raises(KilledError):

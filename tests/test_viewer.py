@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import run_python
 
 import heat_igl
 from heat_igl import cli, shapes
@@ -42,29 +41,27 @@ def test_the_page_is_opened_where_there_is_a_display(
     assert "with t = 0.5 h^2." in text
 
 
-def test_the_command_writes_the_page_that_it_is_told_to(folder: Path) -> None:
-    done = run_python("-m", "heat_igl", "view", "ball.off", "--html", "shown.html", cwd=folder)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert {path.name for path in folder.iterdir()} == {"ball.off", "shown.html"}
+def test_the_command_writes_the_page_that_it_is_told_to(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    assert cli.run(["view", "ball.off", "--html", "shown.html"]) == 0
     for name, message in (("shown.pdf", "pages go to .html or .htm files"), ("no/a.html", "there is no directory no")):
-        done = run_python("-m", "heat_igl", "view", "ball.off", "--html", name, cwd=folder)
-        assert done.returncode == 1
-        assert message in done.stderr
-        assert done.stderr.count("\n") == 1
+        assert cli.run(["view", "ball.off", "--html", name]) == 1
+        error = capsys.readouterr().err
+        assert message in error
+        assert error.count("\n") == 1
     assert {path.name for path in folder.iterdir()} == {"ball.off", "shown.html"}
 
 
-def test_the_command_writes_exact_signed_and_points(folder: Path) -> None:
+def test_the_command_writes_exact_signed_and_points(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
     sphere = shapes.icosphere(2)
-    heat_igl.write_curves(folder / "loops.obj", sphere, heat_igl.isolines(sphere, sphere.V[:, 2], 0.1)[0])
-    done = run_python(
-        "-m", "heat_igl", "view", "ball.off", "--html", "a.html", "--exact", "--curves", "loops.obj", cwd=folder
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    text = (folder / "a.html").read_text(encoding="utf8")
+    heat_igl.write_curves("loops.obj", sphere, heat_igl.isolines(sphere, sphere.V[:, 2], [0.1])[0])
+    assert cli.run(["view", "ball.off", "--html", "a.html", "--exact", "--curves", "loops.obj"]) == 0
+    text = Path("a.html").read_text(encoding="utf8")
     assert '"fields": [["exact", 1], ["signed distance", 1]]' in text
     assert '"beside": "exact"' in text
-    heat_igl.write_point_cloud(folder / "scan.ply", heat_igl.PointCloud(sphere.V))
-    done = run_python("-m", "heat_igl", "view", "scan.ply", "--html", "b.html", "--points", cwd=folder)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert '"points": true' in (folder / "b.html").read_text(encoding="utf8")
+    heat_igl.write_point_cloud("scan.ply", heat_igl.PointCloud(sphere.V))
+    assert cli.run(["view", "scan.ply", "--html", "b.html", "--points"]) == 0
+    assert '"points": true' in Path("b.html").read_text(encoding="utf8")

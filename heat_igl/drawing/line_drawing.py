@@ -68,12 +68,12 @@ def write_line_drawing(
     if target.suffix.lower() != ".svg":
         raise ValueError(f"{target}: line drawings go to .svg files")
     require_choice("hidden", hidden, get_args(Hidden))
-    mesh = as_simplices(mesh)
+    mesh, lines = as_simplices(mesh), flat_curves(curves)
     seen = scene(mesh, np.zeros(mesh.n_vertices), view=view, up=up)
     scale, centre = fitted(seen, _PIXELS, _PIXELS, 0.02 * _PIXELS)
     depth = rasterize(to_pixels(seen.turned, scale, centre), seen.F, _PIXELS, _PIXELS).depth
     groups: dict[str, list[tuple[FloatArray, bool]]] = {"visible": [], "hidden": []}
-    for curve in flat_curves(curves):
+    for curve in lines:
         line = (curve.positions(mesh) - seen.centre) / seen.unit @ seen.turn.T
         for is_seen, run in visible_runs(to_pixels(line, scale, centre), depth, _BEHIND * _PIXELS):
             # Pixels count downwards, the plane of the drawing upwards; its unit is that of the mesh.
