@@ -84,7 +84,7 @@ def cells() -> Picture:
     """Geodesic Voronoi cells of farthest points."""
     mesh = heat_igl.sample_mesh()
     found = heat_igl.farthest_cells(mesh, 40)
-    return plot_labels(mesh, found.labels, sources=found.sites)
+    return plot_labels(mesh, found.labels, distance=found.distance, sources=found.sites)
 
 
 def samples() -> Picture:

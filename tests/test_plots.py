@@ -348,6 +348,30 @@ def test_between_two_labels_is_no_third() -> None:
     assert np.allclose(counts / len(inside), [1 / 6, 1 / 3, 1 / 2], atol=0.03)
 
 
+def test_borders_of_cells_are_where_distances_are_equal() -> None:
+    """In the plane the border of two cells is the bisector of the sites, which crosses the triangles here."""
+    mesh, _ = flat_grid(12)
+    away = np.linalg.norm(mesh.V[:, None] - mesh.V[[30, 120]], axis=2)
+    middle, across = mesh.V[[30, 120]].mean(axis=0), mesh.V[120] - mesh.V[30]
+    wrong = []
+    for distance in (away.min(axis=1), None):
+        image = surface_image(plot_labels(mesh, away.argmin(axis=1), distance=distance))
+        is_first = np.linalg.norm(image[..., :3] - image[..., :3][image.shape[0] - 25, 25], axis=2) < 0.05
+        rows, columns = np.nonzero(image[..., 3] == 1)
+        low, high = (
+            np.array([columns, rows]).T[index] for index in (np.argmin(columns - rows), np.argmax(columns - rows))
+        )
+        place = (np.array([columns, rows]).T - low) / (high - low)
+        side = (place - middle[:2]) @ across[:2]
+        inside = np.abs(side) > 2 * np.linalg.norm(across) / abs(high - low)[0]  # but for two pixels at the border
+        wrong.append((is_first[rows, columns] != (side < 0))[inside].mean())
+    # Of second order in the edge, while thirds of triangles are off by a share of it.
+    assert wrong[0] < 0.2 * wrong[1]
+    assert wrong[1] > 0.01
+    with pytest.raises(ValueError, match=r"distance must have shape \(169,\), one per vertex"):
+        plot_labels(mesh, away.argmin(axis=1), distance=[1.0])
+
+
 def test_vertices_without_a_label_are_grey() -> None:
     mesh = shapes.grid(4)
     image = surface_image(plot_labels(mesh, np.full(25, -1) + (mesh.V[:, 0] > mesh.V[:, 0].mean())))

@@ -6,7 +6,7 @@ import igl
 import numpy as np
 
 from heat_igl.mesh import Mesh, PointCloud
-from heat_igl.typing import FloatArray
+from heat_igl.typing import BoolArray, FloatArray
 
 _CORNERS, _FEW_CORNERS = 8, 4
 # Above this number of points a disc is a few pixels wide, and is drawn as a square.
@@ -40,7 +40,8 @@ def discs(cloud: PointCloud, values: FloatArray, is_flat: bool = False) -> tuple
     angle = 2 * np.pi * np.arange(k) / k
     across = np.cos(angle)[:, None] * x[:, None] + np.sin(angle)[:, None] * y[:, None]
     rim = radius[:, None, None] * across
-    slope = np.zeros((n, 3)) if is_flat else _slopes(triangles, values)[cloud.originals]
+    known: BoolArray = np.asarray(np.isfinite(values)[triangles.F].all(axis=1))
+    slope = np.zeros((n, 3)) if is_flat else slopes(triangles, values, known)[cloud.originals]
     finite = values[np.isfinite(values)]
     on_rim = values[:, None] + np.einsum("nkx,nx->nk", rim, slope)
     on_rim = np.where(np.isfinite(values)[:, None], np.clip(on_rim, finite.min(), finite.max()), values[:, None])
@@ -49,12 +50,12 @@ def discs(cloud: PointCloud, values: FloatArray, is_flat: bool = False) -> tuple
     return Mesh(np.concatenate([V, (V[:, None] + rim).reshape(-1, 3)]), F), np.append(values, on_rim.ravel())
 
 
-def _slopes(triangles: Mesh, values: FloatArray) -> FloatArray:
-    """The gradient (n, 3) of values at each vertex, the mean of the faces around it by area; 0 beside ``inf``."""
+def slopes(triangles: Mesh, values: FloatArray, faces: BoolArray) -> FloatArray:
+    """The gradient (n, 3) of values at each vertex, the mean of the chosen faces around it by area; 0 where is none."""
     known = np.where(np.isfinite(values), values, 0.0)
     G = igl.grad(triangles.V, triangles.F)
     per_face = (G @ known).reshape(3, -1).T
-    weights = triangles.measures * np.isfinite(values)[triangles.F].all(axis=1) * np.isfinite(per_face).all(axis=1)
+    weights = triangles.measures * faces * np.isfinite(per_face).all(axis=1)
     weighted = np.where(weights[:, None] > 0, per_face, 0.0) * weights[:, None]
     of_corner = triangles.F.ravel()
     total = np.bincount(of_corner, np.repeat(weights, 3), len(values))

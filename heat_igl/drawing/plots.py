@@ -18,20 +18,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from heat_igl.drawing.discs import slopes
 from heat_igl.drawing.figure import lay_out
 from heat_igl.drawing.html_view import Page, page
 from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.output import Picture
 from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene
 from heat_igl.drawing.shading import colour_numbers
-from heat_igl.errors import as_array
+from heat_igl.errors import as_array, real_numbers
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_mesh, as_simplices
 from heat_igl.sources import Sources
-from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
     "Page", "Picture", "page", "picture", "plot", "plot_field", "plot_labels", "write_html", "write_line_drawing",
@@ -160,6 +162,7 @@ def plot_labels(
     mesh: MeshLike,
     labels: ArrayLike,
     *,
+    distance: ArrayLike | None = None,
     sources: Sources | None = None,
     curves: Sequence[SurfaceCurve] = (),
     view: tuple[float, float] | None = None,
@@ -171,6 +174,9 @@ def plot_labels(
     ----------
     labels : (n,) array_like of int
         A label for each vertex; -1, for vertices without one, is drawn grey.
+    distance : (n,) array_like, optional
+        Of Voronoi cells, the distance of each vertex from the site of its cell: borders are then drawn where the
+        distances from both sites are equal. Otherwise a point has the label of the nearest corner of its triangle.
     mesh, sources, curves, view, up
         As for `plot`.
 
@@ -202,6 +208,12 @@ def plot_labels(
     seen = scene(
         mesh, values, name="labels", sources=sources, limits=(0, _N_COLOURS), view=view, up=up, is_categorical=True
     )  # fmt: skip
+    if distance is not None:
+        measured = real_numbers("distance", distance)
+        if measured.shape != given.shape:
+            raise ValueError(f"distance must have shape {given.shape}, one per vertex, but it has {measured.shape}")
+        if not isinstance(mesh, PointCloud):  # whose discs have one label each
+            seen = replace(seen, borders=_borders(seen, given, measured / seen.unit))
     return lay_out(seen, _lines_in_space(mesh, curves, seen), "plain", table, "", "no label")
 
 
@@ -213,6 +225,27 @@ def picture(path: str | os.PathLike[str], mesh: MeshLike, distance: ArrayLike, *
 def write_html(path: str | os.PathLike[str], mesh: MeshLike, distance: ArrayLike, **options: Any) -> None:
     """Write an interactive page to `path`: `page` with the same options, then `Page.save`."""
     page(mesh, distance, **options).save(path)
+
+
+def _borders(seen: Scene, labels: IntArray, distance: FloatArray) -> FloatArray:
+    """`Scene.borders` for cells: the distance of the corners of a triangle from the site of each of them.
+
+    At a corner of another cell that is the mean over the neighbours in the cell, from whose distances it is continued
+    with the gradient that these have in the cell. It depends on the vertex alone, so borders continue across edges.
+    """
+    F, corners = seen.F, seen.V[seen.F]
+    _, label = np.unique(labels, return_inverse=True)
+    label = label[F]
+    is_whole: BoolArray = np.asarray((label == label[:, :1]).all(axis=1) & np.isfinite(distance[F]).all(axis=1))
+    slope = slopes(Mesh(seen.V, F), distance, is_whole)
+    to_corner = corners[:, None] - corners[:, :, None]
+    found = distance[F][:, :, None] + np.einsum("mkjx,mkx->mkj", to_corner, slope[F])
+    other = label[:, :, None] != label[:, None, :]
+    key = F[:, None, :] * (int(label.max()) + 1) + label[:, :, None]
+    _, place, count = np.unique(key[other], return_inverse=True, return_counts=True)
+    borders = np.repeat(distance[F][:, None, :], 3, axis=1)
+    borders[other] = (np.bincount(place, found[other]) / count)[place]
+    return borders
 
 
 def _limits(values: ArrayLike) -> tuple[float, float] | None:

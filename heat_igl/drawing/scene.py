@@ -61,6 +61,9 @@ class Scene:
         Segments of sources that are curves, in the coordinates of `V`.
     is_categorical : bool
         Whether the values are numbers of categories, between which there is nothing: no interpolation, no colour bar.
+    borders : (m, 3, 3) float64 or None
+        Of categories: for each corner of each triangle a linear function, by its values at the three corners. A point
+        has the category of the corner with the smallest; None stands for the nearest corner.
     """
 
     V: FloatArray
@@ -76,6 +79,7 @@ class Scene:
     dots: FloatArray
     lines: FloatArray
     is_categorical: bool = False
+    borders: FloatArray | None = None
 
     @property
     def turned(self) -> FloatArray:

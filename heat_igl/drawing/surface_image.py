@@ -36,8 +36,12 @@ def surface_image(
     reached: BoolArray = np.asarray(np.isfinite(values[F]).all(axis=1))
     finite = np.where(np.isfinite(values), values, 0.0)
     if seen.is_categorical:
-        # The category of the nearest corner.
-        here = finite[F[pixels.face, np.argmax(pixels.weights, axis=1)]]
+        corner = np.argmax(pixels.weights, axis=1)
+        if seen.borders is not None:
+            between = np.flatnonzero((np.ptp(values[F], axis=1) > 0)[pixels.face])
+            cost = np.einsum("pj,pkj->pk", pixels.weights[between], seen.borders[pixels.face[between]])
+            corner[between] = np.argmin(cost, axis=1)
+        here = finite[F[pixels.face, corner]]
     else:
         here = np.einsum("pk,pk->p", pixels.weights, finite[F[pixels.face]])
     known: BoolArray = reached[pixels.face]
