@@ -11,9 +11,8 @@ import numpy as np
 from heat_igl.curves.places import snapped
 from heat_igl.errors import SourceError
 from heat_igl.intrinsic import HalfEdges, corner_angles
-from heat_igl.kernels.mesh import polar_angles
 from heat_igl.kernels.paths import shortening, strips
-from heat_igl.mesh import Mesh, SurfaceCurve, is_oriented_manifold
+from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -136,11 +135,7 @@ class Shortener:
         # of more than two faces there are more than two sides.
         sums[edge.vertices[edge.n_faces != 2]] = np.inf
         half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
-        directions = np.empty(0), np.empty(0), np.empty(0, np.int32)
-        if edge.n_faces.max() <= 2 and is_oriented_manifold(mesh):
-            first = np.where(np.diff(first_corner) > 0, corner[np.minimum(first_corner[:-1], len(corner) - 1)], -1)
-            directions = *_directions(face["angle"].ravel(), edges.twin, first), edges.twin
-        self._kernel = kernel.Shortener(self.faces, half_turn, int(np.diff(first_corner).max()), directions)
+        self._kernel = kernel.Shortener(self.faces, half_turn, int(np.diff(first_corner).max()))
 
     def shortest(self, course: FaceSequence, *, is_closed: bool = False) -> Shortened:
         """The locally shortest curve of the class of a course: between the ends, or as a loop."""
@@ -169,14 +164,6 @@ def _faces(mesh: Mesh) -> AnyArray:
     face["above"] = 2 * np.sqrt(np.maximum(half * (half - base) * (half - left) * (half - right), 0)) / base**2
     face["vertex"] = mesh.F
     return face
-
-
-def _directions(angles: FloatArray, opposite: AnyArray, first: AnyArray) -> tuple[FloatArray, FloatArray]:
-    """The angle (3 m,) of each corner's right side around its vertex, and the sums (n,), negative on the boundary."""
-    leaving = np.zeros(len(opposite))
-    sums, _, closes = polar_angles.polar_angles(angles, opposite.astype(np.int64), first.astype(np.int64), leaving)
-    # The half-edge that leaves from a corner is the side opposite the corner before.
-    return np.roll(leaving.reshape(-1, 3), 1, axis=1).ravel(), np.where(closes, sums, -sums)
 
 
 def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:

@@ -43,7 +43,7 @@ cdef class Course:
     cdef bint turn(self, int v, int goal) except -1 nogil
     cdef double settle(self) except -1 nogil
     cdef double lay_out(self) except -1 nogil
-    cdef int _repair(self) except -1 nogil
+    cdef int repair(self) except -1 nogil
     cdef int _shorter_way(self, int i) noexcept nogil
     cdef bint _is_one_way(self, int first, int last, int v) noexcept nogil
     cdef void _trim(self) noexcept nogil

@@ -77,7 +77,7 @@ class Course:
             # Rounding can make two ways around a vertex look shorter than one another.
             failures = 0 if length < shortest * (1.0 - 1e-13) else failures + 1
             shortest = min(shortest, length)
-            if failures > 3 or not self._repair():
+            if failures > 3 or not self.repair():
                 break
         return length
 
@@ -89,7 +89,7 @@ class Course:
         self.funnel.pull_tight(weighted(end, self.funnel.last.x), weighted(end, self.funnel.last.y))
         return self.funnel.length()
 
-    def _repair(self) -> cython.int:
+    def repair(self) -> cython.int:
         """Lead the strip the other way around the bends if that is shorter; 0 if there are none."""
         self.straighter.count = 0
         copied: cython.int = 0
