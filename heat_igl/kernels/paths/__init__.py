@@ -11,9 +11,8 @@ distance is needed. `heat_igl.curves.shortening` and `.straightest` make the arg
 3. `straightening`: where that path bends at a vertex with an angle below pi on another side, the strip is led there and
    step 2 is repeated until there is no such bend (`Course`). Vertices with less than 2 pi can be passed on both sides:
    the other side is tried, and kept if the path becomes shorter (`Passing`).
-4. `shortening`: an open curve is done then. A loop is first relaxed as a polyline of vertices, the smallest angle first
-   (`Polyline`), then straightened from one of its points to itself, and from another one, until its length stays the
-   same (`Loop`).
+4. `shortening`: an open curve is done then. A loop is straightened from one of its points to itself, and from another
+   one, until its length stays the same (`Loop`).
 
 `straightest` is independent of these: a line goes straight on over edges, and past a vertex with equal angles on both
 sides.
