@@ -1,9 +1,9 @@
 """Curves shortened within their class: open ones between fixed ends, loops as a whole.
 
-A loop is a path from a point of it to itself, the base. First the strip is led past the bends of that path once from each
-of a few bases, so that no point of the loop is held for long. Then the path is straightened, and the base moved: to a
-vertex at which the path bends, or else to an edge that it crosses, along which it slides to where the loop is shortest.
-The length falls with every such step unless the loop is locally shortest at the base too.
+A loop is a path from a point of it to itself, the base. First the strip is led past the bends of that path once from
+each of a few bases, so that no point of the loop is held for long. Then the path is straightened, and the base moved:
+to a vertex at which the path bends, or else to an edge that it crosses, along which it slides to where the loop is
+shortest. The length falls with every such step unless the loop is locally shortest at the base too.
 """
 
 import cython
