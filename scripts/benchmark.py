@@ -17,7 +17,6 @@ the variable HEAT_IGL_VTP names its program. ``--backend`` is the linear solver 
 from __future__ import annotations
 
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -29,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, read_mesh, shapes
+from heat_igl import GeodesicSolver, Mesh, read_mesh, shapes
 from heat_igl.cli.demo import sample_mesh
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
@@ -74,10 +73,6 @@ def run(method: str, path: str, sources: list[int], is_whole: bool = True) -> tu
         solver = getattr(query, "__self__", None)
         batch = solver.distances if solver else lambda s: [query(one) for one in s]
         row["batch"] = seconds(lambda: batch(sources[1:]), time.perf_counter) / (len(sources) - 1)
-        if isinstance(solver, HeatMethodSolver):
-            moved = mesh.V * 1.01
-            row["moved"] = seconds(lambda: solver.with_vertices(moved), time.perf_counter)
-            row["factor bytes"] = getattr(solver.diagnostics, "factor_bytes", None)
     return row, distance
 
 
@@ -213,30 +208,6 @@ def exponents(rows: Sequence[Row]) -> Iterator[Row]:
         yield {"method": method} | found
 
 
-def floors(rows: Sequence[Row]) -> Iterator[Row]:
-    """What reading the factors takes, forward and backward, by the rate of a copy, beside what a query takes."""
-    size = 2**28
-    source, target = np.ones(size // 8), np.zeros(size // 8)
-    speed = 2 * size / min(seconds(lambda: np.copyto(target, source), time.perf_counter) for _ in range(7))
-    for row in rows:
-        if row.get("factor bytes"):
-            floor = 2 * row["factor bytes"] / speed
-            yield row | {"factors": row["factor bytes"] / 1e6, "floor": 1e3 * floor, "GB/s": speed / 1e9,
-                         "query": 1e3 * row["later"], "share": row["later"] / floor}  # fmt: skip
-
-
-def imports(repeats: int = 7) -> Iterator[Row]:
-    """Median seconds of a new interpreter, what heat_igl is built on first."""
-    base = "import numpy, scipy.sparse, igl"
-    for statement in (
-        base, "import heat_igl", "import heat_igl; heat_igl.geodesic_distance(heat_igl.shapes.icosphere(3), 0)",
-        f"{base}; import heat_igl; heat_igl.HeatMethodSolver",
-    ):  # fmt: skip
-        command = [sys.executable, "-c", statement]
-        found = [seconds(lambda c=command: subprocess.run(c, check=True), time.perf_counter) for _ in range(repeats)]
-        yield {"statement": f"`{statement}`", "seconds": statistics.median(found)}
-
-
 COST = {
     "mesh": "{mesh}", "method": "{method}", "runs": "{runs}", "precomputation": "{precomputation:.3f}",
     "first query": "{first:.4f}", "later query": "{later:.4f}", f"each of {BATCH}": "{batch:.4f}",
@@ -244,8 +215,6 @@ COST = {
 }  # fmt: skip
 FIT = {"exponent of n": "{method}", "precomputation": "{precomputation:.2f}", "later query": "{later:.2f}",
        f"each of {BATCH}": "{batch:.2f}", "memory": "{peak:.2f}"}  # fmt: skip
-FLOOR = {"mesh": "{mesh}", "GB/s of a copy": "{GB/s:.1f}", "factors MB": "{factors:.0f}", "floor ms": "{floor:.1f}",
-         "later query ms": "{query:.1f}", "over floor": "{share:.2f}"}  # fmt: skip
 RANGE = {"case": "{mesh}", "method": "{method}", "largest distance": "{longest:.6g}", "exact": "{exact:.6g}",
          "mean error": "{mean:.3f}", "largest error": "{largest:.3f}", "seconds": "{seconds:.2f}"}  # fmt: skip
 
@@ -271,14 +240,10 @@ def main(argv: Sequence[str] | None = None) -> None:
         bunny = sample_mesh()
         rows = collected(timings(options, options.meshes or ([bunny] if bunny else [])))
         own = [row for row in rows if row["method"].startswith("heat")]
-        moved = {"mesh": "{mesh}", "a new solver": "{precomputation:.3f}", "with_vertices": "{moved:.3f}"}
         tables = {
             "timings": Table(rows, COST),
             **{f"ratios {peer}": Table(own, ratios(peer)) for peer in PEERS},
             "exponents": Table(list(exponents(rows)), FIT),
-            "floor": Table(list(floors(rows)), FLOOR),
-            "moved": Table(own, moved),
-            "import": Table(list(imports()), {"new interpreter": "{statement}", "seconds": "{seconds:.3f}"}),
         }
         publish(options, tables)
 

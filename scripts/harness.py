@@ -256,16 +256,16 @@ def _libigl_heat(mesh: Mesh) -> Query:
     return lambda source: np.asarray(igl.heat_geodesics_solve(data, np.array([source])))
 
 
-def _front(mesh: Mesh) -> Query:
-    from heat_igl.reference.native import meshlab_front
+def _native(name: str) -> Callable[[Any], Query]:
+    """A function of `heat_igl.reference.native` that prepares nothing, in this process."""
 
-    return lambda source: meshlab_front(mesh.V, mesh.F, np.array([source]))["distance"]
+    def prepare(mesh: Mesh) -> Query:
+        from heat_igl.reference import native
 
+        solve = getattr(native, name)
+        return lambda source: solve(mesh.V, mesh.F, np.array([source]))["distance"]
 
-def _pygeodesic(mesh: Mesh) -> Query:
-    from heat_igl.reference.native import pygeodesic_exact
-
-    return lambda source: pygeodesic_exact(mesh.V, mesh.F, np.array([source]))["distance"]
+    return prepare
 
 
 def _fast_marching(mesh: Mesh) -> Query:
@@ -273,18 +273,6 @@ def _fast_marching(mesh: Mesh) -> Query:
 
     solver = potpourri3d.MeshFastMarchingDistanceSolver(mesh.V, mesh.F)
     return lambda source: np.asarray(solver.compute_distance([[(int(source), [])]]))
-
-
-def _libigl_exact(mesh: Mesh) -> Query:
-    targets, none = np.arange(mesh.n_vertices), np.zeros(0, np.int64)
-    return lambda source: igl.exact_geodesic(mesh.V, mesh.F, np.array([source]), none, targets, none)
-
-
-def _gdist(mesh: Mesh) -> Query:
-    import gdist
-
-    F = mesh.F.astype(np.int32)
-    return lambda source: gdist.compute_gdist(mesh.V, F, source_indices=np.array([source], np.int32))
 
 
 def vtp(mesh: Mesh, source: int) -> tuple[float, FloatArray]:
@@ -339,12 +327,12 @@ METHODS = {
     "exact": Method(ours("exact"), 1_000_000),
     "potpourri3d": Method(_potpourri3d, 1_250_000, "potpourri3d"),
     "libigl heat": Method(_libigl_heat, 1_250_000),
-    "MeshLab's front": Method(_front, 125_000, "pymeshlab", prepares=False),
+    "MeshLab's front": Method(_native("meshlab_front"), 125_000, "pymeshlab", prepares=False),
     "potpourri3d fast marching": Method(_fast_marching, 500_000, "potpourri3d"),
     "VTP": Method(lambda mesh: lambda source: vtp(mesh, source)[1], 500_000, "HEAT_IGL_VTP", prepares=False),
-    "pygeodesic": Method(_pygeodesic, 50_000, "pygeodesic", prepares=False),
-    "libigl exact": Method(_libigl_exact, 30_000, prepares=False),
-    "gdist": Method(_gdist, 50_000, "gdist", prepares=False),
+    "pygeodesic": Method(_native("pygeodesic_exact"), 50_000, "pygeodesic", prepares=False),
+    "libigl exact": Method(_native("igl_exact"), 30_000, prepares=False),
+    "gdist": Method(_native("gdist_exact"), 50_000, "gdist", prepares=False),
 }
 
 

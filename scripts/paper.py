@@ -175,18 +175,6 @@ def varadhan(i: int) -> Rows:
     return rows
 
 
-def graph_limit(i: int) -> Rows:
-    """Theorem 3.1: log u_t / log t against the number of edges phi."""
-    square = shapes.grid(i)
-    A = operators(square, "cotan").L
-    edges = baselines.graph_distance(square, 0, count_edges=True)
-    rows = []
-    for decades in (1, 10, 100, 1000, 10_000, 100_000):
-        off = np.abs(baselines.graph_limit(A, 0, -decades * np.log(10)) - edges)[1:] / edges[1:]
-        rows.append({"t": f"1e-{decades}", "largest |log u / log t - phi| / phi": float(off.max())})
-    return rows
-
-
 def small_steps(i: int) -> Rows:
     """Section 4.1: "approximately the combinatorial weighted distance for smaller values of t"."""
     square = shapes.grid(i)
@@ -365,7 +353,6 @@ def main(argv: Sequence[str] | None = None) -> None:
         f"Triangulation, i = {i}": lambda: triangulation(i),
         f"Signs and factors, i = {i}": lambda: signs(i),
         "Varadhan's factor": lambda: varadhan(40 if options.quick else 300),
-        f"Theorem 3.1, i = {i}": lambda: graph_limit(i),
         f"Small time steps, i = {i}": lambda: small_steps(i),
         "Growth": lambda: growth(times),
         "Accuracy": lambda: [accuracy(i) for i in ((5, 10, 20) if options.quick else (10, 30, 56, 100, 200))],

@@ -11,13 +11,13 @@ below.
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import heat_igl
 
@@ -29,12 +29,12 @@ KNOWN = {
     "test_point_cloud_vector_heat": "its points fill a cube: their triangles are no surface that could be oriented",
     "test_octree": "it fails with libigl 2.6.3 itself, whose marching_cubes returns another number of arrays",
 }
-# Run by the interpreter of the tests: puts the drop-in in the place of the library, and reports in JSON.
+# Run by the interpreter of the tests: puts the drop-in in the place of the library, and leaves out other tests.
 RUNNER = """
-import importlib, inspect, json, sys
+import importlib, inspect, sys
 import pytest
 
-name, path, words, out = sys.argv[1], sys.argv[2], json.loads(sys.argv[3]), sys.argv[4]
+name, path, out, *words = sys.argv[1:]
 module = importlib.import_module(f"heat_igl.compat.{name}")
 if name in sys.modules:  # libigl, whose submodules stay
     module.__path__ = sys.modules[name].__path__
@@ -44,38 +44,28 @@ if name == "pygeodesic":  # the drop-in stands for pygeodesic.geodesic
     sys.modules["pygeodesic.geodesic"] = module
 
 
-class Reports:
-    def __init__(self):
-        self.found = []
-
+class Chosen:
     def pytest_collection_modifyitems(self, items):
-        if words:
-            items[:] = [item for item in items if any(word in inspect.getsource(item.function) for word in words)]
-
-    def pytest_runtest_logreport(self, report):
-        if report.when == "call" or report.outcome != "passed":
-            crash = getattr(report.longrepr, "reprcrash", None)
-            said = crash.message.splitlines()[0] if crash else ""
-            self.found.append({"test": report.nodeid.split("::")[-1], "outcome": report.outcome, "said": said})
+        items[:] = [item for item in items if any(word in inspect.getsource(item.function) for word in words or [""])]
 
 
-reports = Reports()
-pytest.main(["-q", "-p", "no:cacheprovider", "-W", "ignore", path], plugins=[reports])
-json.dump(reports.found, open(out, "w"))
+pytest.main(["-q", "-p", "no:cacheprovider", "-W", "ignore", f"--junitxml={out}", path], plugins=[Chosen()])
 """
 
 
 def outcomes(name: str, path: Path, words: Sequence[str]) -> Iterator[Row]:
     """Test, outcome and message of every test in a file, with `heat_igl.compat.<name>` in the place of `name`."""
     with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "found.json"
-        command = [sys.executable, "-c", RUNNER, name, str(path), json.dumps(list(words)), str(out)]
+        out = Path(folder) / "found.xml"
         around = {**os.environ, "PYTHONPATH": str(Path(heat_igl.__file__).parents[1])}
+        command = [sys.executable, "-c", RUNNER, name, str(path), str(out), *words]
         done = subprocess.run(command, capture_output=True, text=True, cwd=path.parents[1], env=around)
         if not out.exists():
             raise RuntimeError(f"the tests of {path} did not run: {done.stderr.strip() or done.stdout.strip()}")
-        for each in json.loads(out.read_text(encoding="utf8")):
-            yield {"tests of": name, "reason": KNOWN.get(each["test"]) or f"not known: {each['said']}"} | each
+        for case in ElementTree.parse(out).iter("testcase"):
+            said = next((f"{each.tag}: {each.get('message')}".splitlines()[0] for each in case), "passed")
+            outcome, test = said.partition(":")[0].replace("failure", "failed"), str(case.get("name"))
+            yield {"tests of": name, "test": test, "outcome": outcome, "reason": KNOWN.get(test, f"not known, {said}")}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,13 +1,12 @@
 """Signed distance on surfaces and in space: errors from broken curves, circles and holed surfaces, and times.
 
-    python scripts/signed_table.py circles [--finest 160]        # circles against closed forms; how near 0 curves are
+    python scripts/signed_table.py circles [--finest 160]        # circles against closed forms
     python scripts/signed_table.py broken MESH ... [--cases 40]  # curves with gaps, beside potpourri3d
     python scripts/signed_table.py times MESH ... [--repeats 5]  # shares of potpourri3d's times
     python scripts/signed_table.py volumes [--points 33] [--boxes 14] [--holed 3]   # in space, from surfaces with holes
 
 circles: on a perturbed square, a sphere and a cylinder, each mesh with edges half as long as the one before: the mean
-error in percent of the mean distance, and the order to which it falls. Then the values at the middles of the segments,
-linear in each triangle, in mean edge lengths, in the root of the mean square.
+error in percent of the mean distance, and the order to which it falls.
 broken: a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
 curves removed in one to six pieces. Truth is exact distance from the whole curves with the sign of the function; errors
 are means over the vertices, as a share of the square root of the area inside, in percent.
@@ -43,7 +42,7 @@ from heat_igl import (
 from heat_igl.curves import sublevel_areas
 from heat_igl.typing import FloatArray
 
-from harness import Row, Table, as_they_are, collected, geometric_mean, named, paired, parsed, publish, ratio
+from harness import Row, as_they_are, collected, geometric_mean, named, paired, parsed, publish, ratio
 
 COARSEST = 20
 # A regular grid has edges in three directions, which heat prefers; a random move of the vertices, by this share of the
@@ -107,38 +106,6 @@ def circles(options: argparse.Namespace) -> Iterator[Row]:
                 row[name] = f"{error * (error > 1e-9):.2g}" + (f" ({order:.1f})" if order else "")
                 before[name] = error
             yield row
-
-
-def nearness(options: argparse.Namespace) -> Iterator[Row]:
-    """How near 0 the answers are on circles and on levels with bends; the largest of several cases."""
-    rng = np.random.default_rng(options.seed)
-    cases: dict[str, list[Case]] = {
-        "circle, square, n = 12": [on_plane(12, options.seed)],
-        "circle, square, n = 40": [on_plane(40, options.seed)],
-        "circle, sphere, n = 20": [on_sphere(20, options.seed)],
-    }
-    coarse = {"sphere": shapes.icosphere(3), "torus": shapes.torus(40, 20), "blob": shapes.blob(3)}
-    for name, mesh in coarse.items():
-        cases[f"levels, {name} of {mesh.n_vertices} vertices"] = [bent_level(mesh, rng) for _ in range(6)]
-    for name, each in cases.items():
-        row: Row = {"curves": name}
-        for level in ("none", "zero", None):
-            row[level or "default"] = max(
-                on_curves(m, c, SignedHeatSolver(m).distance(c, level=level)) for m, c, _ in each
-            )
-        yield row | ({"true distance": max(on_curves(*case) for case in each)} if name.startswith("circle") else {})
-
-
-def bent_level(mesh: Mesh, rng: np.random.Generator) -> Case:
-    values = np.sin(mesh.V @ rng.normal(size=(3, 5)) * 2 + rng.uniform(0, 6, 5)).sum(axis=1)
-    return mesh, isolines(mesh, values, float(np.quantile(values, 0.4)))[0], values
-
-
-def on_curves(mesh: Mesh, curves: Curves, values: FloatArray) -> float:
-    """Root mean square of values along curves, in mean edge lengths."""
-    middle = np.concatenate([np.einsum("sc,sc->s", (c.start + c.end) / 2, values[mesh.F[c.faces]]) for c in curves])
-    length = np.concatenate([curve.lengths(mesh) for curve in curves])
-    return float(np.sqrt(np.average(middle**2, weights=length)) / mesh.edge_lengths.mean())
 
 
 # Levels of random smooth functions, whole and broken.
@@ -342,11 +309,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         "volumes": lambda: volumes(options),
     }
     rows = collected(make[options.table]())
-    tables = {options.table: as_they_are(rows)}
-    if options.table == "circles":
-        columns = {key: f"{{{key}:.2g}}" for key in ("none", "zero", "default", "true distance")}
-        tables["nearness"] = Table(collected(nearness(options)), {"curves": "{curves}"} | columns)
-    publish(options, tables)
+    publish(options, {options.table: as_they_are(rows)})
 
 
 if __name__ == "__main__":
