@@ -58,13 +58,14 @@ def test_parcel_distances_are_those_of_the_full_matrix(cases, case):
 
 
 def test_parcel_distances_by_another_method():
-    mesh = shapes.icosphere(3)
-    labels = np.arange(mesh.n_vertices) % 3
-    rows = heat_igl.GeodesicSolver(mesh, method="sweep").distances(range(mesh.n_vertices))
-    expected = [[rows[np.ix_(labels == i, labels == j)].mean() for j in range(3)] for i in range(3)]
-    found = parcel_distances(mesh, labels, method="sweep")
-    np.testing.assert_allclose(found, np.add(expected, np.transpose(expected)) / 2, rtol=1e-12)
-    assert abs(found - parcel_distances(mesh, labels)).max() > 1e-6
+    mesh = shapes.icosphere(4)
+    labels = np.digitize(mesh.V[:, 2], [-0.7, 0.7])
+    parcels = [np.flatnonzero(labels == k) for k in range(3)]
+    rows = heat_igl.GeodesicSolver(mesh, method="sweep").distances(parcels)
+    expected = np.array([[row[parcel].min() for parcel in parcels] for row in rows])
+    found = parcel_distances(mesh, labels, statistic="min", method="sweep")
+    np.testing.assert_allclose(found, (expected + expected.T) / 2, rtol=1e-12)
+    assert 1e-6 < abs(found - parcel_distances(mesh, labels, statistic="min")).max() < 1e-2
 
 
 def test_parcels_on_other_components_are_infinitely_far():
