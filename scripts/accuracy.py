@@ -13,7 +13,7 @@ means over the shapes, the worst, and ratios to potpourri3d. A mesh that exact d
 fails, are listed with the reason.
 
 With ``--variants``, a row for each way, its geometric mean over the meshes, and that relative to potpourri3d's default,
-in the mean and at worst: the defaults of `HeatMethodSolver` are chosen by this table (docs/engines.md). With
+in the mean and at worst: the defaults of `HeatMethodSolver` are chosen by this table (docs/engines_theory.md). With
 ``--in-faces``, points are drawn in faces by area, compared with exact distance on the mesh with the point as a vertex,
 and beside them a corner of the same face; "corners" is the largest relative error there (docs/sources.md).
 """

@@ -1,7 +1,7 @@
 """Derivatives of distance: against central differences, the identities that they satisfy, and what they cost.
 
     python scripts/derivatives_table.py [--directions 20]      # generated shapes, in so many random directions
-    python scripts/derivatives_table.py bunny.obj cow.obj --docs docs/derivatives.md
+    python scripts/derivatives_table.py bunny.obj cow.obj --docs docs/derivatives_theory.md
 
 All vertices are moved by 0.01 edges first: in flat parts paths are equally long. Vertices at the cut locus are left
 out (k), which show by a second difference, and those that `inexact` lists (i).

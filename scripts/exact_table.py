@@ -1,6 +1,6 @@
 """Exact distance by windows: agreement with VTP, windows per edge and time, and what local queries cost.
 
-    python scripts/exact_table.py bunny.obj cow.obj --docs docs/exact.md    # 4 sources on each
+    python scripts/exact_table.py bunny.obj cow.obj --docs docs/exact_theory.md  # 4 sources on each
     python scripts/exact_table.py --shapes                 # generated shapes of 5000 to 130 000 vertices instead
     python scripts/exact_table.py --shapes --only "plane"  # some of them
     python scripts/exact_table.py --matrix 10000           # rows of the 5 % nearest vertices, into a store

@@ -104,11 +104,16 @@ class Table:
     text: str = ""
 
     def markdown(self) -> str:
-        """The sentence and the table; columns of words are flushed left."""
-        cells = [[_cell(form, row) for form in self.columns.values()] for row in self.rows]
+        """The sentence and the table; columns of words are flushed left, those without a value are left out."""
+        columns = {
+            head: form
+            for head, form in self.columns.items()
+            if not self.rows or any(_cell(form, row) != "-" for row in self.rows)
+        }
+        cells = [[_cell(form, row) for form in columns.values()] for row in self.rows]
         words = [any(re.match("[a-zA-Z`]", cell) for cell in column) for column in zip(*cells, strict=True)]
-        rule = ["---" if k == 0 or is_word else "---:" for k, is_word in enumerate(words or self.columns)]
-        lines = [f"| {' | '.join(self.columns)} |", f"|{'|'.join(rule)}|", *(f"| {' | '.join(row)} |" for row in cells)]
+        rule = ["---" if k == 0 or is_word else "---:" for k, is_word in enumerate(words or columns)]
+        lines = [f"| {' | '.join(columns)} |", f"|{'|'.join(rule)}|", *(f"| {' | '.join(row)} |" for row in cells)]
         return "\n".join([self.text, ""] * bool(self.text) + lines)
 
 

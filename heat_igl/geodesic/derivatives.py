@@ -3,7 +3,7 @@
 All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
 lengths lead paths (`heat_igl.windows.path_lengths`), from there to the edges of the mesh the flips
 (`heat_igl.intrinsic.length_derivatives`); the positions follow here.
-docs/derivatives.md derives each step.
+docs/derivatives_theory.md derives each step.
 """
 
 from __future__ import annotations

@@ -184,7 +184,8 @@ def _converted(mesh: MeshLike, F: ArrayLike | None) -> Mesh | PolygonMesh | Poin
         return Mesh(*mesh)
     if isinstance(mesh, np.ndarray):
         raise MeshError(
-            "faces F are missing: pass a mesh, positions V and faces F, or a pair (V, F); PointCloud(P) takes points"
+            "faces F are missing: pass a mesh, positions V and faces F, or a pair (V, F); PointCloud(P) takes points, "
+            "image_domain(mask) pixels, and terrain(heights) heights"
         )
     # In the wrapper of brainspace, whose other attributes may not be asked for by names that it does not know.
     mesh = getattr(mesh, "__dict__", {}).get("VTKObject", mesh)

@@ -17,8 +17,8 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 Boundary = Literal["neumann", "dirichlet", "average"]
 
-# Share of a front's rate of decay from which on a direction is trusted fully; docs/engines.md compares values. Fronts
-# of a fitted flow scatter less.
+# Share of a front's rate of decay from which on a direction is trusted fully; docs/engines_theory.md compares values.
+# Fronts of a fitted flow scatter less.
 _FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
 # At an insulated boundary a front meets the mirror image of itself and falls a little more slowly. A fitted flow is
 # damped there from this share of the rate; without damping a regular grid is 1.84 % wrong instead of 1.68.
@@ -245,7 +245,7 @@ def damping(
         Time step that the heat was made with.
     full_rate : float, optional
         Share of a front's rate from which on a direction is trusted fully: on a mesh, fronts scatter by some percent
-        around 1. 0.95 for a fitted flow and 0.9 else; docs/engines.md compares values.
+        around 1. 0.95 for a fitted flow and 0.9 else; docs/engines_theory.md compares values.
     fitted : bool
         Whether the heat comes from a fitted `HeatFlow`.
 

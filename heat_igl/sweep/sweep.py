@@ -1,7 +1,7 @@
 """`Sweep`: distance by unfolding two triangles at a time, in an order of the vertices that is found on the way.
 
 A vertex gets its distance from neighbours that are nearer to the source, by laying triangles out in the plane.
-docs/engines.md has the update and its error.
+docs/engines_theory.md has the update and its error.
 """
 
 from __future__ import annotations
