@@ -345,15 +345,6 @@ def test_places_within_runs_and_the_next_in_each_run() -> None:
     assert grouping.next_in_run(np.array([5, 6, 7, 8, 9, 4]), counts[counts > 0]).tolist() == [6, 5, 8, 9, 7, 4]
 
 
-def test_without_duplicate_faces_keeps_the_first_of_each():
-    V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
-    mesh = Mesh(V, [[0, 1, 2], [2, 1, 3], [1, 2, 0], [3, 2, 1], [2, 1, 3]])
-    reduced, kept = mesh.without_duplicate_faces()
-    assert kept.tolist() == [0, 1]
-    assert reduced.F.tolist() == [[0, 1, 2], [2, 1, 3]]
-    assert reduced.without_duplicate_faces()[0] is reduced
-
-
 # --- Arrays (m, 4): quadrilaterals are refused where tetrahedra are expected, and no tetrahedra are
 
 

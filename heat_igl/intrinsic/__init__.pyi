@@ -2,12 +2,14 @@ from heat_igl.intrinsic.delaunay import intrinsic_delaunay as intrinsic_delaunay
 from heat_igl.intrinsic.frame_axes import tangent_frames as tangent_frames
 from heat_igl.intrinsic.frames import TangentFrames as TangentFrames
 from heat_igl.intrinsic.frames import checked_vectors as checked_vectors
+from heat_igl.intrinsic.gluing import each_face_once as each_face_once
 from heat_igl.intrinsic.gluing import from_edge_lengths as from_edge_lengths
 from heat_igl.intrinsic.gluing import from_gluing as from_gluing
 from heat_igl.intrinsic.gluing import intrinsic_triangulation as intrinsic_triangulation
 from heat_igl.intrinsic.gluing import oriented as oriented
 from heat_igl.intrinsic.half_edges import HalfEdges as HalfEdges
 from heat_igl.intrinsic.half_edges import mollify as mollify
+from heat_igl.intrinsic.history import Change as Change
 from heat_igl.intrinsic.history import Covered as Covered
 from heat_igl.intrinsic.history import Flipped as Flipped
 from heat_igl.intrinsic.history import Merged as Merged

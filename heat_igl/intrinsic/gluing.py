@@ -9,7 +9,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError, real_numbers
 from heat_igl.intrinsic.half_edges import mollify
-from heat_igl.intrinsic.history import Turned
+from heat_igl.intrinsic.history import Merged, Turned
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, half_edge_head, half_edge_tail
 from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -135,6 +135,56 @@ def _require_one_length(lengths: FloatArray, a: IntArray, b: IntArray) -> None:
 def intrinsic_triangulation(mesh: Mesh, margin: float | None = None) -> IntrinsicTriangulation:
     """The triangles of `mesh` by their edge lengths; degenerate ones are mollified, see `mollify`."""
     return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets, margin)
+
+
+def each_face_once(triangulation: IntrinsicTriangulation) -> tuple[IntrinsicTriangulation, IntArray]:
+    """The triangulation with one of the faces that have all edges in common, the first.
+
+    No shortest path crosses from one of them to another.
+
+    Returns
+    -------
+    once : IntrinsicTriangulation
+        The faces that remain; `triangulation` itself if no face is there twice. Its history carries points.
+    kept : (k,) int64
+        Which these are, ascending.
+    """
+    F, m = triangulation.F, len(triangulation.F)
+    order = np.argsort(F, axis=1)
+    first, which, _ = connectivity.unique_rows(np.take_along_axis(F, order, axis=1), triangulation.n)
+    first = first[which]
+    # Edges of more than two faces were never flipped: among them, though not beside others, vertices tell one apart.
+    twin = np.take_along_axis(triangulation.twin.reshape(m, 3), order, axis=1)
+    is_many = twin == -2
+    has_edge_in_common = (is_many & is_many[first]) | (twin // 3 == first[:, None])
+    is_copy = has_edge_in_common.all(axis=1) & (first < np.arange(m))
+    kept = np.flatnonzero(~is_copy)
+    if len(kept) == m:
+        return triangulation, kept
+    stands = np.where(is_copy, first, np.arange(m))
+    corner = np.empty((m, 3), np.int64)
+    np.put_along_axis(corner, order, order[stands], axis=1)
+    half_edge = (3 * kept[:, None] + np.arange(3)).ravel()
+    new = np.full(3 * m + 2, -1)
+    new[half_edge], new[-2] = np.arange(len(half_edge)), -2
+    once = replace(
+        triangulation,
+        F=F[kept],
+        l=triangulation.l[kept],
+        twin=new[triangulation.twin[half_edge]],
+        aligned=triangulation.aligned[half_edge],
+        history=(*triangulation.history, Merged(np.searchsorted(kept, stands), corner)),
+    )
+    # Edges that have one or two faces now.
+    many = np.flatnonzero(once.twin == -2)
+    ends = np.sort(np.stack([once.tail(many), once.head(many)], axis=1), axis=1)
+    _, edge, count = connectivity.unique_rows(ends, once.n)
+    once.twin[many[count[edge] == 1]] = -1
+    many = many[np.argsort(edge, kind="stable")]
+    a, b = many[np.repeat(count, count) == 2].reshape(-1, 2).T
+    once.twin[a], once.twin[b] = b, a
+    once.aligned[a] = once.aligned[b] = once.tail(a) == once.head(b)
+    return once, kept
 
 
 def oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:

@@ -183,3 +183,7 @@ class Refined(NamedTuple):
         faces, barycentric = np.array(faces, np.int64), np.array(barycentric, np.float64, order="C")
         carrying.carry(*self, faces, barycentric)
         return faces, barycentric
+
+
+# How faces became others.
+Change = Merged | Turned | Covered | Flipped | Refined

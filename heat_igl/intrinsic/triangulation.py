@@ -13,7 +13,7 @@ from functools import cached_property
 import igl
 import numpy as np
 
-from heat_igl.intrinsic.history import Covered, Flipped, Merged, Refined, Turned
+from heat_igl.intrinsic.history import Change, Covered
 from heat_igl.intrinsic.layout import corner_angles
 from heat_igl.mesh import grouping
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -65,7 +65,7 @@ class IntrinsicTriangulation:
         Number of edges flipped so far.
     lengthening : float
         Largest length that `mollify` added to an edge; 0 unless a triangle was degenerate.
-    history : tuple of Merged, Turned, Covered, Flipped or Refined
+    history : tuple of Change
         The changes that led from the faces of the mesh to these faces, in order.
     """
 
@@ -76,7 +76,7 @@ class IntrinsicTriangulation:
     n: int
     n_flips: int = 0
     lengthening: float = 0.0
-    history: tuple[Merged | Turned | Covered | Flipped | Refined, ...] = ()
+    history: tuple[Change, ...] = ()
 
     @property
     def boundary(self) -> BoolArray:

@@ -202,20 +202,6 @@ class Mesh:
         moved._hold(positions, self.F)
         return moved
 
-    def without_duplicate_faces(self) -> tuple[Mesh, IntArray]:
-        """The mesh with one of the faces that have the same vertices, the first.
-
-        Returns
-        -------
-        mesh : Mesh
-            The same vertices; this mesh itself if no face is there twice.
-        kept : (k,) int64
-            The faces that remain, ascending.
-        """
-        repeated = connectivity.duplicate_faces(self.F, self.n_vertices)
-        kept = np.delete(np.arange(self.n_faces), repeated)
-        return (Mesh(self.V, self.F[kept]) if len(repeated) else self), kept
-
     def __repr__(self) -> str:
         kind = "tetrahedra" if self.is_tetrahedral else "triangles"
         return f"Mesh({self.n_vertices} vertices, {self.n_faces} {kind})"

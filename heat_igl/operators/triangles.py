@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from heat_igl.intrinsic import (
-    Merged,
+    Change,
+    each_face_once,
     has_nonmanifold_edges,
     intrinsic_delaunay,
     intrinsic_triangulation,
     tufted_cover,
 )
-from heat_igl.mesh import Mesh, PolygonFans, PolygonMesh, connectivity
+from heat_igl.mesh import Mesh, PolygonFans, PolygonMesh
 from heat_igl.operators.intrinsic import changed_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, OnLaplacian, Operators, check_laplacian
 from heat_igl.operators.simplices import cotan_operators, surface_operators
@@ -55,7 +54,7 @@ def operators(
     check_laplacian(laplacian)
     if mesh.is_tetrahedral:
         return cotan_operators(mesh, on_laplacian)
-    history: tuple[Merged, ...] = ()
+    history: tuple[Change, ...] = ()
     if laplacian != "cotan" and has_nonmanifold_edges(mesh):
         # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being manifold.
         mesh, history = _without_duplicates(mesh)
@@ -76,7 +75,7 @@ def operators(
 
 def tufted_operators(
     mesh: Mesh,
-    history: tuple[Merged, ...] = (),
+    history: tuple[Change, ...] = (),
     on_laplacian: OnLaplacian | None = None,
     laplacian: Laplacian = "intrinsic-delaunay",
 ) -> Operators:
@@ -106,21 +105,16 @@ def unfolding_surface(mesh: Mesh, margin: float | None = None) -> Surface:
 
     Triangles thinner than `margin` are mollified, see `mollify`.
     """
-    history: tuple[Merged, ...] = ()
+    history: tuple[Change, ...] = ()
     if has_nonmanifold_edges(mesh):
         mesh, history = _without_duplicates(mesh)
     faces = replace(intrinsic_triangulation(mesh, margin), history=history)
     return Surface(intrinsic_delaunay(faces), faces, V=mesh.V)
 
 
-def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Merged, ...]]:
+def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Change, ...]]:
     """The mesh with each face once, and which faces became which."""
-    reduced, kept = mesh.without_duplicate_faces()
-    if reduced is mesh:
+    faces, kept = each_face_once(intrinsic_triangulation(mesh))
+    if len(kept) == mesh.n_faces:
         return mesh, ()
-    ascending = np.argsort(mesh.F, axis=1)
-    first, inverse, _ = connectivity.unique_rows(np.take_along_axis(mesh.F, ascending, axis=1), mesh.n_vertices)
-    copied = first[inverse]
-    corner = np.empty_like(mesh.F)
-    np.put_along_axis(corner, ascending, ascending[copied], axis=1)
-    return reduced, (Merged(np.searchsorted(kept, copied), corner),)
+    return Mesh(mesh.V, mesh.F[kept]), faces.history

@@ -12,6 +12,7 @@ from heat_igl.intrinsic import (
     HalfEdges,
     IntrinsicTriangulation,
     Merged,
+    each_face_once,
     intrinsic_delaunay,
     intrinsic_triangulation,
     lay_out,
@@ -20,9 +21,9 @@ from heat_igl.intrinsic.half_edges import mean_exponent
 from heat_igl.intrinsic.triangulation import next_half_edge
 from heat_igl.kernels.mesh import numbering
 from heat_igl.kernels.windows.surface import shapes
-from heat_igl.mesh import Mesh, SurfacePoints, connectivity
+from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSegments
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 #: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
 #: `mollify`, paths across needles were up to 3e-4 of themselves too long.
@@ -220,48 +221,15 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> Tables:
     MeshError
         If there are too many triangles for 32-bit indices.
     """
-    once, kept, merged = _without_copies(triangulation)
+    # Windows would go on in every copy of a face, and multiply.
+    once, kept = each_face_once(triangulation)
     edges, number, face = HalfEdges.of(once).numbered(once.n)
-    located_in = replace(triangulation, history=(*triangulation.history, *merged))
-    return Tables(edges, number, kept[face], triangulation=located_in)
-
-
-def _without_copies(
-    given: IntrinsicTriangulation,
-) -> tuple[IntrinsicTriangulation, IntArray, tuple[Merged, ...]]:
-    """The triangulation with one of the faces that share all edges, which faces those are, and where points move.
-
-    No shortest path crosses from one of them to another, and windows would multiply.
-    """
-    F, m = given.F, len(given.F)
-    order = np.argsort(F, axis=1)
-    first, which, _ = connectivity.unique_rows(np.take_along_axis(F, order, axis=1), given.n)
-    first = first[which]
-    # Edges of more than two faces were never flipped: among them, though not beside others, vertices tell one apart.
-    twin = np.take_along_axis(given.twin.reshape(m, 3), order, axis=1)
-    is_many = twin == -2
-    is_shared = (is_many & is_many[first]) | (twin // 3 == first[:, None])
-    is_copy: BoolArray = is_shared.all(axis=1) & (first < np.arange(m))
-    kept = np.flatnonzero(~is_copy)
-    if len(kept) == m:
-        return given, kept, ()
-    stands = np.where(is_copy, first, np.arange(m))
-    corner = np.empty((m, 3), np.int64)
-    np.put_along_axis(corner, order, order[stands], axis=1)
-    half_edge = (3 * kept[:, None] + np.arange(3)).ravel()
-    new = np.full(3 * m + 2, -1)
-    new[half_edge], new[-2] = np.arange(len(half_edge)), -2
-    once = replace(given, F=F[kept], l=given.l[kept], twin=new[given.twin[half_edge]], aligned=given.aligned[half_edge])
-    # Edges that have one or two faces now.
-    many = np.flatnonzero(once.twin == -2)
-    ends = np.sort(np.stack([once.tail(many), once.head(many)], axis=1), axis=1)
-    _, edge, count = connectivity.unique_rows(ends, given.n)
-    once.twin[many[count[edge] == 1]] = -1
-    many = many[np.argsort(edge, kind="stable")]
-    a, b = many[np.repeat(count, count) == 2].reshape(-1, 2).T
-    once.twin[a], once.twin[b] = b, a
-    once.aligned[a] = once.aligned[b] = once.tail(a) == once.head(b)
-    return once, kept, (Merged(stands, corner),)
+    if once is not triangulation:
+        merged = once.history[-1]
+        assert isinstance(merged, Merged)
+        in_given = merged._replace(face=kept[merged.face])
+        triangulation = replace(triangulation, history=(*triangulation.history, in_given))
+    return Tables(edges, number, kept[face], triangulation=triangulation)
 
 
 def from_mesh(mesh: Mesh, start: int) -> Tables:
@@ -272,10 +240,9 @@ def from_mesh(mesh: Mesh, start: int) -> Tables:
     """
     edges, exponent = HalfEdges.of_mesh(mesh)
     if (edges.twin == -2).any():
-        # Windows would go on in every copy of a face, and multiply.
-        reduced, _ = mesh.without_duplicate_faces()
-        if reduced is not mesh:
-            return from_mesh(reduced, start)
+        _, kept = each_face_once(intrinsic_triangulation(mesh))
+        if len(kept) < mesh.n_faces:
+            return from_mesh(Mesh(mesh.V, mesh.F[kept]), start)
     if not edges.aligned.all():
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
     edges.flip(mesh.F, MARGIN)
