@@ -1,7 +1,7 @@
 from heat_igl.intrinsic.delaunay import intrinsic_delaunay as intrinsic_delaunay
-from heat_igl.intrinsic.frame_axes import tangent_frames as tangent_frames
 from heat_igl.intrinsic.frames import TangentFrames as TangentFrames
 from heat_igl.intrinsic.frames import checked_vectors as checked_vectors
+from heat_igl.intrinsic.frames import tangent_frames as tangent_frames
 from heat_igl.intrinsic.gluing import each_face_once as each_face_once
 from heat_igl.intrinsic.gluing import from_edge_lengths as from_edge_lengths
 from heat_igl.intrinsic.gluing import from_gluing as from_gluing

@@ -184,9 +184,9 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
     used, corners = np.unique(corners, return_inverse=True)
     corners = n + corners.reshape(n, -1)
     sides = _sides(dimension)[cells.sum(axis=1) % 2]
-    rim = np.take_along_axis(corners, sides.reshape(n, -1), axis=1).reshape(sides.shape)
+    outer = np.take_along_axis(corners, sides.reshape(n, -1), axis=1).reshape(sides.shape)
     centre = np.broadcast_to(np.arange(n)[:, None, None], (*sides.shape[:2], 1))
-    F = np.concatenate([centre, rim], axis=2).reshape(-1, dimension + 1)
+    F = np.concatenate([centre, outer], axis=2).reshape(-1, dimension + 1)
     V = np.concatenate([cells, np.stack(np.unravel_index(used, shape), axis=1) - 0.5]) * np.asarray(steps)
     return ImageDomain(Mesh(V[:, ::-1], F), index)
 

@@ -17,7 +17,7 @@ _FLAT = 1e-10
 
 
 def first_quadrilateral(V: FloatArray, F: IntArray) -> int | None:
-    """The first of the elements (m, 4) that look like quadrilaterals around their rims; None if they do not.
+    """The first of the elements (m, 4) that look like quadrilaterals, given by their corners in order; None if they do not.
 
     Neighbours in a mesh of tetrahedra have three vertices in common. Quadrilaterals have two in common, which follow
     one another in both, and are thin as tetrahedra. Elements without neighbours are quadrilaterals if all are planar.
@@ -56,7 +56,7 @@ def _thickness(V: FloatArray, F: IntArray) -> FloatArray:
 
 
 def _follow_one_another(F: IntArray, e: int, others: IntArray) -> bool:
-    """Whether the two vertices that element `e` shares with each of the others are neighbours around both rims."""
+    """Whether the two vertices that element `e` shares with each of the others follow one another in both."""
     for g in others.tolist():
         here, there = np.flatnonzero(np.isin(F[e], F[g])), np.flatnonzero(np.isin(F[g], F[e]))
         if np.diff(here)[0] == 2 or np.diff(there)[0] == 2:

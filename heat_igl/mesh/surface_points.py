@@ -247,11 +247,16 @@ def require_triangles(mesh: Mesh) -> None:
         raise SourceError("points on faces need triangles, but the mesh is tetrahedral")
 
 
+def require_faces(faces: IntArray, n_faces: int, place: str = "") -> None:
+    """Raise a `SourceError` if there is no such face; the message begins with `place` and names the first."""
+    outside = (faces < 0) | (faces >= n_faces)
+    if outside.any():
+        first = int(np.flatnonzero(outside)[0])
+        raise SourceError(f"{place}faces[{first}] = {faces[first]} is no face: indices run from 0 to {n_faces - 1}")
+
+
 def _in_space(mesh: MeshLike, faces: IntArray, barycentric: FloatArray) -> FloatArray:
     mesh = as_simplices(mesh)
     require_triangles(mesh)
-    outside = (faces < 0) | (faces >= mesh.n_faces)
-    if outside.any():
-        first = int(np.flatnonzero(outside)[0])
-        raise SourceError(f"faces[{first}] = {faces[first]} is no face: indices run from 0 to {mesh.n_faces - 1}")
+    require_faces(faces, mesh.n_faces)
     return np.asarray(np.einsum("kc,kcx->kx", barycentric, mesh.V[mesh.F[faces]]))

@@ -11,6 +11,7 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
 from heat_igl.mesh.projection import rows_in_space
+from heat_igl.mesh.surface_points import require_faces
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -137,7 +138,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
     points: list[tuple[IntArray, FloatArray, IntArray, FloatArray]] = []
     for i, (name, part) in enumerate(parts):
         if isinstance(part, OrientedPoints):
-            _check_faces(name, part.points.faces, mesh)
+            require_faces(part.points.faces, mesh.n_faces, f"{name}: ")
             label = np.full(len(part), i)
             points.append((part.points.faces, on_simplex(part.points.barycentric), label, part.normals))
         else:
@@ -153,7 +154,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
 def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
     """The segments of a curve or of the boundary of a region, without those of no length."""
     if isinstance(part, SurfaceCurve):
-        _check_faces(name, part.faces, mesh)
+        require_faces(part.faces, mesh.n_faces, f"{name}: ")
         start, end = on_simplex(part.start), on_simplex(part.end)
         kept = (start != end).any(axis=1)
         if not kept.any():
@@ -178,12 +179,3 @@ def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray
         np.concatenate([loop.start for loop in loops]),
         np.concatenate([loop.end for loop in loops]),
     )
-
-
-def _check_faces(name: str, faces: IntArray, mesh: Mesh) -> None:
-    outside = (faces < 0) | (faces >= mesh.n_faces)
-    if outside.any():
-        first = int(np.argmax(outside))
-        raise SourceError(
-            f"{name}: faces[{first}] = {faces[first]} is no face: indices run from 0 to {mesh.n_faces - 1}"
-        )

@@ -9,7 +9,8 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from heat_igl.errors import SourceError, real_numbers, refuse_masked
-from heat_igl.mesh import MeshPart, SurfaceCurve, SurfacePoints
+from heat_igl.mesh import ON_SIDE, MeshPart, SurfaceCurve, SurfacePoints
+from heat_igl.mesh.surface_points import require_faces
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 
@@ -120,8 +121,6 @@ def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntAr
 
 
 _ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask with one entry per vertex"
-# Barycentric coordinates below this are 0: the point lies on the edge, or in the vertex.
-_ON_RIM = 1e-12
 # At an offset, doubles may be so far apart in mean edge lengths: all distances beyond it are rounded by half of that.
 _COARSEST = 1e-3
 
@@ -357,10 +356,7 @@ class _Builder:
     def _check_faces(self, faces: IntArray) -> None:
         if self._F is None:
             raise SourceError("points and curves lie on triangles, and this domain has none: name vertices")
-        outside = (faces < 0) | (faces >= len(self._F))
-        if outside.any():
-            first = int(np.flatnonzero(outside)[0])
-            raise SourceError(f"faces[{first}] = {faces[first]} is no face: indices run from 0 to {len(self._F) - 1}")
+        require_faces(faces, len(self._F))
 
     def finish(self) -> SourceSet:
         points = self._points_in_faces() if self._points else NO_POINTS
@@ -400,7 +396,7 @@ class _Builder:
 
 def on_simplex(barycentric: FloatArray) -> FloatArray:
     """The same, with places that are as good as an edge or a vertex put there."""
-    kept = np.where(barycentric < _ON_RIM, 0.0, barycentric)
+    kept = np.where(barycentric < ON_SIDE, 0.0, barycentric)
     return np.asarray(kept / kept.sum(axis=1, keepdims=True))
 
 

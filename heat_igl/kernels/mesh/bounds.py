@@ -93,7 +93,7 @@ def shorten(
     order of the edges, the result is the same.
     """
     n: cython.Py_ssize_t = d.shape[0]
-    # A ring: no vertex waits twice, so n places suffice.
+    # A circular buffer: no vertex waits twice, so n places suffice.
     waiting: cython.int[::1] = np.empty(n, np.int32)
     given: cython.const[cython.double][::1] = np.array(d) if share > 0 else d
     is_waiting: cython.uchar[::1] = np.zeros(n, np.uint8)
