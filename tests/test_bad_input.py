@@ -210,46 +210,150 @@ def argument_cases() -> Iterator[Case]:
     yield from number_cases()
     yield from array_type_cases()
     yield from choice_cases()
-    ragged = [[1.0, 2.0], [3.0]]
-    rows: tuple[tuple[str, Callable[[heat_igl.Mesh], Any], str], ...] = (
+    for ask, pattern in REFUSED:
+        yield argument_case(pattern, ask, pattern, error="ValueError|SourceError|MeshError")
+    for name, ask in ACCEPTED.items():
+        yield argument_case(f"{name}, neighbour", ask)
+
+
+RAGGED = [[1.0, 2.0], [3.0]]
+CURVE = heat_igl.SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0], [0.2, 0.2, 0.6]])
+CENTRE = [[1 / 3] * 3]
+GRID = heat_igl.shapes.grid(4)
+TRIANGLE, SQUARE = [[0, 1, 2]], V4[[0, 1, 3, 2]]
+# What is asked of a sphere of 42 vertices and 80 faces, and how it is refused.
+REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
+    (lambda m: heat_igl.closest_points(m, [[0, 0, 1], [0, 1e200, 0]]), r"positions\[1\] .* too far"),
+    (lambda m: heat_igl.trace_geodesic(m, 0, (1, 0), 1e300), r"length is too long: 1e\+300"),
+    (lambda m: heat_igl.exp_map(m, 0, [[1, 0], [1e200, 0]]), r"vectors\[1\] is too long: 1e"),
+    (lambda m: heat_igl.exp_map(m, 0, RAGGED), "^vectors must be real numbers.*, not "),
+    (lambda m: heat_igl.trace_geodesic(m, 0, RAGGED, 1.0), "^direction must be real numbers.*, not "),
+    (lambda m: heat_igl.isolines(m, RAGGED, [0.5]), "^values must be real numbers.*, not "),
+    (lambda m: heat_igl.HeatMethodSolver(m).distances([0], dtype="float16"), "dtype must be float64 or"),
+    (lambda m: heat_igl.HeatMethodSolver(m).distances([0], out=3), r"out must be an array .*, not "),
+    (lambda m: heat_igl.HeatMethodSolver(m).distances(3), "source_sets must be .*: try distance"),
+    (lambda m: heat_igl.validate(m, 0, methods="heat"), "methods must be a sequence of methods"),
+    (lambda m: heat_igl.karcher_mean(m, [0, 1], p=65), "p must be a number from 1 to 64"),
+    (lambda m: heat_igl.PolygonMesh(m.V, 3), "polygons must be .*, not "),
+    (lambda _: heat_igl.PolygonMesh(SQUARE, []), "polygons is empty"),
+    (
+        lambda _: heat_igl.PolygonMesh(SQUARE, [[0, 1, 2, 3], [0, 1]]),
+        r"polygons\[1\] = \[0, 1\] needs three corners or more \(1 of 2",
+    ),
+    (
+        lambda _: heat_igl.PolygonMesh(SQUARE, [[0, 1, 2, 4]]),
+        r"polygons\[0\] = \[0, 1, 2, 4\] holds 4, which is no vertex",
+    ),
+    (
+        lambda _: heat_igl.PolygonMesh(SQUARE * 1e150, [[0, 1, 2, 3]]),
+        "outside what areas in double precision allow",
+    ),
+    # Points and curves on faces.
+    (lambda _: heat_igl.SurfacePoints([0], [[0.5, 0.5, 0.1]]), r"barycentric\[0\] .* must sum to 1, not 1.1"),
+    (lambda _: heat_igl.SurfacePoints([0, 0], [[1, 0, 0], [0.5, 0.7, -0.2]]), r"barycentric\[1\] .* not negative"),
+    (lambda _: heat_igl.SurfacePoints([0], [[np.nan, 0.5, 0.5]]), r"barycentric\[0\] .* finite"),
+    (lambda _: heat_igl.SurfacePoints([0], [[1, 0]]), r"barycentric must have shape \(1, 3\)"),
+    (lambda _: heat_igl.SurfacePoints([0.5], [[1, 0, 0]]), "faces must be one face index or more, not float64"),
+    (lambda _: heat_igl.SurfacePoints([], np.zeros((0, 3))), "faces must be one face index"),
+    (lambda _: heat_igl.SurfacePoints([0], "x"), "barycentric must be real numbers"),
+    (
+        lambda m: heat_igl.SurfacePoints([0, 80], CENTRE * 2).positions(m),
+        r"^faces\[1\] = 80 is no face: indices run from 0 to 79",
+    ),
+    (lambda _: heat_igl.curve_on(GRID, [[0, 0, 0]]), "two corners of a curve or more, not 1"),
+    (
+        lambda _: heat_igl.curve_on(GRID, np.ones((2, 4))),
+        r"positions must have shape \(k, 3\), a row for each, or .*, not \(2, 4\)",
+    ),
+    (
+        lambda _: heat_igl.curve_on(GRID, [[0, 0, 0], [1, np.nan, 0]]),
+        r"positions\[1\] = \[1.0, nan, 0.0\] is not finite",
+    ),
+    (lambda _: heat_igl.curve_on(GRID, [["a", 0, 0], [1, 0, 0]]), "positions must be real numbers"),
+    (lambda _: heat_igl.curve_on(GRID, [[0.5, 0.5, 0], [0.5, 0.5, 0]]), "all in one place"),
+    (
+        lambda _: heat_igl.curve_on(GRID, [[0.5, 0.5, 0], [0.5, 0.5, 2]]),
+        r"leaves the surface by .* on the line from positions\[0\].*tolerance is",
+    ),
+    (
+        lambda _: heat_igl.curve_on(GRID, [[0, 0, 0], [1, 0, 0], [1.2, 0.4, 0]], tolerance=0.1),
+        r"line from positions\[1\]",
+    ),
+    (lambda m: heat_igl.edge_curve(m, RAGGED), "^vertices must be an array, but rows"),
+    (
+        lambda _: heat_igl.edge_curve(GRID, [0, 1, 3]),
+        r"vertices\[1\] = 1 and the next, 3, are not joined by an edge",
+    ),
+    (lambda _: heat_igl.edge_curve(GRID, [0]), "vertices must be two vertex indices or more"),
+    (lambda _: heat_igl.edge_curve(GRID, [0, 99]), r"vertices\[0\] = 0 and the next, 99, are not"),
+    (lambda _: heat_igl.edge_curve(GRID, [0.0, 1.0]), "vertices must be two vertex indices or more, not float64"),
+    # Sources in faces, and with offsets.
+    (
+        lambda _: heat_igl.OffsetSources([0, 1], [0.0, -1.0]),
+        r"offsets\[1\] = -1.0 must be finite and not negative",
+    ),
+    (lambda _: heat_igl.OffsetSources([0, 1], [np.nan, 0.0]), r"offsets\[0\] = nan must be finite"),
+    (lambda _: heat_igl.OffsetSources([0, 1], np.inf), "offsets = inf must be finite"),
+    (lambda _: heat_igl.OffsetSources([0, 1], [[0.0, 1.0]]), r"one number or one for each .*, not of shape \(1, 2\)"),
+    (lambda _: heat_igl.OffsetSources([0, 1], "near"), "offsets must be real numbers, not 'near'"),
+    *(
+        (lambda m, sources=sources: heat_igl.geodesic_distance(m, sources), pattern)
+        for sources, pattern in (
+            (heat_igl.OffsetSources([0, 1], [0.0, 1.0, 2.0]), "offsets has 3 entries for 2 sources: give one for each"),
+            (heat_igl.OffsetSources([CURVE, 0], [1.0]), "offsets has 1 entries for 2 sources"),
+            (heat_igl.SurfacePoints([0, 83], CENTRE * 2), r"^faces\[1\] = 83 is no face: indices run from 0 to 79"),
+            (heat_igl.SurfaceCurve([-1], [[1, 0, 0]], [[0, 1, 0]]), r"^faces\[0\] = -1 is no face"),
+            ([CURVE, 42], r"sources\[1\]: sources\[0\] = 42 is no vertex"),
+            ([3, heat_igl.SurfacePoints([99], CENTRE)], r"sources\[1\]: faces\[0\] = 99 is no face"),
+            ([CURVE, None], r"sources\[1\]: sources must be a vertex index"),
+            ([CURVE, []], r"sources\[1\]: sources is empty"),
+        )
+    ),
+    # Edge lengths and gluing.
+    *(
+        (lambda _, given=given: heat_igl.HeatMethodSolver.from_edge_lengths(TRIANGLE, given), pattern)
+        for given, pattern in (
+            ([[1.0, 1.0]], r"one length per side of F, .* shape \(1, 2\)"),
+            ([[1.0, np.nan, 1.0]], r"l\[0, 1\] = nan is not a length"),
+            ([[1, 1, -1]], r"l\[0, 2\] = -1.0 is not a length"),
+        )
+    ),
+    *(
         (
-            "far positions",
-            lambda m: heat_igl.closest_points(m, [[0, 0, 1], [0, 1e200, 0]]),
-            r"positions\[1\] .* too far",
-        ),
-        ("endless line", lambda m: heat_igl.trace_geodesic(m, 0, (1, 0), 1e300), r"length is too long: 1e\+300"),
-        ("endless lines", lambda m: heat_igl.exp_map(m, 0, [[1, 0], [1e200, 0]]), r"vectors\[1\] is too long: 1e"),
-        ("vectors", lambda m: heat_igl.exp_map(m, 0, ragged), "^vectors must be real numbers.*, not "),
-        ("direction", lambda m: heat_igl.trace_geodesic(m, 0, ragged, 1.0), "^direction must be real numbers.*, not "),
-        ("values", lambda m: heat_igl.isolines(m, ragged, [0.5]), "^values must be real numbers.*, not "),
-        (
-            "vertices",
-            lambda m: heat_igl.edge_curve(m, ragged),
-            "^vertices must be an array, but rows",
-        ),
-        (
-            "dtype",
-            lambda m: heat_igl.HeatMethodSolver(m).distances([0], dtype="float16"),
-            "dtype must be float64 or",
-        ),
-        (
-            "out",
-            lambda m: heat_igl.HeatMethodSolver(m).distances([0], out=3),
-            r"out must be an array .*, not ",
-        ),
-        (
-            "sets",
-            lambda m: heat_igl.HeatMethodSolver(m).distances(3),
-            "source_sets must be .*: try distance",
-        ),
-        ("methods", lambda m: heat_igl.validate(m, 0, methods="heat"), "methods must be a sequence of methods"),
-        ("p", lambda m: heat_igl.karcher_mean(m, [0, 1], p=65), "p must be a number from 1 to 64"),
-        ("polygons", lambda m: heat_igl.PolygonMesh(m.V, 3), "polygons must be .*, not "),
-    )
-    for name, ask, pattern in rows:
-        yield argument_case(name, ask, pattern, error="ValueError|SourceError|MeshError")
-    yield argument_case("far positions, neighbour", lambda mesh: heat_igl.closest_points(mesh, [[0, 1e149, 0]]))
-    yield argument_case("long line, neighbour", lambda mesh: heat_igl.exp_map(mesh, 0, [[1e4, 0]]))
+            lambda _, twin=twin: heat_igl.HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=twin),
+            pattern,
+        )
+        for twin, pattern in (
+            ([[-1, 2, -1]], r"twin\[0, 1\] = 2 is no half-edge .* glued back to 1 \(1 entries"),
+            ([[0, 2, 1]], r"twin\[0, 0\] = 0 is no half-edge"),
+            ([[1, 0, -1]], r"twin\[0, 0\] = 1 is no half-edge that ends at the same vertices"),
+        )
+    ),
+    (
+        lambda _: heat_igl.HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]], laplacian="graph"),
+        "laplacian must be",
+    ),
+    # Tangent vectors.
+    (
+        lambda m: heat_igl.tangent_frames(m).to_world(np.ones((3, 2))),
+        r"vectors must have shape \(42, 2\), but it has shape \(3, 2\)",
+    ),
+    (
+        lambda m: heat_igl.tangent_frames(m).to_world([[0, 0], [np.nan, 0]], [0, 1]),
+        r"vectors\[1\] = \[nan, 0.0\] is not finite",
+    ),
+    (lambda m: heat_igl.tangent_frames(m).from_world(["a"], [0]), "vectors must be real numbers"),
+)
+ACCEPTED: dict[str, Callable[[heat_igl.Mesh], Any]] = {
+    "far positions": lambda m: heat_igl.closest_points(m, [[0, 1e149, 0]]),
+    "long line": lambda m: heat_igl.exp_map(m, 0, [[1e4, 0]]),
+    "polygons": lambda _: heat_igl.PolygonMesh(SQUARE, [[0, 1, 2, 3]]),
+    "last face": lambda m: heat_igl.SurfacePoints([0, 79], CENTRE * 2).positions(m),
+    "edge lengths": lambda _: heat_igl.HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]]),
+    "gluing": lambda _: heat_igl.HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]]),
+    "one tangent vector": lambda m: heat_igl.tangent_frames(m).to_world([1.0, 0], [0]),
+    "nested sources": lambda m: heat_igl.geodesic_distance(m, heat_igl.OffsetSources([CURVE, 41], [0.0, 1.0])),
+}
 
 
 # --- files, token by token --------------------------------------------------------------------------------------------

@@ -449,28 +449,6 @@ def test_a_curve_runs_through_its_corners():
     np.testing.assert_allclose(curve.lengths(MESH), [np.sqrt(20), np.sqrt(40)])
 
 
-@pytest.mark.parametrize(
-    ("faces", "barycentric", "message"),
-    [
-        ([0], [[0.5, 0.5, 0.1]], r"barycentric\[0\] .* must sum to 1, not 1.1"),
-        ([0, 0], [[1, 0, 0], [0.5, 0.7, -0.2]], r"barycentric\[1\] .* not negative"),
-        ([0], [[np.nan, 0.5, 0.5]], r"barycentric\[0\] .* finite"),
-        ([0], [[1, 0]], r"shape \(1, 3\)"),
-        ([0.5], [[1, 0, 0]], "faces must be one face index or more, not float64"),
-        ([], np.zeros((0, 3)), "faces must be one face index"),
-        ([0], "x", "real numbers"),
-    ],
-)
-def test_wrong_coordinates_are_refused(faces, barycentric, message):
-    with pytest.raises(SourceError, match=message):
-        SurfacePoints(faces, barycentric)
-
-
-def test_a_face_out_of_range_is_refused():
-    with pytest.raises(SourceError, match=r"faces\[1\] = 2 is no face: indices run from 0 to 1"):
-        SurfacePoints([0, 2], [[1, 0, 0], [1, 0, 0]]).positions(MESH)
-
-
 # --- projection
 
 
@@ -561,23 +539,6 @@ def test_positions_in_the_plane():
     np.testing.assert_allclose(curve_on(mesh, at).positions(mesh)[[0, -1]], np.pad(at, ((0, 0), (0, 1))), atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("positions", "options", "message"),
-    [
-        ([[0, 0, 0]], {}, "two corners of a curve or more, not 1"),
-        ([[0] * 4, [1] * 4], {}, r"positions must have shape \(k, 3\), a row for each, or .*, not \(2, 4\)"),
-        ([[0, 0, 0], [1, np.nan, 0]], {}, r"positions\[1\] = \[1.0, nan, 0.0\] is not finite"),
-        ([["a", 0, 0], [1, 0, 0]], {}, "positions must be real numbers"),
-        ([[0.5, 0.5, 0], [0.5, 0.5, 0]], {}, "all in one place"),
-        ([[0.5, 0.5, 0], [0.5, 0.5, 2]], {}, r"leaves the surface by .* on the line from positions\[0\].*tolerance is"),
-        ([[0, 0, 0], [1, 0, 0], [1.2, 0.4, 0]], {"tolerance": 0.1}, r"line from positions\[1\]"),
-    ],
-)
-def test_refused_polylines(positions, options, message):
-    with pytest.raises(SourceError, match=message):
-        curve_on(shapes.grid(4), positions, **options)
-
-
 def test_a_jump_between_two_sheets_is_refused():
     """Between two parallel sheets the closest point jumps from one to the other."""
     sheet = shapes.grid(4)
@@ -600,17 +561,3 @@ def test_a_polyline_over_a_valley_is_led_through_it():
     curve = curve_on(valley, [[-0.4, 0.3, 0.45], [0.0, 0.4, 0.1], [0.4, 0.5, 0.45]], tolerance=0.12)
     assert_connected(valley, curve)
     assert curve.points[:, 2].min() == pytest.approx(0, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("vertices", "message"),
-    [
-        ([0, 1, 3], r"vertices\[1\] = 1 and the next, 3, are not joined by an edge"),
-        ([0], "vertices must be two vertex indices or more"),
-        ([0, 99], r"vertices\[0\] = 0 and the next, 99, are not"),
-        ([0.0, 1.0], "vertices must be two vertex indices or more, not float64"),
-    ],
-)
-def test_refused_edges(vertices, message):
-    with pytest.raises(SourceError, match=message):
-        edge_curve(shapes.grid(4), vertices)

@@ -15,7 +15,6 @@ from heat_igl import (
     GeodesicSolver,
     HeatMethodSolver,
     Mesh,
-    MeshError,
     OffsetSources,
     SourceError,
     SurfaceCurve,
@@ -95,39 +94,6 @@ def test_offsets_add_up_through_nested_sources():
     # Of a vertex that is named twice, the smaller offset counts.
     twice = source_set(OffsetSources([2, 2], [0.5, 0.25]), 5, F)
     assert (twice.vertices.tolist(), twice.vertex_offset.tolist(), twice.vertex_label.tolist()) == ([2], [0.25], [1])
-
-
-@pytest.mark.parametrize(
-    ("offsets", "message"),
-    [
-        ([0.0, -1.0], r"offsets\[1\] = -1.0 must be finite and not negative"),
-        ([np.nan, 0.0], r"offsets\[0\] = nan must be finite"),
-        (np.inf, "offsets = inf must be finite"),
-        ([[0.0, 1.0]], r"one number or one for each source, not of shape \(1, 2\)"),
-        ("near", "offsets must be real numbers, not 'near'"),
-    ],
-)
-def test_refused_offsets(offsets, message):
-    with pytest.raises(SourceError, match=message):
-        OffsetSources([0, 1], offsets)
-
-
-@pytest.mark.parametrize(
-    ("sources", "message"),
-    [
-        (OffsetSources([0, 1], [0.0, 1.0, 2.0]), "offsets has 3 entries for 2 sources: give one for each"),
-        (OffsetSources([CURVE, 0], [1.0]), "offsets has 1 entries for 2 sources"),
-        (SurfacePoints([0, 3], np.tile(CENTRE, (2, 1))), r"faces\[1\] = 3 is no face: indices run from 0 to 2"),
-        (SurfaceCurve([-1], [[1, 0, 0]], [[0, 1, 0]]), r"faces\[0\] = -1 is no face"),
-        ([CURVE, 7], r"sources\[1\]: sources\[0\] = 7 is no vertex"),
-        ([3, SurfacePoints([9], CENTRE)], r"sources\[1\]: faces\[0\] = 9 is no face"),
-        ([CURVE, None], r"sources\[1\]: sources must be a vertex index"),
-        ([CURVE, []], r"sources\[1\]: sources is empty"),
-    ],
-)
-def test_refused_places(sources, message):
-    with pytest.raises(SourceError, match=message):
-        source_set(sources, 5, F)
 
 
 def test_only_triangles_hold_points():
@@ -512,21 +478,6 @@ def test_edge_lengths_of_no_embedding(method):
     row, column = np.divmod(np.arange(24 * 24), 24)
     truth = np.hypot(*(np.minimum(k, 24 - k) / 24 for k in (row, column)))
     assert mean_error(solver.distance(0), truth) < (0.03 if method == "heat" else 1e-3)
-
-
-@pytest.mark.parametrize(
-    ("F", "lengths", "options", "message"),
-    [
-        ([[0, 1, 2]], [[1, 1, -1]], {}, r"l\[0, 2\] = -1.0 is not a length"),
-        ([[0, 1, 2]], [[1, 1, np.nan]], {}, r"l\[0, 2\] = nan is not a length"),
-        ([[0, 1, 2]], [[1, 1]], {}, "one length per side of F"),
-    ],
-)
-def test_refused_edge_lengths(F, lengths, options, message):
-    with pytest.raises(MeshError, match=message):
-        HeatMethodSolver.from_edge_lengths(F, lengths, **options)
-    with pytest.raises(ValueError, match="laplacian must be"):
-        HeatMethodSolver.from_edge_lengths([[0, 1, 2]], [[1, 1, 1]], laplacian="graph")
 
 
 def test_depth_in_a_ball():

@@ -17,7 +17,7 @@ _FLAT = 1e-10
 
 
 def first_quadrilateral(V: FloatArray, F: IntArray) -> int | None:
-    """The first of the elements (m, 4) that look like quadrilaterals, given by their corners in order; None if they do not.
+    """The first of the elements (m, 4) that look like quadrilaterals with their corners in order; None if they do not.
 
     Neighbours in a mesh of tetrahedra have three vertices in common. Quadrilaterals have two in common, which follow
     one another in both, and are thin as tetrahedra. Elements without neighbours are quadrilaterals if all are planar.
