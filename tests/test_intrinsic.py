@@ -848,12 +848,6 @@ def test_graphs_with_points_on_edges_against_known_distances():
         assert error_in_percent(distance, truth) < 2e-3
 
 
-def test_fan_of_five_triangles():
-    fan = fan_of_five(5)
-    sources = sample_sources(fan, 5)
-    assert heat_error(fan, sources, book_distance(fan, 5, sources)) < 0.03
-
-
 def test_undivided_fan():
     """From each tip the edge leads straight to every other, though the cover glues a triangle to two of the others."""
     fan = fan_of_five(0)
