@@ -6,7 +6,7 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corn
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.flipping import FLIP
-from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge, twice_area
+from cython.cimports.heat_igl.kernels.mesh.triangles import area, next_half_edge, previous_half_edge
 from cython.cimports.libc.math import sqrt
 
 
@@ -85,7 +85,7 @@ class Flips:
     def measure(self, f: cython.int) -> cython.void:
         """The area of a face, and which angles are obtuse: the terms are those of `improves`."""
         h: cython.int = 3 * f
-        self.area[f] = twice_area(self.length[h], self.length[h + 1], self.length[h + 2])
+        self.area[f] = 2.0 * area(self.length[h], self.length[h + 1], self.length[h + 2])
         a: cython.double = self.length[h] * self.length[h]
         b: cython.double = self.length[h + 1] * self.length[h + 1]
         c: cython.double = self.length[h + 2] * self.length[h + 2]
@@ -138,7 +138,7 @@ class Flips:
         x = 0.5 * ((pa - bp) * (pa + bp) - (aq - qb) * (aq + qb)) / ab
         y = (self.area[f] + self.area[g]) / ab
         self.diagonal = sqrt(x * x + y * y)
-        return twice_area(pa, aq, self.diagonal) > 0.0 and twice_area(qb, bp, self.diagonal) > 0.0
+        return area(pa, aq, self.diagonal) > 0.0 and area(qb, bp, self.diagonal) > 0.0
 
     def flip(self, h: cython.int) -> cython.int:
         """Flip the edge of half-edge h, and let the four edges around it wait."""

@@ -12,13 +12,6 @@ cdef inline double foot(double base, double left, double right) noexcept nogil:
     # How far along its base, from the end of the side `left`, the apex of a triangle lies.
     return 0.5 * (base + (left - right) * ((left + right) / base))
 
-cdef inline double twice_area(double a, double b, double c) noexcept nogil:
-    # Twice the area of a triangle by its sides: Heron's formula as a product of differences, which needles need. Faster
-    # than `area`, which keeps more digits.
-    cdef double s = 0.5 * (a + b + c)
-    cdef double product = s * (s - a) * (s - b) * (s - c)
-    return 2.0 * sqrt(product) if product > 0.0 else 0.0
-
 cdef inline double area(double a, double b, double c) noexcept nogil:
     # Area of a triangle by its sides in Kahan's order of operations, which keeps all digits of needles (Kahan 2014).
     cdef double swapped
