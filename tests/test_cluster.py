@@ -244,19 +244,6 @@ def test_a_group_that_a_crash_left_half_made_is_made_anew(client, tmp_path):
         np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
 
 
-@pytest.mark.parametrize("file", ["zarr.json", "distance/zarr.json", "source_vertex/c/0", "source_row/zarr.json"])
-@pytest.mark.parametrize("is_lost", [True, False])
-def test_a_group_that_cannot_be_read_is_made_anew(client, tmp_path, file, is_lost):
-    store = tmp_path / "store"
-    whole = cluster.distances({"fan": FAN}, [0, 4], store, client=client)
-    Store(store).update("fan", {"status": "running"})
-    path = store / "fan" / file
-    path.unlink() if is_lost else path.write_bytes(b"half of it")
-    assert cluster.distances({"fan": FAN}, [0, 4], store, client=client) == whole
-    np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["source_vertex"][:], [0, 4])
-    np.testing.assert_array_equal(zarr.open_group(store / "fan", mode="r")["distance"][:], expected(FAN, [0, 4]))
-
-
 def test_the_format_of_a_store_is_one_that_can_be_read(client, tmp_path):
     store = tmp_path / "store"
     cluster.distances({"fan": FAN}, [0, 4], store, client=client)

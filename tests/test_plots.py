@@ -12,7 +12,7 @@ import heat_igl
 from heat_igl import shapes
 from heat_igl.drawing import camera, figure, raster, shading
 from heat_igl.drawing.line_drawing import write_line_drawing
-from heat_igl.drawing.plots import Picture, picture, plot, plot_field, plot_labels
+from heat_igl.drawing.plots import Picture, plot, plot_field, plot_labels
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK
 from heat_igl.drawing.surface_image import LINE
 
@@ -298,7 +298,7 @@ def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_pat
     drawn = plot(mesh, x)
     for suffix, start in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
         path, again = tmp_path / f"a{suffix}", tmp_path / f"b{suffix}"
-        picture(path, mesh, x)
+        plot(mesh, x).save(path)
         assert path.read_bytes().startswith(start)
         drawn.save(again)
         assert path.read_bytes() == again.read_bytes()

@@ -3,9 +3,7 @@ from heat_igl.drawing.output import PICTURE_SUFFIXES as PICTURE_SUFFIXES
 from heat_igl.drawing.plots import Page as Page
 from heat_igl.drawing.plots import Picture as Picture
 from heat_igl.drawing.plots import page as page
-from heat_igl.drawing.plots import picture as picture
 from heat_igl.drawing.plots import plot as plot
 from heat_igl.drawing.plots import plot_field as plot_field
 from heat_igl.drawing.plots import plot_labels as plot_labels
-from heat_igl.drawing.plots import write_html as write_html
 from heat_igl.drawing.plots import write_line_drawing as write_line_drawing

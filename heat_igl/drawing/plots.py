@@ -16,10 +16,8 @@ b'PNG'
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -36,7 +34,7 @@ from heat_igl.sources import Sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 __all__ = [
-    "Page", "Picture", "page", "picture", "plot", "plot_field", "plot_labels", "write_html", "write_line_drawing",
+    "Page", "Picture", "page", "plot", "plot_field", "plot_labels", "write_line_drawing",
 ]  # fmt: skip
 
 # Of matplotlib's "tab10".
@@ -215,16 +213,6 @@ def plot_labels(
         if not isinstance(mesh, PointCloud):  # whose discs have one label each
             seen = replace(seen, borders=_borders(seen, given, measured / seen.unit))
     return lay_out(seen, _lines_in_space(mesh, curves, seen), "plain", table, "", "no label")
-
-
-def picture(path: str | os.PathLike[str], mesh: MeshLike, distance: ArrayLike, **options: Any) -> None:
-    """Draw a distance and write the picture to `path`: `plot` with the same options, then `Picture.save`."""
-    plot(mesh, distance, **options).save(path)
-
-
-def write_html(path: str | os.PathLike[str], mesh: MeshLike, distance: ArrayLike, **options: Any) -> None:
-    """Write an interactive page to `path`: `page` with the same options, then `Page.save`."""
-    page(mesh, distance, **options).save(path)
 
 
 def _borders(seen: Scene, labels: IntArray, distance: FloatArray) -> FloatArray:
