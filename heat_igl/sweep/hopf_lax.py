@@ -15,6 +15,10 @@ from heat_igl.typing import AnyArray, FloatArray
 
 # How far distances settle before they are differentiated, so that the facets are those of the fixed point.
 _SETTLED = 0.9e-9
+# How far the square of distance may bend where it falls below both ends of an edge, over that from one point. Without a
+# bound, vertices that rest on each other lower each other: up to 36 % too short on discs with fibres twisted to 1:102.
+# With 1.5 no more than 17 %, and with 1 mean errors of smooth fields double.
+_BEND = 1.5
 
 
 class HopfLaxEngine(SimplexEngine):
@@ -38,9 +42,10 @@ class HopfLaxEngine(SimplexEngine):
         mean = squares[:, 0] if squares.shape[1] == 1 else squares.mean(axis=1)
         shorter = squares / np.where(mean > 0, mean, np.inf)[:, None]
         slack = np.sqrt(np.where(mean[:, None] > 0, shorter, 1.0).min(axis=(1, 2, 3)))
+        self._bend = _most_bend(mean, ((X[:, :, None] - X[:, None]) ** 2).sum(axis=3))
         self._in_metric = (
             squares,
-            *map(np.ascontiguousarray, (mean, squares.max(axis=(1, 2, 3)), slack, gradient, place)),
+            *map(np.ascontiguousarray, (mean, squares.max(axis=(1, 2, 3)), slack, self._bend, gradient, place)),
         )
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:  # noqa: ARG002
@@ -60,4 +65,17 @@ class HopfLaxEngine(SimplexEngine):
         """The distance from source vertices with its derivative."""
         distance, label = self._begun(sources)
         found = self._found(sources.vertex_offset, distance, label, _SETTLED)
-        return FixedPointDerivative(self._simplices, sources, self.distance(sources), distance, label, *found)
+        answer = self.distance(sources)
+        return FixedPointDerivative(self._simplices, sources, answer, self._bend, distance, label, *found)
+
+
+def _most_bend(mean: FloatArray, place: FloatArray) -> FloatArray:
+    """How far (m,) the square of distance bends at most on the edges of each simplex, in their squared lengths.
+
+    As that from one point, and more where waves come from a slower metric; by powers of two, which do not change
+    when tensors change a little. `mean` and `place` (m, p + 1, p + 1) are squared lengths in the metric and in space.
+    """
+    edges = (squares[:, 1:, :1] + squares[:, :1, 1:] - squares[:, 1:, 1:] for squares in (mean, place))
+    one, other = (np.linalg.slogdet(products)[1] for products in edges)
+    log = (one - other) / (mean.shape[1] - 1)
+    return np.asarray(_BEND * 2.0 ** np.round((log.max() - log) / np.log(2)))

@@ -69,11 +69,15 @@ class _FacetUpdate:
         Whether two corners have their distance from one source.
     share : (k, p) float64
         The place on the facet; corners of share 0 keep it.
+    bend : (k,) float64
+        How far the square of distance may bend where it falls below both ends of an edge, in its squared length.
     """
 
-    def __init__(self, is_sloped: BoolArray, is_new: BoolArray, same: BoolArray, share: FloatArray) -> None:
+    def __init__(
+        self, is_sloped: BoolArray, is_new: BoolArray, same: BoolArray, share: FloatArray, bend: FloatArray
+    ) -> None:
         self._is_trusted, self._same = is_sloped & is_new, same & is_sloped[:, :, None] & is_sloped[:, None]
-        self.share = share.copy()
+        self.share, self._bend = share.copy(), bend
 
     def place(self, at: _Inputs) -> None:
         """Move the places to where values are least, by Newton's method; shares that come to 0 stay."""
@@ -181,6 +185,9 @@ class _FacetUpdate:
                     for d, g in zip((Di, Dj), edge, strict=True)
                 )
                 sag = _smaller(sag, _smaller(rise + from_i, from_j - rise) - level)
+                base = product[:, :, i, i] + product[:, :, j, j] - 2 * product[:, :, i, j]
+                base = np.take_along_axis(base, np.real(base).argmax(axis=1)[:, None], axis=1)[:, 0]
+                sag = _smaller(sag, _larger(self._bend * base, _size(rise)) - level)
                 sag = _larger(sag, _larger(rise - from_i, -from_j - rise) - level)
                 result[:, i, j] = result[:, j, i] = np.where(doubted | flat | ~self._same[:, i, j], 0, sag)
         return result
@@ -288,6 +295,8 @@ class FixedPointDerivative(SimplexDerivative):
         Vertices.
     answer : (n,) float64
         The distance that the engine gives.
+    bend : (m,) float64
+        As for `HopfLax`.
     distance, label, facet, place, slope, is_sloped
         What `HopfLax` found before bounds were kept.
     """
@@ -297,6 +306,7 @@ class FixedPointDerivative(SimplexDerivative):
         simplices: MetricSimplices,
         sources: SourceSet,
         answer: FloatArray,
+        bend: FloatArray,
         distance: FloatArray,
         label: IntArray,
         facet: IntArray,
@@ -318,7 +328,8 @@ class FixedPointDerivative(SimplexDerivative):
         same = labels[:, :, None] == labels[:, None]
         through = simplices.corners[facet // size] * (facet >= 0)[:, None] - (facet < 0)[:, None]
         is_new = (through[self._vertices[:, 1:]] != v[:, None, None]).all(axis=2)
-        self._update = _FacetUpdate(is_sloped[self._vertices[:, 1:]].astype(bool), is_new, same, place[v])
+        is_known = is_sloped[self._vertices[:, 1:]].astype(bool)
+        self._update = _FacetUpdate(is_known, is_new, same, place[v], bend[self._simplex])
         self._rank = np.empty(n, np.int64)
         self._rank[np.argsort(distance, kind="stable")] = np.arange(n)
         self._state = np.concatenate([distance[:, None], slope], axis=1)

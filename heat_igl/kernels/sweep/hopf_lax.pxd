@@ -47,6 +47,7 @@ cdef class HopfLax(Facet):
     cdef double[:, ::1] place
     cdef double[::1] widest
     cdef double[::1] slack
+    cdef double[::1] bend
     # The corners of the facet in the simplex.
     cdef int side[3]
 

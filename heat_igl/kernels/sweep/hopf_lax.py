@@ -47,16 +47,18 @@ class HopfLax(Facet):
         The mean of these over the metrics.
     widest, slack : (m,) float64
         The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
+    bend : (m,) float64
+        How far, in squared lengths of an edge, the square of T may bend where it falls below both ends of the edge.
     gradient : (m, p + 1, 3) float64
         Of the barycentric coordinates of each simplex.
     V : (n, 3) float64
         Positions.
     """
 
-    def __init__(self, corners, first, incident, squares, mean, widest, slack, gradient, V):
+    def __init__(self, corners, first, incident, squares, mean, widest, slack, bend, gradient, V):
         self.corners, self.first, self.incident, self.squares = corners, first, incident, squares
         self.mean, self.widest, self.slack, self.gradient, self.V = mean, widest, slack, gradient, V
-        self.p, self.q = corners.shape[1] - 1, squares.shape[1]
+        self.bend, self.p, self.q = bend, corners.shape[1] - 1, squares.shape[1]
         self.unit = sqrt(np.mean(widest))
 
     def first_order(self, d, label, offset):
@@ -472,6 +474,11 @@ class HopfLax(Facet):
         from_j: cython.double = 2.0 * Dj * sqrt(self.squares[s, at, self.side[i], self.side[j]])
         most: cython.double = min(rise + from_i, from_j - rise) - level
         least: cython.double = max(rise - from_i, -from_j - rise) - level
+        base: cython.double = 0.0
+        for k in range(self.q):
+            base = max(base, self.squares[s, k, self.side[i], self.side[j]])
+        # Where T falls below both ends, vertices that rest on each other would lower each other.
+        most = min(most, max(self.bend[s] * base, fabs(rise)) - level)
         return max(min(sag, most), least)
 
     def trust(self, s: cython.int, c: cython.int, i: cython.int) -> cython.double:
