@@ -41,7 +41,6 @@ from heat_igl import (
     shapes,
     tangent_frames,
 )
-from heat_igl.mesh.cloud_orientation import doubtful_points
 from heat_igl.typing import FloatArray, IntArray
 
 from harness import Query, Row, Table, collected, drawn, mean_error, on_sphere, parsed, publish, seconds
@@ -101,8 +100,8 @@ def _surface(P: FloatArray) -> tuple[IntArray, str]:
     cloud = PointCloud(P)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        surface, is_beside = cloud._made
-    return doubtful_points(surface, is_beside, with_folds=False), "*" * bool(caught)
+        _, doubtful = cloud._made
+    return doubtful, "*" * bool(caught)
 
 
 METHODS: dict[str, Callable[[FloatArray], Query]] = {
@@ -168,14 +167,15 @@ def scans(options: argparse.Namespace) -> Iterator[Row]:
             P, truth = SHAPES[shape](5 * n if name.startswith("density") else n, rng)
             points, kept = scan(P, rng)
             sources = rng.choice(len(kept), options.sources, replace=False)
-            row[shape] = {"warned": _surface(points)[1]}
+            row[shape] = {"warned": _surface(points)[1], "missing": 0}
+            exact = {i: truth(int(kept[i]))[kept] for i in sources.tolist()}
             for method in ("default", "potpourri3d", "graph"):
                 query, errors = (_graph if method == "graph" else METHODS[method])(points), []
-                for i in sources.tolist():
-                    exact, found = truth(int(kept[i]))[kept], query(i)[: len(kept)]
-                    there = (exact > 0) & np.isfinite(found)
-                    errors.append(np.mean(np.abs(found - exact)[there] / exact[there]))
-                    row[shape]["missing"] = max(row[shape].get("missing", 0), int((~np.isfinite(found)).sum()))
+                for i in exact:
+                    found = query(i)[: len(kept)]
+                    there = (exact[i] > 0) & np.isfinite(found)
+                    errors.append(np.mean(np.abs(found - exact[i])[there] / exact[i][there]))
+                    row[shape]["missing"] = max(row[shape]["missing"], int((~np.isfinite(found)).sum()))
                 row[shape][method] = 100 * float(np.mean(errors))
         yield row
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.cloud_triangles import FOLDED_BACK, pinched_vertices, with_fans_joined, with_one_fan
+from heat_igl.mesh.cloud_triangles import FOLDED_BACK, at_all_corners, pinched_vertices, with_fans_joined, with_one_fan
 from heat_igl.mesh.connectivity import facets
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.mesh import Mesh
-from heat_igl.runtime import warn_caller
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 # Share of the triangles that may be left out for the others to be oriented alike. Clouds of scans had up to 0.0012; at
@@ -26,18 +24,14 @@ _NO_FOLD = -0.99
 # 100, 100, 87, 72 and 64 % of the triangles are oriented as on the mesh with 2, and 88, 100, 100, 88, 76 and 67 % with
 # 4; 6 is within 1 % of both in the mean, and 1 and 3 are down to 58 % on the teapot.
 _POWER, _LEAST_WEIGHT = 2, 1e-3
-# Share of doubtful points, without folds, above which clouds warn. On the vertices of 15 meshes of which distance is at
-# most 0.5 % wrong in the mean it is at most 0.0017, on random points with outliers 0.004, and from 0.007 on where parts
-# are joined or torn.
-_MOST_DOUBTFUL = 0.005
-# A border is torn where one of so many nearest points is more than so many edges away.
-_NEAREST, _EDGES_AWAY = 12, 4
+# So many edges away from its nearest points, a border is torn.
+_EDGES_AWAY = 4
 
 
-def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[IntArray, bool]:
+def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[IntArray, IntArray]:
     """The triangles F (m, 3) int32, neighbours oriented alike and each part like most of the normals (n, 3).
 
-    Also returns whether some neighbours still contradict each other.
+    Also returns the points (k,) at edges where neighbours still contradict each other and are not flat.
 
     Where triangles join sheets wrongly, no orientation may suit all neighbours. Then groups of triangles are joined,
     two at a time, in the relative orientation that more of the edges between them want, weighted by flatness. The
@@ -53,17 +47,17 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
     if 0 < len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(folds) > _FLAT:
         is_settled = np.ones(len(P), bool)
         is_settled[F[left_out]] = False
-        is_settled[F[~is_settled[F].all(axis=1)]] = False
+        is_settled[F[~at_all_corners(is_settled, F)]] = False
         F = np.delete(F, left_out, axis=0)
         F = with_fans_joined(P, with_one_fan(F, pinched_vertices(F, is_settled)), is_settled)
-        is_turned, part, pairs, _ = _turned(P, F)
+        is_turned, part, pairs, folds = _turned(P, F)
     F = np.where(is_turned[:, None], F[:, [0, 2, 1]], F)
     if normals is not None:
         area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
         along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))
         turned = along[part] < 0
         F[turned] = F[turned, ::-1]
-    return F, len(pairs) > 0
+    return F, _points_between(F, pairs[folds > _FLAT])
 
 
 def neighbours_across_edges(F: IntArray, n: int) -> tuple[IntArray, IntArray]:
@@ -136,10 +130,9 @@ def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolA
     is_turned, size, (a, b) = np.zeros(len(group), bool), np.bincount(group), group[pairs].T
     while True:
         n, between = len(size), a != b
-        ends = np.minimum(a, b)[between], np.maximum(a, b)[between]
-        # Sums the weights of all pairs between the same two groups.
-        joined = sp.coo_array((weight[between], ends), shape=(n, n)).tocsr().tocoo()
-        (a, b), weight = joined.coords, joined.data
+        # All pairs between the same two groups are one, with the sum of their weights.
+        ends, which = np.unique((np.minimum(a, b) * n + np.maximum(a, b))[between], return_inverse=True)
+        a, b, weight = ends // n, ends % n, np.bincount(which, weight[between]).astype(np.float64)
         # Of equal shares, an arbitrary order: with that of the numbers, groups would be joined one after the other.
         share = np.abs(weight) / (size[a] + size[b]) * (1 + 1e-6 * (np.arange(len(a)) * 7919 % 1009))
         most, to, turns = np.zeros(n), np.arange(n), np.zeros(n, bool)
@@ -168,53 +161,32 @@ def is_oriented_manifold(surface: Mesh) -> bool:
     return not (runs_alike.any() or pinched_vertices(surface.F, np.zeros(surface.n_vertices, bool)).any())
 
 
-def doubtful_points(surface: Mesh, is_beside: BoolArray, with_folds: bool = True) -> IntArray:
-    """Points (k,) where sheets may be joined or torn wrongly.
+def _points_between(F: IntArray, pairs: IntArray) -> IntArray:
+    """The points (k,) that both triangles of a pair have."""
+    common = (F[pairs[:, 0], :, None] == F[pairs[:, 1], None]).any(axis=2)
+    return np.unique(F[pairs[:, 0]][common])
 
-    Those at edges along which triangles run alike that are not flat, and `with_folds` those that fold back by more than
-    120 degrees, as at a point above the surface; and points at a border where a sheet is torn, see `_torn_points`.
+
+def folded_points(surface: Mesh) -> IntArray:
+    """Points (k,) at edges along which triangles fold back by more than 120 degrees."""
+    pairs, runs_alike = _pairs(surface.F, surface.n_vertices)
+    folds = _folds(surface.V, surface.F, pairs, runs_alike)
+    return _points_between(surface.F, pairs[folds > FOLDED_BACK])
+
+
+def torn_points(surface: Mesh, nearest: IntArray) -> IntArray:
+    """Of the first points of the rows `nearest` (k, j), those from which one of the others is many edges away.
+
+    At a border with another sheet beside it, that is where a thin part is torn. Points in no triangle do not count.
     """
-    P, F = surface.V, surface.F
-    pairs, runs_alike = _pairs(F, len(P))
-    folds = _folds(P, F, pairs, runs_alike)
-    faces = pairs[(runs_alike & (folds > _FLAT)) | (with_folds & (folds > FOLDED_BACK))]
-    common = (F[faces[:, 0], :, None] == F[faces[:, 1], None]).any(axis=2)
-    return np.union1d(F[faces[:, 0]][common], _torn_points(surface, is_beside))
-
-
-def _torn_points(surface: Mesh, is_beside: BoolArray) -> IntArray:
-    """Points (k,) at a border of which one of the 12 nearest ones is more than four edges away.
-
-    Only those with another sheet beside them, as `is_beside` (n,) tells: so are thin parts torn.
-    """
-    from scipy.spatial import KDTree  # takes as long to import as the rest of the package
-
-    chosen, n = np.flatnonzero(surface.boundary & is_beside), surface.n_vertices
-    if not len(chosen):
-        return chosen
-    used = np.flatnonzero(surface.referenced)
-    _, nearest = KDTree(surface.V[used]).query(surface.V[chosen], min(_NEAREST + 1, len(used)))
-    a, b = surface.edges.T
+    (a, b), n = surface.edges.T, surface.n_vertices
     edges = sp.coo_array((np.ones(2 * len(a), bool), (np.append(a, b), np.append(b, a))), shape=(n, n)).tocsr()
-    reached = edges[chosen]
+    reached = edges[nearest[:, 0]]
     for _ in range(_EDGES_AWAY - 1):
         reached = reached + reached @ edges
-    row = np.repeat(np.arange(len(chosen)), nearest.shape[1] - 1)
-    is_reached = np.asarray(reached[row, used[nearest[:, 1:]].ravel()]).reshape(len(chosen), -1)
-    return chosen[~is_reached.all(axis=1)]
-
-
-def warn_of_doubtful_points(surface: Mesh, is_beside: BoolArray) -> None:
-    """Warn if more than 1 in 200 points are doubtful, not counting folds: single points with noise fold back, too."""
-    n, doubtful = surface.n_vertices, doubtful_points(surface, is_beside, with_folds=False)
-    if len(doubtful) > _MOST_DOUBTFUL * n:
-        warn_caller(
-            f"the points do not tell their surface: at {len(doubtful)} of {n}, among "
-            "PointCloud.report().doubtful_points, triangles contradict each other's sides or end at another sheet, as "
-            "where a part is thin or walls have points at their edges alone. Parts may be joined or cut off, and "
-            "distance may be far off: give the mesh, more points, or normals",
-            AccuracyWarning,
-        )
+    row, others = np.repeat(np.arange(len(nearest)), nearest.shape[1] - 1), nearest[:, 1:].ravel()
+    is_far = ~np.asarray(reached[row, others]) & surface.referenced[others]
+    return np.asarray(nearest[np.unique(row[is_far]), 0])
 
 
 def two_sided_cover(surface: Mesh) -> Mesh:
