@@ -6,9 +6,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.cloud_triangles import FOLDED_BACK, at_all_corners, pinched_vertices, with_fans_joined, with_one_fan
-from heat_igl.mesh.connectivity import facets
-from heat_igl.mesh.grouping import group_by_label
+from heat_igl.mesh.cloud_triangles import (
+    FOLDED_BACK,
+    at_all_corners,
+    corner,
+    glued_sides,
+    pinched_vertices,
+    with_fans_joined,
+    with_one_fan,
+)
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -60,18 +66,9 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
     return F, _points_between(F, pairs[folds > _FLAT])
 
 
-def neighbours_across_edges(F: IntArray, n: int) -> tuple[IntArray, IntArray]:
-    """Half-edges 3 f + c (k,), opposite corner c of triangle f, and those of the neighbours across the edges."""
-    found = facets(F, n)
-    sides = group_by_label(found.of_face.ravel(), len(found.vertices))
-    inner = sides.first[:-1][found.n_faces == 2]
-    return sides.members[inner], sides.members[inner + 1]
-
-
 def _pairs(F: IntArray, n: int) -> tuple[IntArray, BoolArray]:
     """Neighbours (k, 2) among the triangles F (m, 3), and whether both run along their edge in one direction (k,)."""
-    first, second = neighbours_across_edges(F, n)
-    runs_alike = F.ravel()[_corner(first, 1)] == F.ravel()[_corner(second, 1)]
+    first, second, runs_alike = glued_sides(F, n)
     return np.stack([first // 3, second // 3], axis=1), runs_alike
 
 
@@ -208,16 +205,15 @@ def two_sided_cover(surface: Mesh) -> Mesh:
     """
     F, n = surface.F, surface.n_vertices
     both = np.concatenate([F, F[:, [0, 2, 1]]])
-    first, second = neighbours_across_edges(F, n)
-    runs_alike = F.ravel()[_corner(first, 1)] == F.ravel()[_corner(second, 1)]
+    first, second, runs_alike = glued_sides(F, n)
     pairs = []
     for side in (0, 1):
         # Across an edge along which both run, the neighbour on the same side is the one that is turned over.
         other = np.where(runs_alike, 1 - side, side)
         for end in (1, 2):
             opposite_end = np.where(runs_alike, end, 3 - end)
-            of_first = _on_side(_corner(first, end), side, F.size)
-            of_second = _on_side(_corner(second, opposite_end), other, F.size)
+            of_first = _on_side(corner(first, end), side, F.size)
+            of_second = _on_side(corner(second, opposite_end), other, F.size)
             pairs.append(np.stack([of_first, of_second], axis=1))
     fan = components(np.concatenate(pairs), both.size)
     return Mesh(*_numbered(surface, both, fan))
@@ -238,9 +234,9 @@ def _numbered(surface: Mesh, both: IntArray, fan: IntArray) -> tuple[IntArray, I
     of_fan[fan] = vertex
     on_other_side = np.empty(n_fans, np.int64)
     half = both.size // 2
-    corner = np.arange(half)
-    on_other_side[fan[:half]] = fan[_on_side(corner, np.ones(half, np.int64), half)]
-    on_other_side[fan[_on_side(corner, np.ones(half, np.int64), half)]] = fan[:half]
+    of_side = np.arange(half)
+    on_other_side[fan[:half]] = fan[_on_side(of_side, np.ones(half, np.int64), half)]
+    on_other_side[fan[_on_side(of_side, np.ones(half, np.int64), half)]] = fan[:half]
     # The largest fan of each vertex, of equal ones that of the first face; then the other side of it.
     first_corner = np.full(n_fans, both.size)
     np.minimum.at(first_corner, fan, np.arange(both.size))
@@ -253,11 +249,6 @@ def _numbered(surface: Mesh, both: IntArray, fan: IntArray) -> tuple[IntArray, I
     number[rest] = 2 * n + np.arange(len(rest))
     V = np.concatenate([surface.V, surface.V, surface.V[of_fan[rest]]])
     return V, number[fan].reshape(-1, 3)
-
-
-def _corner(half_edges: IntArray, turn: int | IntArray) -> IntArray:
-    """The corner 3 f + c at the beginning, for 1, or the end, for 2, of half-edges, which are opposite to corner c."""
-    return half_edges - half_edges % 3 + (half_edges + turn) % 3
 
 
 def _on_side(corners: IntArray, side: IntArray | int, size: int) -> IntArray:

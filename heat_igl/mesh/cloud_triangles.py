@@ -18,6 +18,7 @@ from heat_igl.kernels.cloud.agreeing import agreement
 from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles
+from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, unique_rows
 from heat_igl.mesh.grouping import group_by_label
@@ -29,6 +30,8 @@ __all__ = [
     "FOLDED_BACK",
     "at_all_corners",
     "cloud_triangles",
+    "corner",
+    "glued_sides",
     "pinched_vertices",
     "with_fans_joined",
     "with_loops_filled",
@@ -229,21 +232,25 @@ def _in_smaller_fans(F: IntArray, is_pinched: BoolArray) -> BoolArray:
 
 def _fans(F: IntArray, n: int) -> IntArray:
     """The fan (3 m,) of each corner: corners of a vertex are in one fan if edges join their triangles."""
-    found = facets(F, n)
-    sides = group_by_label(found.of_face.ravel(), len(found.vertices))
-    inner = sides.first[:-1][found.n_faces == 2]
-    of_h, of_g = _ends_of_sides(sides.members[inner]), _ends_of_sides(sides.members[inner + 1])
-    is_turned = F.ravel()[of_h[0]] != F.ravel()[of_g[0]]
-    of_g = np.where(is_turned, of_g[1], of_g[0]), np.where(is_turned, of_g[0], of_g[1])
-    pairs = np.stack([np.concatenate(of_h), np.concatenate(of_g)], axis=1)
-    fan: IntArray = components(pairs, F.size)
+    first, second, runs_alike = glued_sides(F, n)
+    ends = [np.stack([corner(first, e), corner(second, np.where(runs_alike, e, 3 - e))], axis=1) for e in (1, 2)]
+    fan: IntArray = components(np.concatenate(ends), F.size)
     return fan
 
 
-def _ends_of_sides(sides: IntArray) -> tuple[IntArray, IntArray]:
-    """The corners (k,) at the beginning and at the end of sides 3 f + c, opposite corner c."""
-    first = sides - sides % 3
-    return first + (sides + 1) % 3, first + (sides + 2) % 3
+def glued_sides(F: IntArray, n: int) -> tuple[IntArray, IntArray, BoolArray]:
+    """Sides 3 f + c (k,), opposite corner c of triangle f, the sides of neighbours on them, and whether both run alike.
+
+    On n points; an edge has at most two of the triangles F (m, 3).
+    """
+    _, twin, _, is_aligned, _ = glue(F.astype(np.int64), np.zeros((n, 3)), 1.0)
+    first = np.flatnonzero(twin > np.arange(len(twin)))
+    return first, twin[first].astype(np.int64), is_aligned[first] == 0
+
+
+def corner(sides: IntArray, turn: int | IntArray) -> IntArray:
+    """The corner 3 f + c at the beginning, for 1, or the end, for 2, of sides, which are opposite to corner c."""
+    return sides - sides % 3 + (sides + turn) % 3
 
 
 def with_fans_joined(P: FloatArray, F: IntArray, is_settled: BoolArray) -> IntArray:
