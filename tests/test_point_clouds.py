@@ -159,14 +159,6 @@ def test_even_points_are_solved_on_as_their_mesh_is() -> None:
     assert solver.t == pytest.approx(solver.operators.mean_edge_length**2, rel=1e-9)
 
 
-def test_uneven_density() -> None:
-    P = sphere(6000)
-    kept = np.random.default_rng(1).random(len(P)) < np.where(P[:, 2] > 0, 1.0, 0.2)
-    P = P[kept]
-    distance = GeodesicSolver(PointCloud(P), method="exact").distance(0)
-    assert mean_error(distance, on_sphere(P, 0)) < 0.005
-
-
 def test_noise_is_taken_away_and_clean_points_stay() -> None:
     P = sphere(20_000)
     noisy = P + 0.01 * np.random.default_rng(1).standard_normal(P.shape)
@@ -636,17 +628,6 @@ def test_discs_lie_in_the_tangent_planes_and_continue_the_values() -> None:
     np.testing.assert_array_equal(as_given[flat.F].max(axis=1), as_given[flat.F[:, 0]])
 
 
-# The kernel.
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_triangles_are_oriented_like_the_normals(side):
-    P = heat_igl.shapes.icosphere(3).V
-    triangles = heat_igl.PointCloud(P, side * P).triangles
-    first, second, third = np.swapaxes(triangles.V[triangles.F], 0, 1)
-    assert (np.sign(np.einsum("fx,fx->f", np.cross(second - first, third - first), first)) == side).all()
-
-
 # The triangles fit together.
 
 
@@ -751,16 +732,6 @@ def test_points_come_before_their_nearest() -> None:
     np.testing.assert_allclose(near[:, -1], reach**2, rtol=1e-12)
 
 
-def test_exact_distance_on_noisy_points() -> None:
-    """Its bounds are those of the points where they were moved to: the given ones are not on the surface."""
-    P = np.random.default_rng(0).standard_normal((800, 3))
-    P /= np.linalg.norm(P, axis=1, keepdims=True)
-    cloud = PointCloud(P + 0.04 * np.random.default_rng(1).standard_normal(P.shape))
-    assert not np.array_equal(cloud.triangles.V, cloud.P)
-    found = GeodesicSolver(cloud, method="exact").distance(0)
-    np.testing.assert_allclose(found, GeodesicSolver(cloud.triangles, method="exact").distance(0), rtol=1e-9)
-
-
 def test_principal_axes() -> None:
     """They are numpy's eigenvectors."""
     P = np.random.default_rng(0).uniform(-1, 1, (41, 3)) * [1, 0.8, 0.2]
@@ -834,24 +805,6 @@ def test_triangles_that_contradict_are_left_out_if_they_are_few_and_on_a_fold() 
     assert len(np.unique(found)) == len(P)
     for flat in ((P, F), moebius_strip(50)):
         np.testing.assert_array_equal(np.sort(oriented(*flat, None)[0], axis=1), np.sort(flat[1], axis=1))
-
-
-def test_directions_on_a_surface_that_cannot_be_oriented_are_an_error() -> None:
-    """On Klein's bottle."""
-    a, b = 60, 40
-    u, v = np.meshgrid(2 * np.pi * np.arange(a) / a, 2 * np.pi * np.arange(b) / b, indexing="ij")
-    out = 3 + np.cos(u / 2) * np.sin(v) - np.sin(u / 2) * np.sin(2 * v)
-    height = np.sin(u / 2) * np.sin(v) + np.cos(u / 2) * np.sin(2 * v)
-    P = np.stack([out * np.cos(u), out * np.sin(u), height], axis=-1).reshape(-1, 3)
-    number = np.arange(a * b).reshape(a, b)
-    # After a turn, v runs backwards.
-    number = np.append(number, number[:1, -np.arange(b) % b], axis=0)
-    number = np.append(number, number[:, :1], axis=1)
-    p, q, r, s = (each.ravel() for each in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-    F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
-    solver = GeodesicSolver(heat_igl.Mesh(P, F), method="exact")
-    with pytest.raises(MeshError, match="oriented differently"):
-        solver.directions(0)
 
 
 def test_neighbours_on_another_sheet_are_left_out() -> None:
