@@ -191,8 +191,10 @@ class PointCloud:
         if tree is not given:
             _warn_of_noise(np.linalg.norm(tree.P - given.P, axis=1), normals is None, float(found.measures.sum()))
         doubtful = number[doubtful]
-        # At borders where neighbours were left out since they lie on another sheet, a thin part may be torn.
-        beside = np.flatnonzero((near.index[:, -1] < 0) & found.boundary[number])
+        # At borders where neighbours were left out since they lie on another sheet, a thin part may be torn. Outliers
+        # that are many enough to be near each other make small parts of their own.
+        is_large = np.bincount(found.components)[found.components] > _MOST_DOUBTFUL * len(self.P)
+        beside = np.flatnonzero((near.index[:, -1] < 0) & (found.boundary & is_large)[number])
         if len(beside):
             nearest = number[tree.nearest(beside, min(_NEAREST + 1, len(number)))[0]]
             doubtful = np.union1d(doubtful, torn_points(found, nearest))
