@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from functools import cache
 
 import numpy as np
@@ -192,3 +193,37 @@ def test_values_places_and_the_page(name: str) -> None:
     np.testing.assert_allclose(heat_igl.closest_points(made, middle).points.positions(mesh), middle, atol=1e-9)
     pytest.importorskip("matplotlib")
     assert "<script" in heat_igl.plots.page(made, exact(name, A)).html
+
+
+@table
+def test_sources_of_all_kinds(name: str) -> None:
+    made, mesh, solver = domain(name), surface(name), GeodesicSolver(domain(name), method="exact")
+    both = exact(name, A), exact(name, B)
+    along = solver.distance(heat_igl.shortest_path(made, A, B))
+    assert (along <= np.minimum(*both) + 1e-9).all()
+    np.testing.assert_allclose(along[[A, B]], 0, atol=1e-9)
+    later = solver.distance(heat_igl.OffsetSources([A, B], [0, 0.2]))
+    np.testing.assert_allclose(later, np.minimum(both[0], both[1] + 0.2), atol=1e-9)
+    face, at = np.argwhere(mesh.F == A)[0]
+    np.testing.assert_allclose(solver.distance(SurfacePoints([face], [np.eye(3)[at]])), both[0], atol=1e-9)
+    near, few = both[0] <= 0.4, [B, A, 7]
+    np.testing.assert_allclose(solver.distance(A, cutoff=0.4)[near], both[0][near], atol=1e-9)
+    found = heat_igl.geodesic_distance(made, A, method="exact", targets=few)
+    np.testing.assert_allclose(found, both[0][few], atol=1e-9)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(solver)).distance(A), both[0])
+
+
+@table
+def test_other_positions_metrics_and_matrices(name: str) -> None:
+    """Twice the positions, or four times the metric, are twice the distance; normals are not those of other points."""
+    made, solver = domain(name), GeodesicSolver(domain(name), method="exact")
+    twice = solver.with_vertices(2 * made.V).distance(A)
+    np.testing.assert_allclose(twice, 2 * exact(name, A), rtol=0.02 if name == "oriented cloud" else 1e-9)
+    scaled = heat_igl.metric_operators(made, np.tile(4 * np.eye(3), (made.n_vertices, 1, 1)))
+    np.testing.assert_allclose(GeodesicSolver(scaled, method="exact").distance(A), 2 * exact(name, A), rtol=1e-6)
+    matrix = heat_igl.distance_matrix(solver, [A, B])
+    np.testing.assert_allclose(matrix, [[0, exact(name, A)[B]], [exact(name, A)[B], 0]], atol=1e-9)
+    labels = np.full(made.n_vertices, -1)
+    labels[[A, B]] = 0, 1
+    between = heat_igl.parcel_distances(made, labels)
+    np.testing.assert_allclose(between, [[0, exact(name, A)[B]], [exact(name, A)[B], 0]], rtol=1e-4)
