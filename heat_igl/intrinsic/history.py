@@ -107,15 +107,18 @@ class Flipped(NamedTuple):
         (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
         corner = (sides[side, None] + np.arange(3)) % 3
         at_apex, at_tail, at_head = np.take_along_axis(barycentric[moved], corner, axis=1).T
-        x = np.where(in_second, at_tail * ab + at_apex * qx, at_head * ab + at_apex * px)
-        y = at_apex * np.where(in_second, -qy, py)
-        # Twice the signed areas of the triangles of pq with the point, a and b: positive on the side of a.
-        of_point = (px - qx) * (y + qy) - (py + qy) * (x - qx)
+        at_a, at_b = np.where(in_second, at_head, at_tail), np.where(in_second, at_tail, at_head)
+        # Twice the signed areas of the triangles of pq with a, b and the point: positive on the side of a.
         of_a, of_b = (px - qx) * qy + (py + qy) * qx, (px - qx) * qy - (py + qy) * (ab - qx)
+        of_point = at_a * of_a + at_b * of_b
         in_first = of_point >= 0
-        third = np.clip(of_point / np.where(in_first, of_a, of_b), 0.0, 1.0)
-        at_p = np.clip((y + (1 - third) * qy) / (py + qy), 0.0, 1 - third)
-        at_q = 1 - third - at_p
+        # The coordinate of the corner beyond pq goes to p and q, in sums of positive numbers: a point beside a corner
+        # keeps its direction from there.
+        of_third = np.where(in_first, of_a, of_b)
+        third = np.clip(of_point / of_third, 0.0, 1.0)
+        beyond = np.where(in_first, at_b, -at_a) / of_third * ((of_a - of_b) / (py + qy))
+        at_p = np.where(in_second, 0.0, at_apex) + beyond * qy
+        at_q = np.where(in_second, at_apex, 0.0) + beyond * py
         corner = (np.where(in_first, self.half_edge[edge], self.mate[edge])[:, None] + np.arange(3)) % 3
         faces, barycentric = faces.copy(), barycentric.copy()
         faces[moved] = np.where(in_first, self.half_edge[edge], self.mate[edge]) // 3

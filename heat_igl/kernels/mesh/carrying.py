@@ -106,24 +106,20 @@ def _flip(
         side = edge[2]
     c: cython.int = side % 3
     at_apex: cython.double = b[c]
-    at_tail: cython.double = b[(c + 1) % 3]
-    at_head: cython.double = b[(c + 2) % 3]
+    at_a: cython.double = b[(c + 2) % 3] if in_second else b[(c + 1) % 3]
+    at_b: cython.double = b[(c + 1) % 3] if in_second else b[(c + 2) % 3]
     # a at the origin, b on the first axis, p above the axis and q below.
-    x: cython.double = at_head * ab + at_apex * x_p
-    y: cython.double = at_apex * y_p
-    if in_second:
-        x, y = at_tail * ab + at_apex * x_q, -at_apex * y_q
-    # Twice the signed areas of the triangles of pq with the point, a and b: positive on the side of a.
-    of_point: cython.double = (x_p - x_q) * (y + y_q) - (y_p + y_q) * (x - x_q)
+    # Twice the signed areas of the triangles of pq with a, b and the point: positive on the side of a.
     of_a: cython.double = (x_p - x_q) * y_q + (y_p + y_q) * x_q
     of_b: cython.double = (x_p - x_q) * y_q - (y_p + y_q) * (ab - x_q)
+    of_point: cython.double = at_a * of_a + at_b * of_b
     goes_on: cython.longlong = 0 if of_point >= 0.0 else 1
     third: cython.double = min(max(of_point / (of_b if goes_on else of_a), 0.0), 1.0)
-    at_p: cython.double = min(max((y + (1.0 - third) * y_q) / (y_p + y_q), 0.0), 1.0 - third)
+    # The coordinate of the corner beyond pq goes to p and q.
+    beyond: cython.double = -at_a / of_b if goes_on else at_b / of_a
+    beyond *= (of_a - of_b) / (y_p + y_q)
+    at_p: cython.double = beyond * y_q + (0.0 if in_second else at_apex)
+    at_q: cython.double = beyond * y_p + (at_apex if in_second else 0.0)
     c = edge[1 + goes_on] % 3
-    b[(c + 1) % 3] = third
-    if goes_on:
-        b[c], b[(c + 2) % 3] = 1.0 - third - at_p, at_p
-    else:
-        b[c], b[(c + 2) % 3] = at_p, 1.0 - third - at_p
+    b[c], b[(c + 1) % 3], b[(c + 2) % 3] = (at_q, third, at_p) if goes_on else (at_p, third, at_q)
     return goes_on
