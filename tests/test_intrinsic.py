@@ -923,7 +923,7 @@ def test_angles_sum_to_two_pi_and_to_pi_on_the_boundary(mesh):
     np.testing.assert_allclose(scaled, np.where(mesh.boundary, np.pi, 2 * np.pi))
     # Every vertex has a reference edge, and on the boundary it is the first.
     smallest = np.full(mesh.n_vertices, np.inf)
-    np.minimum.at(smallest, mesh.F[:, [1, 2, 0]].ravel(), angles.leaving)
+    np.minimum.at(smallest, mesh.F[:, [1, 2, 0]].ravel(), angles.outgoing)
     np.testing.assert_array_equal(smallest, 0)
 
 
@@ -933,7 +933,7 @@ def test_flat_frames_are_those_of_the_plane():
     np.testing.assert_allclose(frames.normal, np.broadcast_to([0, 0, 1], (36, 3)), atol=1e-15)
     # The polar angle of an edge inside is its angle in the plane, up to that of x.
     along = mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F]
-    leaving = frames.angles.leaving.reshape(-1, 3)[:, [2, 0, 1]]
+    leaving = frames.angles.outgoing.reshape(-1, 3)[:, [2, 0, 1]]
     inside = ~mesh.boundary[mesh.F]
     expected = np.arctan2(along[..., 1], along[..., 0]) - np.arctan2(frames.x[:, 1], frames.x[:, 0])[mesh.F]
     assert off_multiples(leaving - expected)[inside].max() < 1e-13
@@ -960,11 +960,11 @@ def test_a_vector_along_an_edge_has_its_angle_from_both_faces(sphere):
     for c in range(3):
         next_corner, previous = (c + 1) % 3, (c + 2) % 3
         towards = frames.to_angles(frames.from_faces(faces, np.full(len(F), c), V[F[:, next_corner]] - V[F[:, c]]))
-        assert off_multiples(towards - frames.angles.leaving.reshape(-1, 3)[:, previous]).max() < 1e-12
+        assert off_multiples(towards - frames.angles.outgoing.reshape(-1, 3)[:, previous]).max() < 1e-12
         # The other side of the corner leaves from it in the neighbour.
         other = frames.to_angles(frames.from_faces(faces, np.full(len(F), c), V[F[:, previous]] - V[F[:, c]]))
         twin = frames.triangulation.twin.reshape(-1, 3)[:, next_corner]
-        assert off_multiples(other - frames.angles.leaving[twin]).max() < 1e-12
+        assert off_multiples(other - frames.angles.outgoing[twin]).max() < 1e-12
 
 
 def test_flips_keep_the_directions_of_edges():
@@ -979,7 +979,7 @@ def test_flips_keep_the_directions_of_edges():
     half_edge = np.arange(flipped.F.size).reshape(-1, 3)
     for c in range(3):
         vertex, out, back = flipped.F[:, c], half_edge[:, (c + 2) % 3], half_edge[:, (c + 1) % 3]
-        wide = angles.leaving[flipped.twin[back]] - angles.leaving[out]
+        wide = angles.outgoing[flipped.twin[back]] - angles.outgoing[out]
         assert off_multiples(wide - angles.scale[vertex] * angles.corners[:, c]).max() < 1e-11
 
 

@@ -159,7 +159,7 @@ class OutwardField:
         last = next_half_edge(corner)
         last = last[tri.twin[last] < 0]
         ends = np.append(tri.head(out), tri.tail(last))
-        directions = np.append(self._angles.leaving[out], np.full(len(last), np.pi))
+        directions = np.append(self._angles.outgoing[out], np.full(len(last), np.pi))
         found, first, counts = np.unique(ends, return_index=True, return_counts=True)
         once = (counts == 1) & (found != vertex)
         return found[once], directions[first[once]]

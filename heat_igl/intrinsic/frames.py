@@ -147,9 +147,9 @@ class TangentFrames:
         inside = self.angles.corners.ravel()[corner]
         angle = np.arctan2(y, x)
         angle = np.where(angle < inside / 2 - np.pi, angle + 2 * np.pi, angle)
-        leaving = self.angles.leaving[previous_half_edge(corner)]
+        outgoing = self.angles.outgoing[previous_half_edge(corner)]
         return self.from_angles(
-            leaving + self.angles.scale[self.triangulation.F.ravel()[corner]] * angle, np.hypot(x, y)
+            outgoing + self.angles.scale[self.triangulation.F.ravel()[corner]] * angle, np.hypot(x, y)
         )
 
     def to_faces(self, vertices: ArrayLike, vectors: ArrayLike) -> tuple[IntArray, IntArray, FloatArray]:
@@ -226,14 +226,14 @@ class TangentFrames:
         F, polar = self.triangulation.F, self.angles
         vertex = F.ravel()
         # Corners sorted by vertex, and by angle at each: one search finds all.
-        leaving = polar.leaving[previous_half_edge(np.arange(F.size))]
-        order = np.lexsort((leaving, vertex))
+        outgoing = polar.outgoing[previous_half_edge(np.arange(F.size))]
+        order = np.lexsort((outgoing, vertex))
         # Angles are below 2 pi, so this keeps the order of the vertices.
-        key = vertex[order] * 8.0 + leaving[order]
+        key = vertex[order] * 8.0 + outgoing[order]
         first = np.searchsorted(vertex[order], vertices)
         place = np.maximum(np.searchsorted(key, vertices * 8.0 + angles, side="right") - 1, first)
         corner = order[place]
-        turn = angles - leaving[corner]
+        turn = angles - outgoing[corner]
         # Off the boundary: nearer to the first face than to the last.
         off = polar.on_boundary[vertices] & (angles > 1.5 * np.pi)
         corner, turn = np.where(off, order[first], corner), np.where(off, angles - 2 * np.pi, turn)

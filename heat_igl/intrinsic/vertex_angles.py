@@ -25,7 +25,7 @@ class PolarAngles:
 
     Attributes
     ----------
-    leaving : (3 m,) float64
+    outgoing : (3 m,) float64
         Angle of each half-edge in the tangent plane of the tail, counterclockwise from the reference edge.
     corners : (m, 3) float64
         Angle at each corner, as it is in the face.
@@ -36,10 +36,10 @@ class PolarAngles:
     on_boundary : (n,) bool
         Vertices whose faces do not close up around them.
     first : (n,) int64
-        Corner with `leaving` = 0, -1 at a vertex without a face.
+        Corner with `outgoing` = 0, -1 at a vertex without a face.
     """
 
-    leaving: FloatArray
+    outgoing: FloatArray
     corners: FloatArray
     sums: FloatArray
     scale: FloatArray
@@ -49,17 +49,17 @@ class PolarAngles:
     def rigid(self, tail: IntArray) -> tuple[FloatArray, FloatArray]:
         """The angle (3 m,) of each half-edge for transport, and the factor (n,) of angles in faces.
 
-        Inside these are `leaving` and `scale`. The faces at a boundary vertex lie in a plane already: transport takes
+        Inside these are `outgoing` and `scale`. The faces at a boundary vertex lie in a plane already: transport takes
         their angles as they are, so that a flat piece with corners has no curvature, and turns them until the middle
-        between the two boundary edges is at pi / 2, as in `leaving`.
+        between the two boundary edges is at pi / 2, as in `outgoing`.
 
         Parameters
         ----------
         tail : (3 m,) int64
             Tail of each half-edge.
         """
-        flat = self.leaving / self.scale[tail] + (np.pi - self.sums[tail]) / 2
-        return np.where(self.on_boundary[tail], flat, self.leaving), np.where(self.on_boundary, 1.0, self.scale)
+        flat = self.outgoing / self.scale[tail] + (np.pi - self.sums[tail]) / 2
+        return np.where(self.on_boundary[tail], flat, self.outgoing), np.where(self.on_boundary, 1.0, self.scale)
 
     def to_polar(self, vertices: IntArray, angles: FloatArray) -> FloatArray:
         """The polar angle (k,) of directions at vertices that have the given angles (k,) for transport.
@@ -93,8 +93,8 @@ def polar_angles(triangulation: IntrinsicTriangulation) -> PolarAngles:
     corners = corner_angles(triangulation.l)
     lowest = np.full(n, -1)
     lowest[F.ravel()[::-1]] = np.arange(F.size)[::-1]
-    leaving = np.zeros(F.size)
-    sums, counts, closes = kernel(corners.ravel(), triangulation.twin, lowest, leaving)
+    outgoing = np.zeros(F.size)
+    sums, counts, closes = kernel(corners.ravel(), triangulation.twin, lowest, outgoing)
     fans = np.bincount(F.ravel(), minlength=n) != counts
     if fans.any():
         first = int(np.argmax(fans))
@@ -107,11 +107,11 @@ def polar_angles(triangulation: IntrinsicTriangulation) -> PolarAngles:
     scale = np.divide(whole, sums, out=np.ones(n), where=sums > 0)
     first_corner = np.full(n, -1)
     tail = triangulation.tail(np.arange(F.size))
-    starts = np.flatnonzero((leaving == 0) & (~on_boundary[tail] | (triangulation.twin < 0)))
+    starts = np.flatnonzero((outgoing == 0) & (~on_boundary[tail] | (triangulation.twin < 0)))
     first_corner[tail[starts]] = next_half_edge(starts)
     inner = ~on_boundary
     first_corner[inner] = lowest[inner]
-    return PolarAngles(leaving * scale[tail], corners, sums, scale, on_boundary, first_corner)
+    return PolarAngles(outgoing * scale[tail], corners, sums, scale, on_boundary, first_corner)
 
 
 def _require_oriented_manifold(triangulation: IntrinsicTriangulation) -> None:
@@ -142,15 +142,15 @@ def carried_angles(angles: PolarAngles, flipped: IntrinsicTriangulation) -> Pola
     flipped : IntrinsicTriangulation
         The triangulation now. The history holds flips only.
     """
-    leaving, scale = angles.leaving.copy(), angles.scale
+    outgoing, scale = angles.outgoing.copy(), angles.scale
     flips = [change for change in flipped.history if isinstance(change, Flipped)]
     if len(flips) < len(flipped.history):
         raise ValueError("polar angles are carried over flips only: pass a triangulation without added vertices")
     F = _faces_before(flipped.F, flips)
     for change in flips:
-        _replay(leaving, scale, F, change)
+        _replay(outgoing, scale, F, change)
     return PolarAngles(
-        leaving, corner_angles(flipped.l), angles.sums, scale, angles.on_boundary, np.full_like(angles.first, -1)
+        outgoing, corner_angles(flipped.l), angles.sums, scale, angles.on_boundary, np.full_like(angles.first, -1)
     )
 
 
@@ -165,17 +165,17 @@ def _faces_before(flipped_faces: IntArray, flips: list[Flipped]) -> IntArray:
     return F
 
 
-def _replay(leaving: FloatArray, scale: FloatArray, F: IntArray, change: Flipped) -> None:
+def _replay(outgoing: FloatArray, scale: FloatArray, F: IntArray, change: Flipped) -> None:
     """Carry the angles, and the faces, over edges flipped at once; names as in `Flipped`."""
     (ab, bp, pa), (ba, aq, qb) = sides_from(change.half_edge), sides_from(change.mate)
     p, q = F[ab], F[ba]
     length_ab, length_pa, length_bp, length_aq, length_qb = change.lengths
     # The quadrilateral p a q b: the angles at p and q, on the sides of a and b, from the new diagonal.
     at_p, at_q = _angles_at_diagonal(length_ab, length_pa, length_bp, length_aq, length_qb)
-    leaving_qp = leaving[qb] + scale[q] * at_q
-    leaving_pq = leaving[pa] + scale[p] * at_p
-    leaving[ab], leaving[ba] = leaving[aq], leaving[bp]
-    leaving[bp], leaving[aq] = leaving_qp, leaving_pq
+    outgoing_qp = outgoing[qb] + scale[q] * at_q
+    outgoing_pq = outgoing[pa] + scale[p] * at_p
+    outgoing[ab], outgoing[ba] = outgoing[aq], outgoing[bp]
+    outgoing[bp], outgoing[aq] = outgoing_qp, outgoing_pq
     F[pa], F[qb] = q, p
 
 
@@ -199,11 +199,13 @@ def transport_angles(triangulation: IntrinsicTriangulation, angles: PolarAngles)
     boundary as `PolarAngles.rigid` has it.
     """
     half_edge = np.arange(triangulation.F.size)
-    leaving, scale = angles.rigid(triangulation.tail(half_edge))
+    outgoing, scale = angles.rigid(triangulation.tail(half_edge))
     following = next_half_edge(half_edge)
     # At the head: the next half-edge leaves there, and the angle of the face lies between the two.
-    back = leaving[following] + scale[triangulation.head(half_edge)] * angles.corners.ravel()[next_half_edge(following)]
+    back = (
+        outgoing[following] + scale[triangulation.head(half_edge)] * angles.corners.ravel()[next_half_edge(following)]
+    )
     twin = triangulation.twin
     glued = twin >= 0
-    back[glued] = leaving[twin[glued]]
-    return np.asarray(back + np.pi - leaving)
+    back[glued] = outgoing[twin[glued]]
+    return np.asarray(back + np.pi - outgoing)

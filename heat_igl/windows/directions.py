@@ -159,7 +159,7 @@ class PathDirections:
     def _at_corners(self, corner: IntArray, seen: FloatArray) -> FloatArray:
         """Polar angles (k,) of directions that are turned by `seen` from the side to the next corner."""
         angles, v = self.angles, self._triangulation.F.ravel()[corner]
-        return _polar(angles.leaving[previous_half_edge(corner)], seen, angles.scale[v], angles.on_boundary[v])
+        return _polar(angles.outgoing[previous_half_edge(corner)], seen, angles.scale[v], angles.on_boundary[v])
 
     def around_corners(self, corner: IntArray, departure: FloatArray) -> FloatArray:
         """Polar angles (k,) of directions at corners, whose angles (k,) count from the first sides of the triangles."""

@@ -92,7 +92,7 @@ def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None
     except MeshError:
         return None
     leaves = np.flatnonzero(star.tail(np.arange(F.size)) == centre)
-    spokes = _Spokes(used[star.head(leaves)], star.l.ravel()[leaves], polar.leaving[leaves], next_half_edge(leaves))
+    spokes = _Spokes(used[star.head(leaves)], star.l.ravel()[leaves], polar.outgoing[leaves], next_half_edge(leaves))
     return spokes, float(polar.scale[centre]), bool(polar.on_boundary[centre])
 
 

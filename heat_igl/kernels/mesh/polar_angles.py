@@ -5,9 +5,9 @@ import numpy as np
 
 
 def polar_angles(
-    angle: cython.double[::1], twin: cython.longlong[::1], first: cython.longlong[::1], leaving: cython.double[::1]
+    angle: cython.double[::1], twin: cython.longlong[::1], first: cython.longlong[::1], outgoing: cython.double[::1]
 ):
-    """Fill `leaving` (3 m,) with the angle from the reference edge of the tail to each half-edge, counterclockwise.
+    """Fill `outgoing` (3 m,) with the angle from the reference edge of the tail to each half-edge, counterclockwise.
 
     `angle` (3 m,) are the angles at the corners, `first` (n,) is one corner at each vertex, -1 if there is none. The
     reference edge of an inner vertex leaves from that corner. On the boundary it is the edge at which the faces begin.
@@ -24,7 +24,7 @@ def polar_angles(
     with cython.nogil:
         for v in range(n):
             if first[v] >= 0:
-                closed[v] = _around(angle, twin, first[v], leaving, cython.address(total[v]), cython.address(count[v]))
+                closed[v] = _around(angle, twin, first[v], outgoing, cython.address(total[v]), cython.address(count[v]))
     return sums, counts, closes.astype(bool)
 
 
@@ -35,7 +35,7 @@ def _around(
     angle: cython.double[::1],
     twin: cython.longlong[::1],
     first: cython.longlong,
-    leaving: cython.double[::1],
+    outgoing: cython.double[::1],
     total: cython.p_double,
     count: cython.p_longlong,
 ) -> cython.bint:
@@ -55,7 +55,7 @@ def _around(
     at: cython.longlong = start
     angles: cython.double = 0.0
     for _k in range(most):
-        leaving[at + 2 if at % 3 == 0 else at - 1] = angles
+        outgoing[at + 2 if at % 3 == 0 else at - 1] = angles
         angles += angle[at]
         count[0] += 1
         # Counterclockwise: across the half-edge that arrives at the corner.
