@@ -103,20 +103,21 @@ class Domain:
     @cached_property
     def edge_graph(self) -> csr_array:
         """The sides of the cells (n, n), each at the shortest of its lengths within cells."""
-        ends, lengths = [], []
-        for i, cell in enumerate(self.cells):
-            corners = np.asarray(cell)
-            if self.kind == "polygons":
-                pairs = np.stack([corners, np.roll(corners, -1)], axis=1)
-            else:
-                pairs = corners[np.stack(np.triu_indices(len(corners), 1), axis=1)]
-            along = self.V[pairs[:, 1]] - self.V[pairs[:, 0]]
-            tensor = np.eye(3) if self.field is None or self.field.ndim == 1 else self.field[i]
-            length = np.sqrt(np.einsum("ex,xy,ey->e", along, tensor, along))
-            ends.append(np.sort(pairs, axis=1))
-            lengths.append(length / self.field[i] if self.field is not None and self.field.ndim == 1 else length)
-        order = np.lexsort((np.concatenate(lengths), *np.concatenate(ends).T))
-        pairs, length = np.concatenate(ends)[order], np.concatenate(lengths)[order]
+        if self.kind == "polygons":
+            sides = [np.stack([cell, np.roll(cell, -1)], axis=1) for cell in self.cells]
+        else:
+            cells = np.asarray(self.cells)
+            sides = cells[:, np.stack(np.triu_indices(cells.shape[1], 1), axis=1)]
+        of_cell = np.repeat(np.arange(len(sides)), [len(each) for each in sides])
+        pairs = np.sort(np.concatenate(sides), axis=1)
+        along = self.V[pairs[:, 1]] - self.V[pairs[:, 0]]
+        length = np.linalg.norm(along, axis=1)
+        if self.field is not None and self.field.ndim == 3:
+            length = np.sqrt(np.einsum("ex,exy,ey->e", along, self.field[of_cell], along))
+        elif self.field is not None:
+            length = length / self.field[of_cell]
+        order = np.lexsort((length, *pairs.T))
+        pairs, length = pairs[order], length[order]
         is_first = np.append(True, (np.diff(pairs, axis=0) != 0).any(axis=1))
         return csr_array((length[is_first], tuple(pairs[is_first].T)), shape=(self.n, self.n))
 
