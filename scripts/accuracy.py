@@ -4,7 +4,6 @@
     python scripts/accuracy.py FOLDER MESH --methods heat sweep meshlab        # meshes instead
     python scripts/accuracy.py --shapes none --members 10 --seed 1100           # random members of the zoo's kinds
     python scripts/accuracy.py MESH --variants                                 # the ways to run the heat method
-    python scripts/accuracy.py MESH --in-faces                                 # points in faces as sources
 
 Columns are the mean of |d - exact| / exact over the vertices, averaged over ``--sources`` seeded vertices, and in
 brackets the largest |d - exact| and the largest exact - d as shares of the largest distance; all in percent. ``w``
@@ -13,9 +12,7 @@ means over the shapes, the worst, and ratios to potpourri3d. A mesh that exact d
 fails, are listed with the reason.
 
 With ``--variants``, a row for each way, its geometric mean over the meshes, and that relative to potpourri3d's default,
-in the mean and at worst: the defaults of `HeatMethodSolver` are chosen by this table (docs/engines_theory.md). With
-``--in-faces``, points are drawn in faces by area, compared with exact distance on the mesh with the point as a vertex,
-and beside them a corner of the same face; "corners" is the largest relative error there (docs/sources.md).
+in the mean and at worst: the defaults of `HeatMethodSolver` are chosen by this table (docs/engines_theory.md).
 """
 
 from __future__ import annotations
@@ -24,18 +21,17 @@ import argparse
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 
-from heat_igl import Mesh, SurfacePoints, read_mesh, reference
+from heat_igl import Mesh, read_mesh, reference
 from heat_igl.errors import AccuracyWarning, MeshError, MissingExtraError, ReferenceSolverError
 from heat_igl.operators import operators
 from heat_igl.steps import HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 
-from harness import Query, Row, Table, collected, errors, geometric_mean, mean_error, ours, parsed, publish
+from harness import Query, Row, Table, collected, errors, geometric_mean, ours, parsed, publish
 
 SUFFIXES = {".off", ".obj", ".ply", ".stl", ".mesh", ".msh"}
 FAILURES = (MeshError, MissingExtraError, ReferenceSolverError, ImportError, RuntimeError, ValueError)
@@ -104,11 +100,7 @@ VARIANTS: dict[str, Callable[[Mesh], Query]] = {
     "not damped": field(full_rate=None),
     "along u": field(of_log=False),
     "not fitted": field(fitted=False, full_rate=0.9),
-    "not fitted, along u": field(fitted=False, of_log=False, full_rate=0.9),
     "t_coef 1": field(t_coef=1.0),
-    "t_coef 1, along u": field(of_log=False, t_coef=1.0),
-    "t_coef 1, not fitted": field(fitted=False, full_rate=0.9, t_coef=1.0),
-    "t_coef 1, not fitted, along u": field(fitted=False, of_log=False, full_rate=0.9, t_coef=1.0),
 }
 
 
@@ -205,47 +197,9 @@ def of_variants(rows: Sequence[Row]) -> list[Row]:
     return turned
 
 
-def in_faces(path: Path, count: int, seed: int) -> Row:
-    """Errors from points inside faces, of no coordinate below 0.01 since exact solvers dislike slivers."""
-    mesh, rng = read_mesh(path), np.random.default_rng(seed)
-    faces = rng.choice(mesh.n_faces, count, p=mesh.measures / mesh.measures.sum())
-    row: Row = {"mesh": path.stem}
-    points = [SurfacePoints([face], [0.97 * rng.dirichlet(np.ones(3)) + 0.01]) for face in faces]
-    truths = [exact_from(mesh, point) for point in points]
-    for method in ("heat", "sweep"):
-        query = METHODS[method](mesh)
-        row[method] = np.mean([errors(query(p), truth)["mean"] for p, truth in zip(points, truths, strict=True)])
-        corners = [int(mesh.F[face, 0]) for face in faces]
-        row[f"{method}, vertex"] = mean_error(query, corners, lambda corner: reference.exact(mesh, corner))
-        off = []
-        for point in points:
-            corners = mesh.F[point.faces[0]]
-            straight = np.linalg.norm(mesh.V[corners] - point.positions(mesh), axis=1)
-            off.append(np.abs(query(point)[corners] / straight - 1).max())
-        row[f"{method}, corners"] = max(off)
-    return row
-
-
-def exact_from(mesh: Mesh, point: SurfacePoints) -> FloatArray:
-    """Exact distance on the mesh with a point inside a face as its last vertex."""
-    face, new = int(point.faces[0]), mesh.n_vertices
-    fan = [np.where(np.arange(3) == corner, new, mesh.F[face]) for corner in range(3)]
-    F = np.concatenate([np.delete(mesh.F, face, 0), fan])
-    return reference.exact(Mesh(np.concatenate([mesh.V, point.positions(mesh)]), F), new)[:-1]
-
-
 def main(argv: Sequence[str] | None = None) -> None:
-    switches = {"variants": False, "in_faces": False}
-    options = parsed(__doc__, argv, "*", shapes=[""], members=0, methods=list(METHODS), sources=3, **switches)
+    options = parsed(__doc__, argv, "*", shapes=[""], members=0, methods=list(METHODS), sources=3, variants=False)
     reasons: list[str] = []
-    if options.in_faces:
-        rows = collected(in_faces(path, options.sources, options.seed) for path in options.meshes)
-        columns = {"mesh": "{mesh}"}
-        for method in ("heat", "sweep"):
-            columns |= {f"{method}, face": f"{{{method}:.3g}}", f"{method}, vertex": f"{{{method}, vertex:.3g}}"}
-            columns |= {f"{method}, corners": f"{{{method}, corners:.1e}}"}
-        publish(options, {"in faces": Table(rows, columns)})
-        return
     methods = VARIANTS if options.variants else {name: METHODS[name] for name in options.methods}
     rows = collected(over_meshes(options, methods, reasons))
     if options.variants:

@@ -1,8 +1,7 @@
-"""Signed distance on surfaces and in space: errors from broken curves, circles and holed surfaces, and times.
+"""Signed distance on surfaces and in space: errors from broken curves, circles and holed surfaces.
 
     python scripts/signed_table.py circles [--finest 160]        # circles against closed forms
     python scripts/signed_table.py broken MESH ... [--cases 40]  # curves with gaps, beside potpourri3d
-    python scripts/signed_table.py times MESH ... [--repeats 5]  # shares of potpourri3d's times
     python scripts/signed_table.py volumes [--points 33] [--boxes 14] [--holed 3]   # in space, from surfaces with holes
 
 circles: on a perturbed square, a sphere and a cylinder, each mesh with edges half as long as the one before: the mean
@@ -10,7 +9,6 @@ error in percent of the mean distance, and the order to which it falls.
 broken: a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
 curves removed in one to six pieces. Truth is exact distance from the whole curves with the sign of the function; errors
 are means over the vertices, as a share of the square root of the area inside, in percent.
-times: medians of paired runs by the clock; potpourri3d's precomputation includes its first query, which factors.
 volumes: a sphere, a box and a torus in a unit cube: closed, with 20 % of the faces removed one by one, or 20 % of the
 area in patches. Truth is libigl's distance with the winding number. Mean error in cells within a cell of the surface,
 and in brackets at all points; the largest of several seeds. docs/signed_theory.md shows the tables.
@@ -21,7 +19,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -42,7 +39,7 @@ from heat_igl import (
 from heat_igl.curves import sublevel_areas
 from heat_igl.typing import FloatArray
 
-from harness import Row, as_they_are, collected, geometric_mean, named, paired, parsed, publish, ratio
+from harness import Row, as_they_are, collected, geometric_mean, named, parsed, publish
 
 COARSEST = 20
 # A regular grid has edges in three directions, which heat prefers; a random move of the vertices, by this share of the
@@ -210,36 +207,6 @@ def summary(rows: Sequence[Row]) -> Iterator[Row]:
     yield {"removed": "in the geometric mean", "n": ""} | means
 
 
-def times(name: str, mesh: Mesh, repeats: int) -> Iterator[Row]:
-    """Medians of paired runs: a curve through the middle of the mesh, whole for the peer and in every ratio."""
-    height = mesh.V @ [0.3, 0.5, 0.81]
-    curves = isolines(mesh, height, float(np.median(height)))[0]
-    rng = np.random.default_rng(0)
-    pieces = [piece for curve in curves for piece in broken(mesh, curve, 0.3, 3, rng)]
-    peer, solver = Peer(mesh), SignedHeatSolver(mesh)
-    nodes = peer.nodes(curves)
-
-    def theirs() -> None:
-        import potpourri3d
-
-        made = potpourri3d.MeshSignedHeatSolver(mesh.V, mesh.F)
-        made.compute_distance(nodes, level_set_constraint="None")
-
-    calls: dict[str, Callable[[], object]] = {
-        "query from a closed curve": lambda: solver.distance(curves),
-        "query from a curve with gaps": lambda: solver.distance(pieces),
-        'query, level="zero"': lambda: solver.distance(curves, level="zero"),
-    }
-    made = paired({"ours": lambda: SignedHeatSolver(mesh), "theirs": theirs}, repeats, time.perf_counter)
-    asked = paired(calls | {"theirs": lambda: peer.distance(nodes, "None")}, repeats, time.perf_counter)
-    for what, one, other in (
-        ("precomputation", made["ours"], made["theirs"]),
-        *((what, asked[what], asked["theirs"]) for what in calls),
-    ):
-        both = {"ours, s": np.median(one), "potpourri3d, s": np.median(other)}
-        yield {"mesh": name, "what": what} | both | {"ratio": ratio(one, other)}
-
-
 # In space.
 
 
@@ -299,13 +266,12 @@ def volumes(options: argparse.Namespace) -> Iterator[Row]:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    names = ("circles", "broken", "times", "volumes")
-    options = parsed(__doc__, argv, "*", names, finest=160, cases=40, repeats=5, points=33, boxes=14, holed=3)
+    names = ("circles", "broken", "volumes")
+    options = parsed(__doc__, argv, "*", names, finest=160, cases=40, points=33, boxes=14, holed=3)
     meshes = named(options.meshes)
     make: dict[str, Callable[[], Iterator[Row]]] = {
         "circles": lambda: circles(options),
         "broken": lambda: summary(collected(broken_rows(meshes, options))),
-        "times": lambda: (row for name, mesh in meshes.items() for row in times(name, mesh, options.repeats)),
         "volumes": lambda: volumes(options),
     }
     rows = collected(make[options.table]())
