@@ -784,12 +784,6 @@ def test_order_and_orientation_of_the_faces_do_not_matter():
     assert abs(one.M - other.M).max() <= 1e-9 * abs(one.M).max()
 
 
-def test_paths_are_to_be_unfolded_on_each_face_once():
-    domain = operators(finned_sphere())
-    assert domain.surface.unfolding.areas.sum() == pytest.approx(domain.weights.sum(), rel=1e-12)
-    assert (domain.surface.unfolding.twin == -2).any()
-
-
 def test_each_face_once_keeps_the_first_of_each():
     mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [2, 1, 3], [1, 2, 0], [3, 2, 1], [2, 1, 3]])
     once, kept = each_face_once(intrinsic_triangulation(mesh))

@@ -14,7 +14,6 @@ import igl
 import numpy as np
 
 from heat_igl.intrinsic.history import Change, Covered
-from heat_igl.intrinsic.layout import corner_angles
 from heat_igl.mesh import grouping
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -115,11 +114,6 @@ class IntrinsicTriangulation:
     def areas(self) -> FloatArray:
         """Area (m,) of each triangle, by Heron's formula in Kahan's order."""
         return np.asarray(igl.doublearea(self.l, 0.0) / 2)
-
-    @property
-    def total_angles(self) -> FloatArray:
-        """The sum (n,) of the angles around each vertex: 2 pi inside a plane, pi on a straight boundary."""
-        return np.asarray(np.bincount(self.F.ravel(), corner_angles(self.l).ravel(), self.n), np.float64)
 
     @property
     def is_cover(self) -> bool:

@@ -101,50 +101,19 @@ def components(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
     above: cython.longlong[::1] = labels  # a vertex of the same component, not above this one; then the label
     f: cython.Py_ssize_t
     c: cython.Py_ssize_t
+    v: cython.Py_ssize_t
+    count: cython.longlong = 0
     with cython.nogil:
         for f in range(F.shape[0]):
             for c in range(1, F.shape[1]):
                 _join(above, F[f, 0], F[f, c])
-        _number(above)
+        for v in range(n):
+            if above[v] == v:
+                above[v] = count
+                count += 1
+            else:
+                above[v] = above[above[v]]
     return labels
-
-
-def components_without(F: cython.const[cython.int][:, ::1], skip: cython.const[cython.uchar][::1]):
-    """As `components`, of the vertices that are left if some are taken away; each of these is a component of its own.
-
-    `F` (m, k) int32, and `skip` (n,) says which to take away.
-    """
-    labels = np.arange(skip.shape[0])
-    above: cython.longlong[::1] = labels
-    f: cython.Py_ssize_t
-    c: cython.Py_ssize_t
-    with cython.nogil:
-        for f in range(F.shape[0]):
-            first: cython.int = -1
-            for c in range(F.shape[1]):
-                if skip[F[f, c]]:
-                    continue
-                if first >= 0:
-                    _join(above, first, F[f, c])
-                else:
-                    first = F[f, c]
-        _number(above)
-    return labels
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _number(above: cython.longlong[::1]) -> cython.void:
-    """From a vertex of the same component that is not above each to the number of the component."""
-    count: cython.longlong = 0
-    v: cython.Py_ssize_t
-    for v in range(above.shape[0]):
-        if above[v] == v:
-            above[v] = count
-            count += 1
-        else:
-            above[v] = above[above[v]]
 
 
 @cython.cfunc
