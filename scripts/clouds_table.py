@@ -2,16 +2,17 @@
 
     python scripts/clouds_table.py distances [--sizes 5000 50000] [--noise 0 0.01] [--shapes torus] [--sources 6]
     python scripts/clouds_table.py distances bunny.obj ...     # the vertices of meshes instead
-    python scripts/clouds_table.py clock [--repeats 15]        # times by the clock, as ratios
+    python scripts/clouds_table.py turns [MESH ...] [--repeats 15]   # errors, and times as ratios
     python scripts/clouds_table.py log-maps bunny.obj ...
     python scripts/clouds_table.py scans [--sizes 1000 5000 20000] [--sources 3]   # noise, outliers, uneven density
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4, a cylinder of radius 1 and height 3, and a square
-with sides of length 1; noise is Gaussian in all coordinates, of the given standard deviation. distances: the share of
-doubtful points that is held to a bound, with a star where the cloud warned, the mean of |d - exact| / exact in percent,
-and seconds of all processors together to make the solver and for a query. clock: both
-solvers take turns; medians of ratios, of the solver with the first query, for which potpourri3d factors, of the solver,
-and of a later query. log-maps: on the vertices of meshes, against the exact one of the mesh: the median angle between
+with sides of length 1; noise is Gaussian in all coordinates, of the given standard deviation. distances: the mean of
+|d - exact| / exact in percent, and seconds of all processors together to make the solver and for a query. turns: both
+solvers take turns; medians of ratios of processor time, of the solver, of the solver with the first query, for which
+potpourri3d factors, and of a later query; with the mean errors, and the share of the points that are doubtful, not
+counting folds, with a star where the cloud warned. log-maps: on the vertices of meshes, against the exact one of the
+mesh: the median angle between
 them in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in percent at the points of the
 surface, of default / potpourri3d / the shortest path in the graph of 8 neighbours, which is what there is without a
 solver; a star follows where the cloud warned. Needs the extra ``bench``; docs/clouds.md shows the tables.
@@ -194,8 +195,6 @@ def clouds(options: argparse.Namespace) -> Iterator[tuple[Row, FloatArray, Query
 def distances(options: argparse.Namespace) -> Iterator[Row]:
     for row, P, truth in clouds(options):
         sources = np.random.default_rng(options.seed).choice(len(P), options.sources, replace=False).tolist()
-        doubtful, row["warned"] = _surface(P)
-        row["doubtful"] = 100 * len(doubtful) / len(P)
         for method in options.methods:
             start = time.process_time()
             query = METHODS[method](P)
@@ -206,20 +205,25 @@ def distances(options: argparse.Namespace) -> Iterator[Row]:
         yield row
 
 
-def clock(options: argparse.Namespace) -> Iterator[Row]:
-    """Median ratios of times by the clock to potpourri3d's."""
+def turns(options: argparse.Namespace) -> Iterator[Row]:
+    """Errors, and median ratios of processor times to potpourri3d's."""
 
     def stages(method: str, P: FloatArray) -> tuple[float, float, float]:
-        start = time.perf_counter()
+        start = time.process_time()
         query = METHODS[method](P)
-        made = time.perf_counter() - start
+        made = time.process_time() - start
         query(0)
-        first = time.perf_counter() - start
-        return first, made, seconds(lambda: query(len(P) // 2), time.perf_counter)
+        first = time.process_time() - start
+        return made, first, seconds(lambda: query(len(P) // 2))
 
-    for row, P, _ in clouds(options):
-        ratios = [np.divide(stages("heat", P), stages("potpourri3d", P)) for _ in range(options.repeats)]
-        yield row | dict(zip(("both", "solver", "later"), np.median(ratios, axis=0), strict=True))
+    for row, P, truth in clouds(options):
+        doubtful, warned = _surface(P)
+        row["doubtful"] = f"{100 * len(doubtful) / len(P):.2g}{warned}"
+        sources = np.random.default_rng(options.seed).choice(len(P), options.sources, replace=False).tolist()
+        for method in ("default", "potpourri3d"):
+            row[method] = mean_error(METHODS[method](P), sources, truth)
+        ratios = [np.divide(stages("default", P), stages("potpourri3d", P)) for _ in range(options.repeats)]
+        yield row | dict(zip(("solver", "both", "later"), np.median(ratios, axis=0), strict=True))
 
 
 def log_maps(options: argparse.Namespace) -> Iterator[Row]:
@@ -247,7 +251,7 @@ def log_maps(options: argparse.Namespace) -> Iterator[Row]:
 
 def main(argv: Sequence[str] | None = None) -> None:
     several = {"shapes": [*SHAPES], "sizes": [5000, 50000], "noise": [0.0, 0.01], "methods": [*METHODS]}
-    options = parsed(__doc__, argv, "*", ("distances", "clock", "log-maps", "scans"), sources=6, repeats=15, **several)
+    options = parsed(__doc__, argv, "*", ("distances", "turns", "log-maps", "scans"), sources=6, repeats=15, **several)
     head = {"points on": "{points on}", "number": "{number}", "noise": "{noise:g}"}
     if options.table == "distances":
         columns = (
@@ -257,9 +261,11 @@ def main(argv: Sequence[str] | None = None) -> None:
         )
         columns |= {f"{m}, s + s": f"{{{m}[made]:.2g}} + {{{m}[asked]:.2g}}" for m in options.methods}
         table = Table(collected(distances(options)), columns)
-    elif options.table == "clock":
-        columns = {"solver and first query": "{both:.2f}", "solver": "{solver:.2f}", "later query": "{later:.2f}"}
-        table = Table(collected(clock(options)), head | columns)
+    elif options.table == "turns":
+        columns = head | {"doubtful, %": "{doubtful}"}
+        columns |= {"default, %": "{default:.2g}", "potpourri3d, %": "{potpourri3d:.2g}", "solver": "{solver:.2f}"}
+        columns |= {"solver and first query": "{both:.2f}", "later query": "{later:.2f}"}
+        table = Table(collected(turns(options)), columns)
     elif options.table == "scans":
         cell = "{{{0}[default]:.2g}} / {{{0}[potpourri3d]:.2g}} / {{{0}[graph]:.2g}}{{{0}[warned]}}"
         columns = {shape: cell.format(shape) for shape in options.shapes}
