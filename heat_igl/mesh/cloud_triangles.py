@@ -26,19 +26,6 @@ from heat_igl.mesh.neighbourhoods import Neighbourhoods
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
-__all__ = [
-    "FOLDED_BACK",
-    "at_all_corners",
-    "cloud_triangles",
-    "corner",
-    "glued_sides",
-    "pinched_vertices",
-    "with_fans_joined",
-    "with_loops_filled",
-    "with_one_fan",
-    "with_points",
-]
-
 # Largest radius of a circumscribed circle, in shares of the radius of the neighbourhood. Below one half, all points
 # inside the circle are known; a little more bridges the gaps of random points.
 _LARGEST_RADIUS = 0.6

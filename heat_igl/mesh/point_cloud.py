@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError
-from heat_igl.mesh.cloud_copies import distinct_points
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.mesh.report import CloudReport
 from heat_igl.runtime import warn_caller
@@ -130,7 +129,20 @@ class PointCloud:
 
     @cached_property
     def _distinct(self) -> tuple[IntArray, IntArray]:
-        return distinct_points(self.P)
+        """The points (k,) that are no copy of an earlier one, and which of them each of the n points equals."""
+        P = self.P
+        # Copies have the same sum, whatever the factors.
+        total = np.sort(P[:, 0] + np.sqrt(2) * P[:, 1] + np.sqrt(3) * P[:, 2])
+        if (total[1:] > total[:-1]).all():
+            return np.arange(len(P)), np.arange(len(P))
+        order = np.lexsort(P.T)
+        is_new = np.ones(len(P), bool)
+        is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
+        # The sort is stable: the first of equal points has the smallest index.
+        distinct = np.sort(order[is_new])
+        original = np.empty(len(P), np.int64)
+        original[order] = np.searchsorted(distinct, order[is_new])[np.cumsum(is_new) - 1]
+        return distinct, original
 
     @property
     def has_copies(self) -> bool:
