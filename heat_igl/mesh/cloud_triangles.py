@@ -10,7 +10,6 @@ joined, and points in no triangle are inserted into the nearest one.
 from __future__ import annotations
 
 from collections import defaultdict
-from itertools import product
 
 import numpy as np
 
@@ -266,28 +265,37 @@ def with_fans_joined(P: FloatArray, F: IntArray, is_settled: BoolArray) -> IntAr
     for vertex in np.flatnonzero(is_pinched).tolist():
         while True:
             joint = _between_fans(P, vertex, sides[vertex])
-            free = [(a, b) for a, b in joint if sum(b in side for side in sides[a]) < 2]
-            if not free:
+            free = next(((a, b) for a, b in joint if sum(b in side for side in sides[a]) < 2), None)
+            if free is None:
                 break
-            added.append((vertex, *free[0]))
+            added.append((vertex, *free))
             add(*added[-1])
     return np.concatenate([F, np.array(added, F.dtype)]) if added else F
 
 
 def _between_fans(P: FloatArray, vertex: int, sides: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Ends of different fans, those with the smallest angle at the vertex first; `sides` are opposite to it."""
-    fans: list[list[int]] = []
-    for side in sides:
-        touching = [fan for fan in fans if not set(fan).isdisjoint(side)]
-        fans = [fan for fan in fans if fan not in touching] + [sum(touching, list(side))]
-    ends = [[corner for corner in fan if fan.count(corner) == 1] for fan in fans]
-    pairs = [pair for i in range(len(ends)) for j in range(i) for pair in product(ends[i], ends[j])]
-    if not pairs:
+    beside: defaultdict[int, list[int]] = defaultdict(list)
+    for a, b in sides:
+        beside[a].append(b)
+        beside[b].append(a)
+    fan: dict[int, int] = {}
+    for end, at in ((corner, others[0]) for corner, others in beside.items() if len(others) == 1):
+        if end not in fan:
+            before = end
+            while len(beside[at]) > 1:
+                before, at = at, sum(beside[at]) - before
+            fan[end] = fan[at] = end
+    ends = list(fan)
+    if len(ends) < 3:
         return []
-    ways = P[np.array(pairs)] - P[vertex]
-    lengths = np.linalg.norm(ways, axis=2).prod(axis=1)
-    cosine = np.einsum("kx,kx->k", ways[:, 0], ways[:, 1]) / np.maximum(lengths, np.finfo(float).tiny)
-    return [pairs[i] for i in np.argsort(-cosine, kind="stable")]
+    ways = P[ends] - P[vertex]
+    ways /= np.maximum(np.linalg.norm(ways, axis=1), np.finfo(float).tiny)[:, None]
+    cosine = (ways @ ways.T).tolist()
+    pairs = [
+        (-cosine[i][j], ends[i], ends[j]) for i in range(len(ends)) for j in range(i) if fan[ends[i]] != fan[ends[j]]
+    ]
+    return [(a, b) for _, a, b in sorted(pairs)]
 
 
 def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_settled: BoolArray) -> IntArray:
