@@ -506,6 +506,22 @@ def test_a_circle_around_the_sphere():
         np.testing.assert_allclose(curve.positions(mesh)[:, 2], height, atol=5e-3)
 
 
+def test_more_corners_on_the_lines_of_a_polyline_change_no_curve():
+    sphere, rng = shapes.icosphere(3), np.random.default_rng(3)
+    mesh = Mesh(sphere.V * np.exp(0.2 * rng.normal(size=(sphere.n_vertices, 1))), sphere.F)
+    angle, share = np.linspace(0, 2, 8), np.linspace(0, 1, 100, endpoint=False)[:, None]
+    for x, y in np.eye(3)[[[0, 1], [1, 2], [2, 0]]]:
+        corners = closest_points(mesh, np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)).points.positions(mesh)
+        dense = np.concatenate([*(a + share * (b - a) for a, b in itertools.pairwise(corners)), corners[-1:]])
+        curve = curve_on(mesh, corners, tolerance=1)
+        assert_connected(mesh, curve)
+        assert curve.length == pytest.approx(curve_on(mesh, dense, tolerance=1).length, rel=0.01)
+        # At least as long as the track of the closest points, which jumps over valleys.
+        track = closest_points(mesh, dense).points.positions(mesh)
+        assert curve.length > 0.995 * np.linalg.norm(np.diff(track, axis=0), axis=1).sum()
+        assert np.linalg.norm(curve.points[:, None] - corners, axis=2).min(axis=0).max() < 1e-12
+
+
 def test_a_polyline_over_a_real_mesh(bunny):
     """Through vertices in space that are not neighbours, a mean edge length off the surface."""
     rng = np.random.default_rng(0)

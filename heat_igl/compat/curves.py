@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import igl
 import numpy as np
 
-from heat_igl.curves import geodesic_path, isolines, shortest_path, straighten, trace_geodesic
+from heat_igl.curves import GeodesicPathSolver, geodesic_path, isolines, shortest_path, straighten, trace_geodesic
+from heat_igl.curves.places import CommonFaces
+from heat_igl.curves.shortening import as_curve
 from heat_igl.geodesic import geodesic_distance
 from heat_igl.heat import HeatMethodSolver, SignedHeatSolver
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.sources import OffsetSources
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 # Curves, each a list of points: a face, and the barycentric coordinates in it.
 Curves = list[list[tuple[int, list[float]]]]
@@ -151,53 +152,31 @@ _LEVELS: dict[str, Literal["zero", "none", "constant"]] = {"zeroset": "zero", "n
 _SIGNED_TIME_STEP = 0.25
 
 
-class _Place(NamedTuple):
-    """Vertices (k,) of a face, up to three, and their weights (k,), none of them 0."""
-
-    vertices: IntArray
-    weights: FloatArray
-
-
 class CurveReader:
     """Reads the curves of potpourri3d, lists of nodes, as curves and points of this package."""
 
     def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-        self._faces, self._first = igl.vertex_triangle_adjacency(mesh.F, mesh.n_vertices)
+        self._mesh, self._faces, self._solver = mesh, CommonFaces(mesh), GeodesicPathSolver(mesh)
 
     def points(self, name: str, nodes: Sequence[Node]) -> SurfacePoints:
         """The nodes as points in faces."""
-        found = [self._in_face(place, self._common_face(place.vertices)) for place in self._places(name, nodes)]
+        found = [self._place(f"{name}[{i}]", *node) for i, node in enumerate(nodes)]
         faces, barycentric = zip(*found, strict=True)
         return SurfacePoints(np.array(faces), np.array(barycentric))
 
     def curve(self, name: str, nodes: Sequence[Node]) -> SurfaceCurve:
-        """The curve from node to node: straight in a face that has both, and along the shortest path otherwise."""
-        places = self._places(name, nodes)
-        if len(places) < 2:
-            raise ValueError(f"{name} has {len(places)} points: a curve needs two or more")
-        pieces = [self._piece(p, q) for p, q in pairwise(places)]
-        faces, start, end = (
-            np.concatenate([getattr(piece, part) for piece in pieces]) for part in ("faces", "start", "end")
-        )
-        return SurfaceCurve(faces, start, end)
+        """The curve from node to node: straight in a face that has both, and along a geodesic otherwise."""
+        if len(nodes) < 2:
+            raise ValueError(f"{name} has {len(nodes)} points: a curve needs two or more")
+        at = self.points(name, nodes)
+        return as_curve(self._solver.pieces(at.faces, at.barycentric), is_closed=False)
 
     def through(self, name: str, vertices: Sequence[int]) -> SurfaceCurve:
         """The curve from vertex to vertex."""
         return self.curve(name, [(vertex, ()) for vertex in vertices])
 
-    def _piece(self, p: _Place, q: _Place) -> SurfaceCurve:
-        face = self._common_face(np.concatenate([p.vertices, q.vertices]))
-        if face >= 0:
-            (_, start), (_, end) = self._in_face(p, face), self._in_face(q, face)
-            return SurfaceCurve(np.array([face]), start, end)
-        ends = [self._in_face(place, self._common_face(place.vertices)) for place in (p, q)]
-        return geodesic_path(self._mesh, [SurfacePoints(np.array([face]), at) for face, at in ends])
-
-    def _places(self, name: str, nodes: Sequence[Node]) -> list[_Place]:
-        return [self._place(f"{name}[{i}]", *node) for i, node in enumerate(nodes)]
-
-    def _place(self, name: str, index: int, coordinates: Sequence[float]) -> _Place:
+    def _place(self, name: str, index: int, coordinates: Sequence[float]) -> tuple[int, FloatArray]:
+        """The first face that holds a node, and the coordinates (3,) of the node in it."""
         given = np.asarray(coordinates, np.float64).ravel()
         if len(given) > 3:
             raise ValueError(
@@ -212,23 +191,11 @@ class CurveReader:
             given = np.array([1 - given[0], given[0]])
         elif len(given) != 3:
             given = np.append(given, 1 - given.sum())
-        held = given != 0
-        return _Place(elements[index][held], given[held])
-
-    def _common_face(self, vertices: IntArray) -> int:
-        """The first face that has all these vertices, or -1."""
-        found: set[int] | None = None
-        for v in np.unique(vertices):
-            around = set(self._faces[self._first[v] : self._first[v + 1]].tolist())
-            found = around if found is None else found & around
-        return min(found, default=-1) if found is not None else -1
-
-    def _in_face(self, place: _Place, face: int) -> tuple[int, FloatArray]:
-        """The face, and the barycentric coordinates (3,) of a place in it."""
+        vertices = elements[index]
+        face = self._faces.of(vertices[given != 0])
         if face < 0:
-            raise ValueError(f"vertex {place.vertices[0]} is in no face, so no curve goes through it")
-        here = self._mesh.F[face][:, None] == place.vertices
-        return face, (here * place.weights).sum(axis=1)
+            raise ValueError(f"vertex {vertices[0]} is in no face, so no curve goes through it")
+        return face, ((self._mesh.F[face][:, None] == vertices) * given).sum(axis=1)
 
 
 def signed_distance(

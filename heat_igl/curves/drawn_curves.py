@@ -11,9 +11,16 @@ from heat_igl.errors import SourceError, names_guessed, positive, truth
 from heat_igl.heat import SignedHeatSolver
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, closest_points
 from heat_igl.mesh.grouping import enumerate_runs
-from heat_igl.mesh.projection import checked_points
+from heat_igl.mesh.projection import ClosestPoints, Projector, checked_points
 from heat_igl.mesh.surface_points import unchecked_curve
-from heat_igl.typing import ArrayLike, FloatArray
+from heat_igl.typing import ArrayLike, FloatArray, IntArray
+
+# Twice so many faces are followed between two samples, half a mean edge length apart.
+_MOST_FACES = 100
+# Shares of a line nearer to one another are the same place.
+_SAME_PLACE = 1e-9
+# A jump is found up to this length, in mean edge lengths.
+_NEAR_A_JUMP = 0.003
 
 
 @names_guessed
@@ -86,7 +93,8 @@ def curve_on(
         Triangles.
     positions : (k, 3) array_like
         Corners of the polyline, in the mesh's unit. Each straight line between two corners is sampled at steps of at
-        most half a mean edge length; the closest points to the samples are joined by geodesics.
+        most half a mean edge length, and where it passes from one face to the next. The closest points to the samples
+        are joined by straight lines in faces that hold both, else, as over a valley, by geodesics.
     closed : bool
         Whether a last line leads back to the first corner.
     tolerance : float, optional
@@ -131,21 +139,23 @@ def curve_on(
     line, step = enumerate_runs(np.maximum(np.ceil(lengths / (h / 2)).astype(int), 1))
     share = step / np.bincount(line)[line]
     samples = np.append(ends[line] + share[:, None] * (ends[line + 1] - ends[line]), ends[-1:], axis=0)
-    found = closest_points(mesh, samples)
+    step, places, found = _with_borders(mesh, solver, samples)
+    line = line[step]
     far = int(found.gap.argmax())
     if found.gap[far] > tolerance:
         raise SourceError(
             f"the polyline leaves the surface by {found.gap[far]:.6g} on the line from "
-            f"positions[{line[min(far, len(line) - 1)]}], at {samples[far].tolist()}; tolerance is {tolerance:.6g}"
+            f"positions[{line[min(far, len(line) - 1)]}], at {places[far].tolist()}; tolerance is {tolerance:.6g}"
         )
     faces, barycentric = found.points.faces, snapped(found.points.barycentric)
     component = mesh.components[mesh.F[faces, 0]]
     jumps = component[1:] != component[:-1]
     if not jumps.any():
-        curve = as_curve(legs := solver.geodesics(faces, barycentric), is_closed=closed).on(mesh)
-        # Each corner of the curve lies near the straight line between the two samples of its leg.
+        curve = as_curve(legs := solver.pieces(faces, barycentric), is_closed=closed).on(mesh)
+        # Each corner of the curve lies near the straight line of its step.
         leg = np.repeat(np.arange(len(legs)), [len(part.faces) for part in legs])
-        begin, along = samples[leg], samples[leg + 1] - samples[leg]
+        begin = samples[step[leg]]
+        along = samples[step[leg] + 1] - begin
         place = curve.points[1:] - begin
         squared = np.maximum(np.einsum("kx,kx->k", along, along), np.finfo(float).tiny)
         nearest = np.clip(np.einsum("kx,kx->k", place, along) / squared, 0, 1)[:, None] * along
@@ -154,12 +164,58 @@ def curve_on(
         i = int(np.argmax(jumps))
         raise SourceError(
             f"the line from positions[{line[i]}] jumps from face {faces[i]} to face {faces[i + 1]} at "
-            f"{samples[i].tolist()}, where another part of the surface is closer: draw it closer to the surface"
+            f"{places[i].tolist()}, where another part of the surface is closer: draw it closer to the surface"
         )
     moves = (curve.start != curve.end).any(axis=1)
     if not moves.any():
         raise SourceError("all positions are closest to one point of the surface: a curve needs two different ones")
     return unchecked_curve(curve.faces[moves], curve.start[moves], curve.end[moves], closed, mesh)
+
+
+def _with_borders(
+    mesh: Mesh, solver: GeodesicPathSolver, samples: FloatArray
+) -> tuple[IntArray, FloatArray, ClosestPoints]:
+    """The step (j - 1,) between two samples that each leg is in, and places (j, 3) with their closest points.
+
+    Places are the samples (k, 3), and more between those that no face holds: where the line, projected onto the plane
+    of the face at either end, leaves that face. If that is not between them, closest points jump, as over a valley, and
+    the pair is halved.
+    """
+    projector = Projector(mesh)
+    found = projector.project(samples)
+    step = apart = np.arange(len(samples) - 1)
+    for _ in range(_MOST_FACES):
+        faces, barycentric = found.points.faces, found.points.barycentric
+        apart = apart[[not solver.hold(faces[i : i + 2], barycentric[i : i + 2]) for i in apart]]
+        begin, end = samples[apart], samples[apart + 1]
+        shares = np.stack([_leaving(mesh, faces[apart], begin, end), 1 - _leaving(mesh, faces[apart + 1], end, begin)])
+        shares.sort(axis=0)
+        shares[1, shares[1] < shares[0] + _SAME_PLACE] = 1
+        is_new = (shares > _SAME_PLACE) & (shares < 1 - _SAME_PLACE)
+        jumps = ~is_new.any(axis=0) & (np.linalg.norm(end - begin, axis=1) > _NEAR_A_JUMP * mesh.edge_lengths.mean())
+        shares[0, jumps], is_new[0, jumps] = 0.5, True
+        pair, which = np.nonzero(is_new.T)
+        if not len(pair):
+            break
+        between = begin[pair] + shares[which, pair, None] * (end - begin)[pair]
+        more, at = projector.project(between), apart[pair] + 1
+        faces = np.insert(faces, at, more.points.faces)
+        barycentric = np.insert(barycentric, at, more.points.barycentric, axis=0)
+        found = ClosestPoints(SurfacePoints(faces, barycentric), np.insert(found.gap, at, more.gap))
+        step, samples = np.insert(step, at, step[at - 1]), np.insert(samples, at, between, axis=0)
+        new = at + np.arange(len(at))
+        apart = np.union1d(new - 1, new)
+    return step, samples, found
+
+
+def _leaving(mesh: Mesh, faces: IntArray, begin: FloatArray, end: FloatArray) -> FloatArray:
+    """The share (k,) of each line at which, projected onto the plane of a face, it leaves the face; else 1."""
+    corners = mesh.V[mesh.F[faces]]
+    inverse = np.linalg.pinv(corners[:, 1:] - corners[:, :1])
+    before, after = (np.einsum("kx,kxc->kc", x - corners[:, 0], inverse) for x in (begin, end))
+    before, after = (np.column_stack([1 - x.sum(axis=1), x]) for x in (before, after))
+    leaves = (after < 0) & (before > 0)
+    return np.asarray(np.where(leaves, before / np.where(leaves, before - after, 1), 1.0).min(axis=1))
 
 
 def signed_distance(mesh: MeshLike, curve: NestedCurves) -> FloatArray:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from threading import RLock
 
 import numpy as np
 
-from heat_igl.curves.places import Waypoints, corners, mixed_places
+from heat_igl.curves.places import CommonFaces, Waypoints, corners, mixed_places
 from heat_igl.curves.routes import Router
 from heat_igl.curves.shortening import FaceSequence, Shortened, Shortener, as_curve, course_of
 from heat_igl.errors import MeshError, SourceError, names_guessed, truth
@@ -179,6 +180,25 @@ class GeodesicPathSolver:
         """The geodesics between checked places (k,), each from one to the next."""
         with self._one_at_a_time:
             return [self._shortener.shortest(leg) for leg in self._routes.legs(faces, barycentric)]
+
+    def pieces(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
+        """From each checked place (k,) to the next: straight in a face that holds both, or else the geodesic."""
+        found = []
+        for i in range(len(faces) - 1):
+            two = faces[i : i + 2], barycentric[i : i + 2]
+            face, ends = self._common.around(*two)
+            length = float(np.linalg.norm((ends[1] - ends[0]) @ self._mesh.V[self._mesh.F[face]]))
+            straight = Shortened(length, np.array([face]), ends[None])
+            found += [straight] if face >= 0 else self.geodesics(*two)
+        return found
+
+    def hold(self, faces: IntArray, barycentric: FloatArray) -> bool:
+        """Whether one face holds two places, given as for `pieces`."""
+        return self._common.around(faces, barycentric)[0] >= 0
+
+    @cached_property
+    def _common(self) -> CommonFaces:
+        return CommonFaces(self._mesh)
 
     @property
     def _routes(self) -> Router:

@@ -9,6 +9,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
+from heat_igl.mesh.grouping import group_by_label
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
 
@@ -54,6 +55,26 @@ def mixed_places(
             raise SourceError(f"{name}[{i}] must be a vertex or SurfacePoints, not {type(point).__name__}")
         parts.append(places(f"{name}[{i}]", mesh, cast(Sources, point), corner_at))
     return np.concatenate([faces for faces, _ in parts]), np.concatenate([weights for _, weights in parts])
+
+
+class CommonFaces:
+    """Finds faces of a mesh that hold several vertices."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh, self._around = mesh, group_by_label(mesh.F.ravel(), mesh.n_vertices)
+
+    def of(self, vertices: IntArray) -> int:
+        """The first face that has all these vertices, or -1."""
+        first, corner = self._around
+        found = [set((corner[first[v] : first[v + 1]] // 3).tolist()) for v in np.unique(vertices).tolist()]
+        return min(set.intersection(*found), default=-1)
+
+    def around(self, faces: IntArray, barycentric: FloatArray) -> tuple[int, FloatArray]:
+        """The first face that holds two places, by faces (2,) and coordinates (2, 3), and those in it; or face -1."""
+        corners = self._mesh.F[faces]
+        face = int(faces[0]) if faces[0] == faces[1] else self.of(corners[barycentric > 0])
+        here = self._mesh.F[face][None, :, None] == corners[:, None]
+        return face, np.einsum("kij,kj->ki", here, barycentric)
 
 
 def snapped(barycentric: FloatArray) -> FloatArray:
