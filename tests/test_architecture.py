@@ -30,7 +30,6 @@ numba
 polyscope
 potpourri3d
 psutil
-pyamg
 pygeodesic
 pymeshlab
 pytest

@@ -84,7 +84,6 @@ def test_loops_of_an_abandoned_pool_end():
 CALLS = {
     "the factors of heat": "HeatMethodSolver(large)",
     "a batch by heat": "HeatMethodSolver(mesh).distances(each)",
-    "heat by relaxation": "HeatMethodSolver(mesh, backend='iterative').distances(each)",
     "an exact batch": "GeodesicSolver(large).distances(each)",
     "a batch of sweeps": "GeodesicSolver(large, method='sweep').distances(each)",
     "a local query": "distances_within(mesh, 1.0)",

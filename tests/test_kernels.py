@@ -19,7 +19,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from heat_igl import kernels, shapes
-from heat_igl.kernels.linear import relaxation
 from heat_igl.kernels.ordering import ascending
 from heat_igl.linear import factorize, multifrontal
 from heat_igl.linear.dissection import dissect
@@ -47,18 +46,6 @@ def test_any_graph_is_dissected_factored_and_solved(n, density, seed):
     x = np.where(free[:, None], np.random.default_rng(seed).standard_normal((n, 11)), 0)
     found = multifrontal.MultifrontalAnalysis(A).factorize(A, free).solve(A @ x)
     np.testing.assert_allclose(found, x, rtol=0, atol=1e-9)
-
-
-@settings(deadline=None, max_examples=60)
-@given(n=st.integers(1, 300), density=st.floats(0, 4), n_sources=st.integers(0, 5), seed=st.integers(0, 2**32 - 1))
-def test_relaxation_solves_what_the_right_hand_side_reaches(n, density, n_sources, seed):
-    A = random_m_matrix(n, int(density * n), seed)
-    b = np.zeros(n)
-    b[np.random.default_rng(seed).integers(n, size=n_sources)] = 1.0
-    x, n_sweeps = relaxation.relax(A.indptr, A.indices, A.data, b, 1e-13, 100_000)
-    assert n_sweeps >= 0
-    np.testing.assert_allclose(A @ x, b, rtol=0, atol=1e-9)
-    assert (x >= 0).all()
 
 
 @settings(deadline=None, max_examples=60)
@@ -119,7 +106,5 @@ def test_the_checked_build_raises():
     """A neighbour that there is not, met in a function that is declared to raise nothing."""
     A = random_m_matrix(20, 40, 0)
     A.indices[3] = 1000
-    with pytest.raises(IndexError, match="Out of bounds"):
-        relaxation.relax(A.indptr, A.indices, A.data, np.ones(20), 1e-13, 100)
     with pytest.raises(IndexError, match="Out of bounds"):
         dissect(A.indptr, A.indices)

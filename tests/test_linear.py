@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import itertools
 import pickle
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from threading import get_ident
 
@@ -10,11 +9,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
+from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, shapes
-from heat_igl.errors import FactorizationError, MissingExtraError
+from heat_igl.errors import FactorizationError
 from heat_igl.linear import analyse, factorize
 from heat_igl.linear.dissection import dissect
+from heat_igl.linear.factor_memory import factor_bytes
 from heat_igl.operators import operators
 from heat_igl.runtime import threads
 from heat_igl.validation.zoo import SHAPES
@@ -69,15 +70,6 @@ def test_matrices_that_are_not_positive_definite_are_refused(backend, kind):
     }[kind]
     with pytest.raises(FactorizationError, match=r"singular|not positive definite|not finite|could not be factored"):
         factorize(matrix.tocsc(), backend)
-
-
-def test_missing_backend_names_the_extra(monkeypatch):
-    """Only multigrid needs more than the base install; "auto" does without it."""
-    laplacian = -operators(shapes.icosphere(2)).L
-    monkeypatch.setitem(sys.modules, "pyamg", None)
-    free = np.arange(162) > 0
-    with pytest.raises(MissingExtraError, match="needs pyamg: pip install pyamg"):
-        factorize(laplacian, "iterative", free)
 
 
 def test_principal_submatrix(heat_matrix, backend):
@@ -262,3 +254,11 @@ def test_an_order_with_much_fill_is_not_taken() -> None:
     assert analyse(L).backend == "scipy"
     assert analyse(L, "multifrontal").backend == "multifrontal"
     assert analyse(operators(shapes.icosphere(4)).L).backend == "multifrontal"
+
+
+def test_estimate_bounds_what_the_factors_hold():
+    """One to four times the entries of the multifrontal factor: what is held while it is made comes on top."""
+    for mesh in (shapes.torus(200, 200), perturbed(shapes.box(16))):
+        A = -operators(mesh).L
+        held = analyse(A, "multifrontal").nonzeros * 12
+        assert 1 < factor_bytes(A.shape[0], A.nnz) / held < 4

@@ -61,7 +61,7 @@ class SignedHeatSolver:
     ------
     MeshError
         If the mesh is tetrahedral, not manifold, not oriented, or cannot be oriented.
-    FactorizationError, MissingExtraError, ValueError
+    FactorizationError, ValueError
         As for `HeatMethodSolver`.
 
     Notes

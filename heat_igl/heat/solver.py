@@ -58,7 +58,7 @@ class HeatMethodSolver(BatchedSolver):
         negative and the paper's method is wanted. "unit" is the paper's method throughout: otherwise the heat flow is
         fitted to the lengths of edges (`fitted_laplacian`), X follows the gradient of log u, and the vertices next to a
         source vertex get the lengths of the edges.
-    backend : {"auto", "scipy", "multifrontal", "iterative"}
+    backend : {"auto", "scipy", "multifrontal"}
         Linear solver, see `factorize`.
     region : (n,) or (m,) array_like of bool, optional
         What heat may enter, of a mesh: faces all of whose vertices are selected, or selected faces. Elsewhere distance
@@ -70,8 +70,6 @@ class HeatMethodSolver(BatchedSolver):
         If the mesh cannot be used; the message names the first offender.
     FactorizationError
         If a matrix is not positive definite.
-    MissingExtraError
-        If a library asked for is not installed.
     ValueError
         If an option has no meaning.
 

@@ -17,20 +17,18 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
-from heat_igl.linear.factor_memory import factors_fit, is_of_volume
-from heat_igl.linear.iterative import IterativeAnalysis, has_iterative
+from heat_igl.linear.factor_memory import is_of_volume
 from heat_igl.linear.multifrontal import MultifrontalAnalysis
 from heat_igl.linear.protocols import Analysis, Factorization
 from heat_igl.linear.superlu import SuperLUAnalysis
 from heat_igl.plan import MOST_FILL, SMALLEST_MULTIFRONTAL
 from heat_igl.typing import BoolArray
 
-Backend = Literal["auto", "scipy", "multifrontal", "iterative"]
+Backend = Literal["auto", "scipy", "multifrontal"]
 
 _ANALYSES: dict[str, Callable[[sp.csc_matrix], Analysis]] = {
     "scipy": SuperLUAnalysis,
     "multifrontal": MultifrontalAnalysis,
-    "iterative": IterativeAnalysis,
 }
 
 
@@ -41,10 +39,9 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
     ----------
     pattern : (n, n) csc_matrix
         Both triangles stored, indices sorted or not; the values do not matter.
-    backend : {"auto", "scipy", "multifrontal", "iterative"}
-        SuperLU; the package's own factorization; or no factors at all, see `iterative`, which needs pyamg. "auto" takes
-        the second if the matrix is not small and the order of elimination good, and the third if pyamg is installed
-        and factors would not fit into memory, by an estimate made before.
+    backend : {"auto", "scipy", "multifrontal"}
+        SuperLU, or the package's own factorization, which "auto" takes if the matrix is not small and the order of
+        elimination good.
 
     Raises
     ------
@@ -52,18 +49,12 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
         If there is no such backend.
     """
     require_choice("backend", backend, get_args(Backend))
-    found = _ANALYSES[_choice(pattern) if backend == "auto" else backend](pattern)
-    if backend != "auto" or not isinstance(found, MultifrontalAnalysis):
-        return found
     n = pattern.shape[0]
+    if backend != "auto" or n < SMALLEST_MULTIFRONTAL:
+        return _ANALYSES["scipy" if backend == "auto" else backend](pattern)
+    found = MultifrontalAnalysis(pattern)
     is_poor = found.nonzeros > MOST_FILL * n * np.log2(n) and not is_of_volume(n, pattern.nnz)
     return SuperLUAnalysis(pattern) if is_poor else found
-
-
-def _choice(pattern: sp.csc_matrix) -> str:
-    if has_iterative() and not factors_fit(pattern):
-        return "iterative"
-    return "multifrontal" if pattern.shape[0] >= SMALLEST_MULTIFRONTAL else "scipy"
 
 
 def factorize(A: sp.csc_matrix, backend: Backend = "auto", free: BoolArray | None = None) -> Factorization:
@@ -73,7 +64,7 @@ def factorize(A: sp.csc_matrix, backend: Backend = "auto", free: BoolArray | Non
     ----------
     A : (n, n) csc_matrix
         Both triangles stored.
-    backend : {"auto", "scipy", "multifrontal", "iterative"}
+    backend : {"auto", "scipy", "multifrontal"}
         See `analyse`.
     free : (n,) bool, optional
         Rows and columns to keep, all by default.
@@ -82,8 +73,6 @@ def factorize(A: sp.csc_matrix, backend: Backend = "auto", free: BoolArray | Non
     ------
     FactorizationError
         If A has entries that are not finite, or is not positive definite.
-    MissingExtraError
-        If the backend asked for needs a library that is not installed.
     ValueError
         As for `analyse`.
     """

@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
-
-from heat_igl.runtime import available_memory
 
 # Bytes per row of each of two factors while they are made, on log2 n and on n^(1/3): the multifrontal ones of spheres
 # and tori of 150k vertices took 25 to 37, those of a box of 30k vertices 35. Rather too much than too little.
 _BYTES_SURFACE = 45.0
 _BYTES_VOLUME = 100.0
-
-
-def factors_fit(A: sp.csc_matrix) -> bool:
-    """Whether factors with the pattern of `A`, heat's and Poisson's, would fit into the memory available now."""
-    return 2 * factor_bytes(A.shape[0], A.nnz) < available_memory()
 
 
 def factor_bytes(n: int, n_entries: int) -> float:

@@ -68,7 +68,7 @@ class HeatFlow:
     boundary : {"neumann", "dirichlet", "average"}
         Insulated boundary, boundary held at zero, or the mean of both solutions. Under "dirichlet" heat that is put on
         a boundary vertex stays there as a fixed value.
-    backend : {"auto", "scipy", "multifrontal", "iterative"}
+    backend : {"auto", "scipy", "multifrontal"}
         See `factorize`.
     analysis : Analysis, optional
         As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew if it does not fit.
@@ -413,7 +413,7 @@ class PoissonProblem:
     ----------
     operators : Operators
         The domain.
-    backend : {"auto", "scipy", "multifrontal", "iterative"}
+    backend : {"auto", "scipy", "multifrontal"}
         See `factorize`.
     analysis : Analysis, optional
         As `analysis` makes it for a domain with the same pattern of L, to be shared; made anew if it does not fit.

@@ -11,9 +11,6 @@ from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.steps.three_steps import shifted
 from heat_igl.typing import AnyArray, FloatArray
 
-# Fewer unknowns than this are factored by SuperLU.
-_SMALLEST_MULTIFRONTAL = 1000
-
 
 class VectorHeatFlow:
     """One backward Euler step of the heat flow of tangent vectors, (M - t L) Y = mean_mass * b, factored.
@@ -30,7 +27,7 @@ class VectorHeatFlow:
     t : float or (n_components,) float64
         Time step, a squared length; one for all components, or one for each.
     backend : {"auto", "scipy", "multifrontal"}
-        See `factorize`. The iterative backend solves for numbers of one sign only.
+        See `factorize`.
     fitted : bool
         As for `HeatFlow`. No weight is negative then, and Y is nowhere longer than heat that starts with the lengths
         of b.
@@ -41,8 +38,6 @@ class VectorHeatFlow:
     ------
     FactorizationError
         If M - t L is not positive definite.
-    ValueError
-        If the backend is iterative.
     """
 
     def __init__(
@@ -54,12 +49,6 @@ class VectorHeatFlow:
         fitted: bool = False,
         mass: FloatArray | None = None,
     ) -> None:
-        if backend == "iterative":
-            raise ValueError("backend='iterative' cannot solve for vectors: use 'auto', 'scipy' or 'multifrontal'")
-        if backend == "auto":
-            # Never the iterative one, which "auto" may stand for.
-            is_large = 2 * operators.n >= _SMALLEST_MULTIFRONTAL
-            backend = "multifrontal" if is_large else "scipy"
         self.t, self.mean_mass, self._n = t, operators.mean_mass, operators.n
         L = fitted_laplacian(operators, t) if fitted else operators.L
         lumped = operators.M.diagonal() if mass is None else mass

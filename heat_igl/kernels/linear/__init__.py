@@ -1,1 +1,1 @@
-"""Sparse matrices: assembled by counting, ordered, factored, solved, and relaxed where factors do not fit."""
+"""Sparse matrices: assembled by counting, ordered, factored and solved."""
