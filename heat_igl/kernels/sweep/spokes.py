@@ -3,8 +3,11 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.signals import is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.spokes import Corner, Spoke
 from cython.cimports.libc.math import M_PI, NAN, atan2, fabs, sqrt
+
+from heat_igl.kernels.signals import raise_caught
 
 _CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("angle", "f8")])
 
@@ -54,11 +57,15 @@ def fill(edges, first: cython.const[cython.int][::1], spoke: Spoke[::1]):
     left: cython.int[::1] = np.empty(spoke.shape[0], np.int32)
     end: cython.int[::1] = np.array(first)
     is_done: cython.uchar[::1] = np.zeros(twin.shape[0], np.uint8)
-    n_fans: cython.int
+    n_fans: cython.int = 0
     with cython.nogil:
         _shapes(length, corner)
-        n_fans = _fans(vertex, twin, aligned, corner, first, total, is_flat, spoke, left, end, is_done)
-        _fill_spokes(vertex, length, twin, aligned, corner, spoke, left)
+        # Each step takes half a second on a million faces.
+        if not is_interrupted():
+            n_fans = _fans(vertex, twin, aligned, corner, first, total, is_flat, spoke, left, end, is_done)
+            if not is_interrupted():
+                _fill_spokes(vertex, length, twin, aligned, corner, spoke, left)
+    raise_caught()
     return total_array[:n_fans].copy(), flat_array.view(bool)
 
 
