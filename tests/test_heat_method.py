@@ -23,15 +23,10 @@ def angle(mesh: Mesh, source: int) -> np.ndarray:
     return np.arccos(np.clip(directions @ directions[source], -1, 1))
 
 
-def test_several_sources_are_the_nearest_of_each(sphere, solver):
+def test_the_cell_of_each_source_starts_at_0_by_itself(sphere, solver):
+    """A common shift would leave the error of the paths between sources."""
     sources = [3, 4, 5, 6, 7, 800]
-    together = solver.distance(sources)
-    nearest = np.min([angle(sphere, source) for source in sources], axis=0)
-    assert (together[sources] == 0).all()
-    assert (together >= 0).all()
-    assert np.abs(together - nearest).mean() < 0.02 * nearest.max()
-    # The cell of each source starts at 0 by itself; a common shift would leave the error of the paths between sources.
-    h = solver.diagnostics.mean_edge_length
+    together, h = solver.distance(sources), solver.diagnostics.mean_edge_length
     for source in sources:
         ring = (angle(sphere, source) < 3 * h) & (angle(sphere, source) > 2 * h)
         bias = (together - solver.distance(source))[ring].mean()
@@ -172,13 +167,6 @@ def test_dirichlet_and_average_boundaries():
     with pytest.warns(AccuracyWarning, match="too short"):
         distance = HeatMethodSolver(mesh, boundary="dirichlet").distance(edge)
     assert 1.5 < distance[np.argmin(mesh.V[:, 0])] < 2.5
-
-
-def test_backends_agree(sphere):
-    one = HeatMethodSolver(sphere, backend="scipy")
-    other = HeatMethodSolver(sphere, backend="multifrontal")
-    assert (one.diagnostics.backend, other.diagnostics.backend) == ("scipy", "multifrontal")
-    np.testing.assert_allclose(one.distance(0), other.distance(0), rtol=0, atol=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore:heat gave|heat is off|distances differ:heat_igl.AccuracyWarning")

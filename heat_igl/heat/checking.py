@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -192,7 +193,8 @@ class Comparisons:
         if not is_doubtful and (near[components] >= _ENOUGH).all():
             return None
         engine = self._engine or self._made()
-        found = Comparison.of(distance, engine.distance(sources), float(sources.offsets.min()))
+        other = engine.distance(sources)[: len(distance)]
+        found = Comparison.of(distance, other, float(sources.offsets.min()))
         self._worst = found if self._worst is None else max(found, self._worst)
         if not found.is_near:
             near[components] = -1
@@ -203,10 +205,15 @@ class Comparisons:
         return found
 
     def _made(self) -> Engine:
-        triangles = OperatorTriangles(self._domain)
+        domain, surface = self._domain, self._domain.surface
+        triangles = OperatorTriangles(domain)
         sweep = SweepEngine(triangles)
-        is_poor = sweep_plan(sweep.measures, _BY_SWEEP).engine == "windows"
-        return WindowEngine(triangles) if is_poor else sweep
+        if sweep_plan(sweep.measures, _BY_SWEEP).engine == "sweep":
+            return sweep
+        if surface is not None and domain.n > domain.n_given:
+            # On the added vertices a sweep is accurate, and windows would multiply on fans of many narrow triangles.
+            return SweepEngine(OperatorTriangles(replace(domain, surface=replace(surface, uncovered=None, V=None))))
+        return WindowEngine(triangles)
 
     def _components(self, sources: SourceSet) -> IntArray:
         """The components (c,) that sources lie in."""
