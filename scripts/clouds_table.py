@@ -12,10 +12,10 @@ with sides of length 1; noise is Gaussian in all coordinates, of the given stand
 solvers take turns; medians of ratios of processor time, of the solver, of the solver with the first query, for which
 potpourri3d factors, and of a later query; with the mean errors, and the share of the points that are doubtful, not
 counting folds, with a star where the cloud warned. log-maps: on the vertices of meshes, against the exact one of the
-mesh: the median angle between
-them in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in percent at the points of the
-surface, of default / potpourri3d / the shortest path in the graph of 8 neighbours, which is what there is without a
-solver; a star follows where the cloud warned. Needs the extra ``bench``; docs/clouds.md shows the tables.
+mesh: the median angle between them in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in
+percent at the points of the surface, of default / potpourri3d / the shortest path in the graph of 8 neighbours, which
+is what there is without a solver; a star follows where the cloud warned. Needs the extra ``bench``; docs/clouds.md
+shows the tables.
 """
 
 from __future__ import annotations
