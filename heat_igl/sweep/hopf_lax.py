@@ -6,13 +6,21 @@ from typing import Any
 
 import numpy as np
 
+from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
+from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
+from heat_igl.operators.metric_derivatives import plane_axes
+from heat_igl.plan import MOST_TURNING
+from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray
 
+# Simplices of which it is asked how far the metric turns.
+_SAMPLE = 1000
+_ROUNDING = 1e-12
 # How far distances settle before they are differentiated, so that the facets are those of the fixed point.
 _SETTLED = 0.9e-9
 # How far the square of distance may bend where it falls below both ends of an edge, over that from one point. Without a
@@ -47,6 +55,44 @@ class HopfLaxEngine(SimplexEngine):
             squares,
             *map(np.ascontiguousarray, (mean, squares.max(axis=(1, 2, 3)), slack, self._bend, gradient, place)),
         )
+        if (turning := self.turning) > MOST_TURNING:
+            warn_caller(
+                "the metric turns farther than the mesh resolves: over an edge, the ratio of its lengths in two "
+                f"directions changes by a factor of {turning:.2g} or more at a tenth of the faces, and distance may be "
+                "wrong by several percent, and by tens at single vertices: take a finer mesh",
+                AccuracyWarning,
+            )
+
+    @property
+    def turning(self) -> float:
+        """By how much the ratio of lengths in two directions changes over an edge, at a tenth of the simplices.
+
+        From a sample of the simplices: between the corners of one, or between those that meet in a vertex, with planes
+        of triangles turned into each other. 1 where tensors differ by a factor alone, as those of speeds do.
+        """
+        simplices = self._simplices
+        tensors, corners = simplices.tensors, simplices.corners
+        if tensors is None or simplices.place is None:
+            return 1.0
+        size = corners.shape[1]
+        chosen = np.arange(0, len(corners), len(corners) // _SAMPLE + 1)
+        one = other = np.repeat(chosen, size)
+        two = tensors[one, np.tile(np.arange(size), len(chosen)) % tensors.shape[1]]
+        if tensors.shape[1] == 1:
+            other = self._incident[self._first[corners[chosen]]].ravel() // size
+            two = tensors[other, 0]
+        first = tensors[one, 0]
+        if size == 3:
+            x = plane_axes(Mesh(simplices.place, corners))
+            normal = np.cross(x[:, 0], x[:, 1])
+            w, cosine = np.cross(normal[one], normal[other]), (normal[one] * normal[other]).sum(axis=1)
+            # Rodrigues' formula for the rotation that takes one normal to the other.
+            once = np.cross(w[:, None], x[one])
+            turned = x[one] + once + np.cross(w[:, None], once) / np.maximum(1 + cosine, _ROUNDING)[:, None, None]
+            first, two = (axes @ g @ np.swapaxes(axes, 1, 2) for axes, g in ((x[one], first), (turned, two)))
+        stretch = np.linalg.eigvals(np.linalg.solve(first, two)).real
+        ratio = np.sqrt(stretch.max(axis=1) / np.maximum(stretch.min(axis=1), _ROUNDING))
+        return float(np.quantile(ratio.reshape(-1, size).max(axis=1), 0.9))
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:  # noqa: ARG002
         """Lower distance to that of second order."""
