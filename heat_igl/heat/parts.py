@@ -48,7 +48,7 @@ from heat_igl.steps import (
     smallest_time_step,
     smallest_time_steps,
 )
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 
 Magnitude = Literal["auto", "unit", "damped"]
 
@@ -193,8 +193,6 @@ class SolverParts:
         Compares the first answers with those of another engine; None if answers are not held to bounds.
     is_default : bool
         Whether answers are held to bounds: neither the paper's field, a time step nor a boundary was asked for.
-    given_faces : (m, 3) int64 or None
-        Vertices of the triangles that points and curves refer to.
     plan : Plan
         For the user.
     diagnostics : Diagnostics
@@ -214,7 +212,6 @@ class SolverParts:
     checker: Checker
     comparisons: Comparisons | None
     is_default: bool
-    given_faces: IntArray | None
     plan: Plan
     diagnostics: Diagnostics
 
@@ -318,7 +315,6 @@ def prepare(
         checker=Checker(domain.source_surface, domain.referenced[: domain.n_given], V),
         comparisons=Comparisons(domain) if is_triangles and options.holds_to_bounds else None,
         is_default=options.holds_to_bounds,
-        given_faces=None if domain.source_surface is None else domain.source_surface.given_faces,
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,
     )

@@ -279,7 +279,8 @@ class HeatMethodSolver(BatchedSolver):
         return np.asarray(distance)
 
     def _source_set(self, sources: Sources) -> SourceSet:
-        faces = self._parts.given_faces
+        surface = self.operators.source_surface
+        faces = None if surface is None else surface.given_faces
         if self._part is not None and faces is not None:
             faces = self._part.whole
         chosen = source_set(sources, self.n_vertices, faces)
