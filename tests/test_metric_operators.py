@@ -160,6 +160,7 @@ def test_layers_by_snells_law():
     assert np.abs(found[far] / exact - 1).max() < 0.005
 
 
+@pytest.mark.filterwarnings("ignore:the metric turns farther")
 @pytest.mark.parametrize("ratio", [2.0, 5.0, 20.0])
 def test_no_distance_is_negative_where_fibres_change_at_every_edge(ratio):
     """Distance is no longer than along edges, and no shorter than in the plane in the metric's shortest direction."""
