@@ -19,10 +19,10 @@ from heat_igl.kernels.windows import windows
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.sweep import SweepEngine
-from heat_igl.typing import FloatArray
+from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo import FAMILIES
 from heat_igl.validation.zoo.registry import joined
-from heat_igl.windows import Engine, GuardedEngine, Invariants, WindowEngine
+from heat_igl.windows import Engine, ExactSurface, GuardedEngine, Invariants, WindowEngine
 
 SOURCE, FAR = 40, 399
 
@@ -100,7 +100,9 @@ def test_tetrahedra_and_edge_lengths_have_edges_too() -> None:
 
 
 class Broken(Engine):
-    """An engine that is wrong at one vertex."""
+    """An engine that is wrong at one vertex, though exact."""
+
+    accuracy = 0.0
 
     def __init__(self, distance: FloatArray, value: float) -> None:
         self._wrong = distance.copy()
@@ -140,10 +142,10 @@ def test_windows_that_are_wrong_do_not_leave_the_solver(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(WindowEngine, "distance", wrong)
     ask: list[Callable[[], FloatArray]] = [
-        lambda: GeodesicSolver(mesh).distance(SOURCE),
+        lambda: GeodesicSolver(mesh, tolerance=0).distance(SOURCE),
         lambda: GeodesicSolver(mesh, method="exact").distances([SOURCE])[0],
-        lambda: heat_igl.geodesic_distance(mesh, SOURCE),
-        lambda: pickle.loads(pickle.dumps(GeodesicSolver(mesh))).distance(SOURCE),
+        lambda: heat_igl.geodesic_distance(mesh, SOURCE, method="exact"),
+        lambda: pickle.loads(pickle.dumps(GeodesicSolver(mesh, tolerance=0))).distance(SOURCE),
     ]
     for each in ask:
         with pytest.warns(AccuracyWarning, match=f"{FAR}.*report"):
@@ -180,6 +182,24 @@ def test_local_answers_that_are_wrong_are_found_again(monkeypatch: pytest.Monkey
     with pytest.warns(AccuracyWarning, match="contradicted themselves .* found again"):
         found = LOCAL[query](mesh)
     np.testing.assert_allclose(found, right, rtol=1e-6)
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.6, np.inf])
+def test_windows_within_a_tolerance_that_are_wrong_give_way_to_exact_ones(
+    monkeypatch: pytest.MonkeyPatch, factor: float
+) -> None:
+    mesh, distance = two_squares()
+    solve = ExactSurface.distance
+
+    def wrong(
+        self: ExactSurface, sources: IntArray, offsets: None, cutoff: float, threads: int, accuracy: float
+    ) -> FloatArray:
+        found = solve(self, sources, offsets, cutoff, threads, accuracy)
+        found[FAR] *= factor if accuracy > 0 else 1
+        return found
+
+    monkeypatch.setattr(ExactSurface, "distance", wrong)
+    np.testing.assert_allclose(GeodesicSolver(mesh).distance(SOURCE), distance, rtol=1e-12)
 
 
 @pytest.mark.parametrize("factor", [0.5, np.nan, np.inf])

@@ -14,6 +14,7 @@ from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.mesh import checking
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
+from heat_igl.plan import joining_accuracy
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
@@ -187,10 +188,19 @@ class TriangleEngine(Engine):
 
 
 class WindowEngine(TriangleEngine):
-    """Distance by windows, directions and paths: all exact, which holds every tolerance."""
+    """Distance by windows, exact or within a tolerance; directions and paths, all exact.
 
-    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
+    Parameters
+    ----------
+    triangles, originals
+        As for the class above.
+    accuracy : float
+        Windows are joined as far as distances keep this fraction of themselves; 0 for exact.
+    """
+
+    def __init__(self, triangles: Triangles, originals: IntArray | None = None, accuracy: float = 0.0) -> None:
         super().__init__(triangles, originals)
+        self.accuracy = accuracy
         # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
         self._from_vertices = ExactSurface(triangles.tables())
 
@@ -211,12 +221,13 @@ class WindowEngine(TriangleEngine):
         """Distance (n,)."""
         if not sources.on_vertices_alone or sources.vertex_offset.any():
             return super().distance(sources, cutoff, threads)
-        return self._with_copies(self._from_vertices.distance(sources.vertices, None, cutoff, threads))
+        found = self._from_vertices.distance(sources.vertices, None, cutoff, threads, self.accuracy)
+        return self._with_copies(found)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from."""
         query = Query.of(sources, self._triangles)
-        found = self.solution(query, query.cutoff(cutoff), threads=threads)
+        found = self.solution(query, query.cutoff(cutoff), threads=threads, accuracy=self.accuracy)
         labels = labels_of(sources)[found.origin.label]
         return self._with_copies(query.with_begin(found.distance)), self._with_copies(labels)
 
@@ -229,6 +240,7 @@ class WindowEngine(TriangleEngine):
         targets: SurfacePoints | None = None,
         goals: IntArray | None = None,
         threads: int = 1,
+        accuracy: float = 0.0,
     ) -> ExactSolution:
         """Distance and the paths from the sources of a query; see `ExactSurface.solve`."""
         if query.has_curves:
@@ -237,7 +249,20 @@ class WindowEngine(TriangleEngine):
             surface = self._on_delaunay
         else:
             surface = self._from_vertices
-        return query.solve(surface, cutoff=cutoff, directed=directed, targets=targets, goals=goals, threads=threads)
+        return query.solve(
+            surface,
+            cutoff=cutoff,
+            directed=directed,
+            targets=targets,
+            goals=goals,
+            threads=threads,
+            accuracy=accuracy,
+        )
+
+    @cached_property
+    def exact(self) -> WindowEngine:
+        """The same engine without a tolerance."""
+        return WindowEngine(self._triangles, self._originals)
 
     def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
         """Distance (t,) of points or vertices; the search ends when all are known."""
@@ -456,7 +481,8 @@ class GuardedEngine(Engine):
     tolerance : float
         Violations by this share of the largest distance are no contradiction.
     others : sequence of callables
-        Engines to ask instead, each made when it is needed.
+        Engines to ask instead, each made when it is needed. Before them, windows within a tolerance are asked for exact
+        distance, which replaces an answer without a warning.
 
     Raises
     ------
@@ -494,7 +520,7 @@ class GuardedEngine(Engine):
             return found
         if isinstance(targets, SurfacePoints):
             raise contradicted(problem)
-        return self._replacement(problem, sources, np.inf, 1)[0][targets]
+        return self._another(problem, sources, np.inf, 1)[0][targets]
 
     def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
         """Distance and directions, see `WindowEngine.directed`: no other engine finds these."""
@@ -511,6 +537,16 @@ class GuardedEngine(Engine):
     def _replacement(
         self, problem: str, sources: SourceSet, cutoff: float, threads: int
     ) -> tuple[FloatArray, IntArray]:
+        """Of exact windows, if those asked have a tolerance; else, and if these fail too, of another engine."""
+        if self.windows.accuracy > 0:
+            found = self.windows.exact.labelled(sources, cutoff, threads)
+            remaining = self.problem(found[0], sources, cutoff)
+            if remaining is None:
+                return found
+            problem = remaining
+        return self._another(problem, sources, cutoff, threads)
+
+    def _another(self, problem: str, sources: SourceSet, cutoff: float, threads: int) -> tuple[FloatArray, IntArray]:
         for make in self._others:
             found = make().labelled(sources, cutoff, threads)
             if self.problem(found[0], sources, cutoff) is None:
@@ -535,7 +571,7 @@ def guarded_windows(
         invariants = Invariants(triangles.faces.F, components, lengths=triangles.faces.l)
     else:
         invariants = Invariants(triangles.given_faces, components, V)
-    windows = WindowEngine(triangles, originals)
+    windows = WindowEngine(triangles, originals, joining_accuracy(tolerance))
     return GuardedEngine(windows, invariants, tolerance, (partial(_sweep, triangles, originals),))
 
 

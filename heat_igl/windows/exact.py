@@ -304,6 +304,7 @@ class ExactSurface:
         goals: IntArray | None = None,
         directed: bool = False,
         threads: int = 1,
+        accuracy: float = 0.0,
     ) -> ExactSolution:
         """Distances from vertices and points.
 
@@ -332,6 +333,8 @@ class ExactSurface:
         threads : int
             With more than one, two threads share the search for distances of all vertices, on large surfaces. The
             distances are the same; of paths that are equally long, another may be found.
+        accuracy : float
+            Windows are joined as far as distances keep this fraction of themselves, see `search`; 0 for exact.
 
         Returns
         -------
@@ -354,6 +357,7 @@ class ExactSurface:
             goals=goals,
             directed=directed,
             threads=threads,
+            accuracy=accuracy,
         )
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
@@ -370,11 +374,12 @@ class ExactSurface:
         offsets: FloatArray | None = None,
         cutoff: float = np.inf,
         threads: int = 1,
+        accuracy: float = 0.0,
     ) -> FloatArray:
         """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths."""
         tables = self.tables
         starts = starts_at(tables, sources, offsets, None, None, None)
-        done = search(tables, starts, cutoff=cutoff, threads=threads)
+        done = search(tables, starts, cutoff=cutoff, threads=threads, accuracy=accuracy)
         distance = tables.unscaled(done.found.distance[tables.number])
         if cutoff < np.inf:
             distance[distance > cutoff] = np.inf
@@ -474,8 +479,13 @@ def search(
     goals: IntArray | None = None,
     directed: bool = False,
     threads: int = 1,
+    accuracy: float = 0.0,
 ) -> Searched:
-    """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`."""
+    """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`.
+
+    Windows are joined in searches for all vertices, on an intrinsic Delaunay triangulation without edges of more than
+    two faces, and where no source is a segment. Elsewhere the search is exact, which holds every accuracy.
+    """
     n, wanted = tables.n, _targets_at(tables, targets)
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
     found, leaving = Found.of(n, n_labels), Leaving.of(n) if directed else None
@@ -487,14 +497,17 @@ def search(
     statistics = None
     # Vertices are found flat by the first search.
     asks_for_all = not len(wanted.place.faces) and goals is None and not directed
-    shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all
+    if not (asks_for_all and tables.is_delaunay and not len(starts.segments.faces)):
+        accuracy = 0.0
+    # Joined windows depend on those beside them, which are not the same on two threads.
+    shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all and accuracy == 0.0
     if shares and not (tables.kind == FLAT_VERTEX).any():
         statistics = _beside(tables, starts, found, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        _require(run(windows.Front(tables, found, TOLERANCE, leaving), starts, statistics))
+        _require(run(windows.Front(tables, found, TOLERANCE, leaving, None, accuracy), starts, statistics))
     return Searched(starts, found, wanted, int(statistics[1]), int(statistics[2]), leaving)
 
 

@@ -8,6 +8,12 @@ import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, take
+from cython.cimports.heat_igl.kernels.windows.joining import (
+    carry_joined,
+    cut_joined_by_ends,
+    find_side,
+    join,
+)
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
     BESIDE,
@@ -35,6 +41,9 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     at_corner,
     backward,
     bent,
+    direction,
+    error_of,
+    is_joined,
     is_within,
     lateral,
     reach,
@@ -50,7 +59,29 @@ from cython.cimports.libc.string import memcpy, memmove
 @cython.exceptval(check=False)
 def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
     """Derivative, along the half-edge, of the length `reached` that a window adds to its offset."""
+    if is_joined(w):
+        return w.turn_x + (at - w.x) / (reached - w.turn_x * at)
     return w.x if w.is_plane else (at - w.x) / reached
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _has_one_root(w: cython.pointer(Window)) -> cython.bint:
+    """Whether all lines come from one point, at the same offset."""
+    return not (w.is_plane or is_joined(w))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _bend(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
+    """A bound of the derivative of `_slope` over a quarter of the distance of the root."""
+    if w.is_plane:
+        return 0.0
+    return 2.0 / fabs(reached - w.turn_x * at if is_joined(w) else reached)
 
 
 @cython.cfunc
@@ -61,7 +92,7 @@ def _change(
     u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, a: cython.double, b: cython.double
 ) -> cython.double:
     """The sign of the derivative of distance by u less that by w, which add a and b to their offsets."""
-    if u.is_plane or w.is_plane:
+    if not (_has_one_root(u) and _has_one_root(w)):
         return _slope(u, at, a) - _slope(w, at, b)
     return (at - u.x) * b - (at - w.x) * a
 
@@ -106,7 +137,7 @@ def _meeting(
             high = x
         slope = _slope(u, x, a) - _slope(w, x, b)
         # At most twice the second derivative while the step is below a quarter of both distances.
-        bend = (0.0 if u.is_plane else 2.0 / a) + (0.0 if w.is_plane else 2.0 / b)
+        bend = _bend(u, x, a) + _bend(w, x, b)
         step = -y / slope if slope != 0.0 else INFINITY
         x += step
         if 4.0 * bend * fabs(step) <= fabs(slope) and low <= x <= high:
@@ -179,7 +210,7 @@ def _ordered(
         a = u.x - w.x
         b = u.depth - w.depth
         is_farther: cython.bint = u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2
-        return U_NEARER if is_farther and not (u.is_plane or w.is_plane) else UNDECIDED
+        return U_NEARER if is_farther and _has_one_root(u) and _has_one_root(w) else UNDECIDED
     if at_low < -margin and at_high > margin:
         b = margin
         a = _meeting(u, w, low, high, at_low, at_high, 0.0, cython.address(b))
@@ -225,7 +256,7 @@ def _compare(
     slope_high: cython.double
     margin: cython.double
     order: cython.int
-    if u.offset == w.offset and not (u.is_plane or w.is_plane):
+    if u.offset == w.offset and _has_one_root(u) and _has_one_root(w):
         return _compare_squares(u, w, low, high, until)
     a, b, c, d = reach(u, low), reach(w, low), reach(u, high), reach(w, high)
     at_low, at_high = (u.offset - w.offset) + a - b, (u.offset - w.offset) + c - d
@@ -243,16 +274,31 @@ def _compare(
 @cython.nogil
 @cython.exceptval(check=False)
 def _gives_way(
-    u: cython.pointer(Window), w: cython.pointer(Window), low: cython.double, high: cython.double
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    has_errors: cython.bint,
 ) -> cython.int:
-    """Cut w between two points where u is nearer. 2: w is gone, 4: what is left comes before u, 0: or behind."""
+    """Cut w between two points where u is nearer. 2: w is gone, 4: what is left comes before u, 0: or behind.
+
+    Within a tolerance, u may be nearer as far as it goes by its error alone, while its lines and those of w separate
+    behind its end. Then w keeps its lines between.
+    """
+    at: cython.double
     if low <= w.start:
         if high >= w.stop:
             return 2
-        w.start = high
+        at = high
+        if has_errors and direction(w, high) > direction(u, high):
+            at = w.start if w.is_plane or w.depth < 0.0 else w.x + w.depth * direction(u, high)
+        w.start = min(max(at, w.start), high)
         return 0
     if high >= w.stop:
-        w.stop = low
+        at = low
+        if has_errors and direction(w, low) < direction(u, low):
+            at = w.stop if w.is_plane or w.depth < 0.0 else w.x + w.depth * direction(u, low)
+        w.stop = max(min(at, w.stop), low)
         return 4
     return 4 if w.start < u.start and w.stop < u.stop else 0
 
@@ -260,7 +306,19 @@ def _gives_way(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _settle(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.int:
+def _separate(
+    u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, has_errors: cython.bint
+) -> cython.bint:
+    """Whether lines of u, to the left of a point, and of w, to the right, separate behind it, within a tolerance."""
+    return has_errors and direction(u, at) < direction(w, at)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _settle(
+    s: cython.pointer(Search), u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double
+) -> cython.int:
     """Cut two windows of one half-edge where the other is nearer. 1: u is gone, 2: w is gone, 4: w comes before u.
 
     What overlaps by little, of both or of the half-edge, is left: it seldom pays to compare.
@@ -276,20 +334,25 @@ def _settle(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython
     if high - low < OVERLAP * (u.stop - u.start) and high - low < OVERLAP * (w.stop - w.start):
         return first
     order = _compare(u, w, low, high, until)
+    has_errors: cython.bint = s.is_joining
     if order == U_NEARER:
-        return _gives_way(u, w, low, high)
+        return _gives_way(u, w, low, high, has_errors)
     if order == W_NEARER:
-        order = _gives_way(w, u, low, high)
+        order = _gives_way(w, u, low, high, has_errors)
         if order == 2:
             return 1
         # What is left of u comes before w, unless w comes first.
         return 4 if order == 0 and w.start < u.start else 0
     if order == U_THEN_W:
+        if _separate(u, w, until[0], has_errors):
+            return first
         if high >= u.stop:
             u.stop = until[0]
         if low <= w.start:
             w.start = until[1]
     elif order == W_THEN_U:
+        if _separate(w, u, until[1], has_errors):
+            return first
         if high >= w.stop:
             w.stop = until[1]
         if low <= u.start:
@@ -319,6 +382,8 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
         if w.x * w.stop > b - w.stop:
             w.stop = b / (w.x + 1.0)
         return True
+    if is_joined(w):
+        return cut_joined_by_ends(w, a, b)
     square = w.depth * w.depth
     p = (w.start - w.x) * (w.start - w.x) + square
     q = (w.stop - w.x) * (w.stop - w.x) + square
@@ -358,6 +423,8 @@ def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cytho
     Halves that passed a vertex beside the root, one on either side, may have the same root to rounding while they left
     it in directions that differ by the curvature of the vertex: then their half-edge is turned against the corner.
     """
+    if is_joined(u) or is_joined(w):
+        return False
     if u.corner == w.corner and fabs(u.turn_x - w.turn_x) + fabs(u.turn_y - w.turn_y) > TURNED:
         return False
     return (
@@ -378,21 +445,29 @@ def _insert(
     k: cython.int,
     w: cython.pointer(Window),
     length: cython.double,
+    is_many: cython.bint,
+    s: cython.pointer(Search),
 ) -> cython.int:
-    """Add a window to k that lie side by side, after cutting all where another is nearer; how many there are then.
+    """Add a window to k, after cutting all where another is nearer; how many there are then.
 
-    The window may stand in the same array, behind the k.
+    They lie side by side, or, over an edge of more than two faces, in any order: then the window is compared with all,
+    and is one with those of the same root. The window may stand in the same array, behind the k.
     """
     j: cython.int = k
     outcome: cython.int
     moved: Window
+    u: cython.pointer(Window)
     narrow: cython.double = NARROW * length
+    sliver: cython.double = 0.0 if is_many else SLIVER * length
     while j > 0:
-        outcome = _settle(cython.address(windows[j - 1]), w, SLIVER * length)
-        if outcome == 1 or windows[j - 1].stop - windows[j - 1].start <= narrow:
-            # remove j - 1
+        u = windows + (j - 1)
+        if (is_many or (j == k and u.start <= w.start)) and _goes_on(u, w, length):
+            u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
+            return k
+        outcome = _settle(s, u, w, sliver)
+        if outcome == 1 or u.stop - u.start <= narrow:
             if j < k:
-                memmove(windows + (j - 1), windows + j, (k - j) * cython.sizeof(Window))
+                memmove(u, u + 1, (k - j) * cython.sizeof(Window))
             k -= 1
             j -= 1
             if outcome == 2:
@@ -400,47 +475,17 @@ def _insert(
             continue
         if outcome == 2 or w.stop - w.start <= narrow:
             return k
-        if outcome == 4:
-            j -= 1
-            continue
-        break
+        if outcome != 4 and not is_many:
+            break
+        j -= 1
+    if is_many:
+        j = k
     if j < k:
         moved = w[0]
         memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
         windows[j] = moved
-        return k + 1
-    if j > 0 and windows[j - 1].start <= w.start and _goes_on(cython.address(windows[j - 1]), w, length):
-        if w.stop > windows[j - 1].stop:
-            windows[j - 1].stop = w.stop
-        return k
-    if w != windows + j:
+    elif w != windows + j:
         windows[j] = w[0]
-    return k + 1
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def _insert_among(
-    windows: cython.pointer(Window), k: cython.int, w: cython.pointer(Window), length: cython.double
-) -> cython.int:
-    """As `_insert`, for k windows in any order: w is compared with all, and is one with those of the same root."""
-    j: cython.int = k
-    outcome: cython.int
-    u: cython.pointer(Window)
-    while j > 0:
-        j -= 1
-        u = windows + j
-        if _goes_on(u, w, length):
-            u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
-            return k
-        outcome = _settle(u, w, 0.0)
-        if outcome == 1 or u.stop - u.start <= NARROW * length:
-            k -= 1
-            memmove(u, u + 1, (k - j) * cython.sizeof(Window))
-        if outcome == 2 or w.stop - w.start <= NARROW * length:
-            return k
-    windows[k] = w[0]
     return k + 1
 
 
@@ -474,9 +519,19 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     is_many: cython.bint = s.twin[h] == -2
     from_tail: cython.double = _bound_over(s, s.vertex[next_half_edge(h)], length)
     from_head: cython.double = _bound_over(s, s.vertex[previous_half_edge(h)], length) + length
+    # What an error may make of the comparison with an end.
+    margin: cython.double = 0.0
+    has_errors: cython.bint = s.is_joining
+    if has_errors:
+        from_tail += s.error[s.vertex[next_half_edge(h)]]
+        from_head += s.error[s.vertex[previous_half_edge(h)]]
     for i in range(n):
         w = windows + i
-        if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset) or w.stop - w.start <= NARROW * length:
+        if has_errors:
+            margin = error_of(s, w)
+        if not _cut_by_ends(w, from_tail + margin - w.offset, from_head + margin - w.offset):
+            continue
+        if w.stop - w.start <= NARROW * length:
             continue
         u = windows + (k - 1)
         # The usual case: behind the last, and not a half of it.
@@ -485,10 +540,8 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
             if k < i:
                 windows[k] = w[0]
             k += 1
-        elif is_many:
-            k = _insert_among(windows, k, w, length)
         else:
-            k = _insert(windows, k, w, length)
+            k = _insert(windows, k, w, length, is_many, s)
     return k
 
 
@@ -565,7 +618,10 @@ def _arrive(
     leaving_y: cython.double = x * w.turn_y + y * w.turn_x
     if w.is_plane:
         leaving_x, leaving_y = w.turn_x + w.turn_y * w.depth * at, w.turn_y
+    is_nearer: cython.bint = distance < s.upper[s.vertex[h]]
     relax(s, s.vertex[h], distance, w.root, h, at, w.corner, leaving_x, leaving_y)
+    if is_nearer and s.is_joining:
+        s.error[s.vertex[h]] = error_of(s, w)
 
 
 @cython.cfunc
@@ -577,6 +633,35 @@ def _straight(w: cython.pointer(Window), apex: cython.pointer(Apex)) -> cython.d
     x: cython.double = apex.x - w.x
     y: cython.double = apex.y + w.depth
     return w.offset + (w.x * apex.x + w.depth * apex.y if w.is_plane else sqrt(x * x + y * y))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _reach_over_joined(
+    s: cython.pointer(Search),
+    h: cython.int,
+    windows: cython.pointer(Window),
+    i: cython.int,
+    apex: cython.pointer(Apex),
+) -> cython.void:
+    """`_reach_apex` for the joined window i."""
+    w: cython.pointer(Window) = windows + i
+    a: cython.double
+    b: cython.double
+    at: cython.double
+    distance: cython.double
+    find_side(w, apex, cython.address(a), cython.address(b))
+    near: cython.double = NEAR * apex.length * fabs(w.depth)
+    if b < -near or a > near or apex.y + w.depth == 0.0:
+        return
+    at = min(max(backward(w, apex.x, apex.y), w.start), w.stop)
+    distance = bent(w, at, apex.x, apex.y)
+    if w.side == LEFT_OF_APEX or w.side == RIGHT_OF_APEX:
+        _arrive(s, h, w, apex, distance, at)
+    elif distance < apex.nearest:
+        apex.nearest = distance
+        apex.best = i
 
 
 @cython.cfunc
@@ -605,6 +690,9 @@ def _reach_apex(
             m = 1.0
             a = w.start - x
             b = w.stop - x
+        elif is_joined(w):
+            _reach_over_joined(s, h, windows, i, apex)
+            continue
         else:
             x = apex.x - w.x
             m = apex.y + w.depth
@@ -639,6 +727,8 @@ def _reach_apex(
     if apex.best >= 0:
         w = windows + apex.best
         apex.best_at = backward(w, apex.x, apex.y)
+        if is_joined(w):
+            apex.best_at = min(max(apex.best_at, w.start), w.stop)
         _arrive(s, h, w, apex, apex.nearest, apex.best_at)
 
 
@@ -648,6 +738,8 @@ def _reach_apex(
 def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
     """Make the window over the side between the tail and the apex; true if there is one."""
     scale: cython.double
+    if is_joined(w):
+        return carry_joined(w, apex, True, out)
     out[0] = w[0]
     if w.is_plane:
         out.x = w.x * apex.cos_left + w.depth * apex.sin_left
@@ -678,6 +770,8 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
     """Make the window over the side between the apex and the head; true if there is one."""
     scale: cython.double
     x: cython.double = apex.length - w.x
+    if is_joined(w):
+        return carry_joined(w, apex, False, out)
     out[0] = w[0]
     if w.is_plane:
         out.offset = w.offset + w.x * apex.x + w.depth * apex.y
@@ -812,6 +906,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     apex: Apex
     w: cython.pointer(Window)
     is_best: cython.bint
+    margin: cython.double = 0.0
     prefetch(s.upper + s.vertex[h])
     _fetch(s, s.twin[previous_half_edge(h)])
     _fetch(s, s.twin[next_half_edge(h)])
@@ -826,7 +921,16 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     assert memcpy(s.to_left, windows, n * cython.sizeof(Window)) != cython.NULL
     i = n
     n = trim(s, windows, n, h)
-    assert is_covered(s, s.to_left, i, windows, n, h)
+    assert s.accuracy > 0.0 or is_covered(s, s.to_left, i, windows, n, h)
+    if s.accuracy > 0.0 and n > 1:
+        n = join(s, one, n, h)
+        if s.failed:
+            return
+        windows = one.windows
+        if n > s.n_out:
+            more_room(s, n)
+            if s.failed:
+                return
     apex = _opposite(s, h)
     _reach_apex(s, h, windows, n, cython.address(apex))
     if s.first_target != cython.NULL and s.first_target[h // 3] >= 0:
@@ -834,27 +938,38 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     for i in range(n):
         w = windows + i
         # Windows whose lines would cross a shorter path to the apex go no further.
-        is_best = apex.best < 0 or i == apex.best
+        # Those that meet ahead may cross that path twice.
+        is_best = apex.best < 0 or i == apex.best or w.depth < 0.0
+        if s.is_joining:
+            margin = s.error[s.vertex[h]] + error_of(s, w)
         if w.side != RIGHT_OF_APEX and (
             is_best
             or w.start < apex.best_at
-            or (w.side != AROUND_APEX and not apex.nearest <= bent(w, w.stop, apex.x, apex.y))
+            or (w.side == LEFT_OF_APEX and not apex.nearest + margin <= bent(w, w.stop, apex.x, apex.y))
         ):
             if _to_left(w, cython.address(apex), s.to_left + n_left):
-                assert _continues(w, cython.address(apex), s.to_left + n_left, True)
+                assert s.accuracy > 0.0 or _continues(w, cython.address(apex), s.to_left + n_left, True)
                 n_left += 1
         else:
-            assert w.side == RIGHT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, True)
+            assert (
+                s.accuracy > 0.0
+                or w.side == RIGHT_OF_APEX
+                or _is_behind(w, cython.address(apex), windows + apex.best, True)
+            )
         if w.side != LEFT_OF_APEX and (
             is_best
             or w.stop > apex.best_at
-            or (w.side != AROUND_APEX and not apex.nearest <= bent(w, w.start, apex.x, apex.y))
+            or (w.side == RIGHT_OF_APEX and not apex.nearest + margin <= bent(w, w.start, apex.x, apex.y))
         ):
             if _to_right(w, cython.address(apex), s.to_right + n_right):
-                assert _continues(w, cython.address(apex), s.to_right + n_right, False)
+                assert s.accuracy > 0.0 or _continues(w, cython.address(apex), s.to_right + n_right, False)
                 n_right += 1
         else:
-            assert w.side == LEFT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, False)
+            assert (
+                s.accuracy > 0.0
+                or w.side == LEFT_OF_APEX
+                or _is_behind(w, cython.address(apex), windows + apex.best, False)
+            )
     # The list is free again; its room stays with it.
     s.lists[place].count = s.free_list
     s.lists[place].half_edge = -1

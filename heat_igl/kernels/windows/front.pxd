@@ -1,4 +1,4 @@
-from heat_igl.kernels.windows.structures cimport Entry, Search, Window
+from heat_igl.kernels.windows.structures cimport Entry, List, Search, Window
 
 cdef void allocate(Search* s) noexcept nogil
 cdef void more_room(Search* s, int n) noexcept nogil
@@ -19,4 +19,5 @@ cdef void relax(
 cdef void take(Search* s, int j, double distance, int root) noexcept nogil
 cdef void tell(Search* s, int v, double distance) noexcept nogil
 cdef void append(Search* s, int t, Window* run, int n, bint in_front, bint mirrored) noexcept nogil
+cdef bint has_room(List* one, int n) noexcept nogil
 cdef void add(Search* s, int e, Window* run, int n, bint in_front) noexcept nogil

@@ -16,6 +16,7 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge
 from cython.cimports.heat_igl.kernels.windows.front import add, push, relax, take, tell
 from cython.cimports.heat_igl.kernels.windows.structures import (
     BENDS,
+    BENT_MORE,
     FLATNESS,
     JOINS,
     NARROW,
@@ -196,15 +197,29 @@ def _emit_from_bend(
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
-    """Distances along the two sides of corner k from its vertex v."""
+def _reach_ends(
+    s: cython.pointer(Search),
+    k: cython.int,
+    v: cython.int,
+    offset: cython.double,
+    bends_before: cython.bint,
+    bends_behind: cython.bint,
+) -> cython.void:
+    """Distances along the two sides of corner k from its vertex v.
+
+    Before the first line from a bend, and behind the last, a path along a side bends where straight ones pass the
+    vertex. Within a tolerance such a path may seem to be shorter than these, which would leave the directions between
+    without a window, so it is taken for longer by more than the tolerance.
+    """
     head: cython.int = next_half_edge(k)
     tail: cython.int = previous_half_edge(k)
     a: cython.double = s.length[tail]
     b: cython.double = s.length[head]
-    relax(s, s.vertex[head], offset + a, v, head, b, k, 1.0, 0.0)
+    more: cython.double = BENT_MORE * s.accuracy * offset
+    relax(s, s.vertex[head], offset + a + (more if bends_before else 0.0), v, head, b, k, 1.0, 0.0)
     x: cython.double = 0.5 * twice_product(a, b, s.length[k]) / a
-    relax(s, s.vertex[tail], offset + b, v, tail, 0.0, k, x, s.double_area[k // 3] / a)
+    length: cython.double = offset + b + (more if bends_behind else 0.0)
+    relax(s, s.vertex[tail], length, v, tail, 0.0, k, x, s.double_area[k // 3] / a)
 
 
 @cython.cfunc
@@ -271,15 +286,18 @@ def _fill(
     while k >= 0:
         length: cython.double = s.length[k]
         far: cython.double = length
-        if last != cython.NULL and k == last.corner:
+        is_first: cython.bint = k == first.corner and side == first.side
+        is_last: cython.bint = last != cython.NULL and k == last.corner
+        is_tail: cython.bint = side == previous_half_edge(k)
+        if is_last:
             far = length - _reach(s, last)
-        _reach_ends(s, k, v, offset)
+        _reach_ends(s, k, v, offset, is_first if is_tail else is_last, is_last if is_tail else is_first)
         if near < far:
             if side == previous_half_edge(k):
                 _emit_from_bend(s, k, near, far, v, offset)
             else:
                 _emit_from_bend(s, k, length - far, length - near, v, offset)
-        if last != cython.NULL and k == last.corner:
+        if is_last:
             return
         near = 0.0
         side = third(k, side)
@@ -300,7 +318,7 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     if h < 0 or s.kind[v] == JOINS:
         k: cython.int = s.corner_of_vertex[v]
         while k >= 0:
-            _reach_ends(s, k, v, s.distance[v])
+            _reach_ends(s, k, v, s.distance[v], False, False)
             _emit_from_bend(s, k, 0.0, s.length[k], v, s.distance[v])
             k = s.next_corner[k]
         return

@@ -13,16 +13,19 @@ cdef extern from *:
     """
     # The part of a half-edge that straight lines from one root cross, in the frame of the half-edge: its tail is the
     # origin, its head lies at (length, 0), the face that the lines enter above. If it is a plane, the lines are
-    # parallel, and the root is a segment all of whose points are sources (Bommes and Kobbelt 2007).
+    # parallel, and the root is a segment all of whose points are sources (Bommes and Kobbelt 2007). If it is joined from
+    # several, `corner` is -1, and its lines are those between the first and the last line of these: they meet in one
+    # point, before the half-edge or, with a negative depth, behind it (see `joining`).
     ctypedef struct Window:
         double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
         # The half-edge as a unit vector in the frame of `corner`; of a plane, how far along the segment the line
-        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right.
+        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right. If joined, how fast the
+        # offset grows along the half-edge, and the largest error of distance.
         double turn_x, turn_y
         double start, stop   # from where to where along the half-edge
-        double offset        # distance of the root; of a plane, the distance that it gives the tail
+        double offset        # distance of the root, if joined at the tail; of a plane, the distance that it gives the tail
         int root             # vertex, n + p for source point p, or after those, n + p + i for source segment i
-        int corner           # of the root, out of which the lines leave it: see `relax`
+        int corner           # of the root, out of which the lines leave it: see `relax`; -1 if joined
         unsigned int side    # of the apex: see the sides below
         unsigned int is_plane
 
@@ -122,6 +125,12 @@ cdef struct Search:
     bint failed
     long long n_windows, n_lists_done
     double tolerance
+    # Windows are joined as far as distance keeps this fraction of itself; 0 for never. `error` is that of each vertex.
+    double accuracy
+    double* error
+    bint is_joining      # once lists are long
+    int n_long, join_every  # long lists so far; crossings
+    long long n_pairs, n_joined  # neighbours since that was decided
     # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
     double cutoff
     double last_key      # what has a larger key can change nothing that is asked for
@@ -164,6 +173,7 @@ cdef enum Side:
     RIGHT_OF_APEX = 0
     LEFT_OF_APEX = 1
     AROUND_APEX = 2
+    CROSSED_AROUND_APEX = 3  # joined lines that have met before they come to the height of the apex
 
 
 cdef extern from *:
@@ -195,6 +205,22 @@ cdef extern from *:
     #define SLIVER 1e-5
     // What a list costs beside its windows, in windows.
     #define PER_LIST 4
+    // Lines of a joined window meet farther away than this many sides ahead, and nearer than so many times its width.
+    #define NEAREST_FOCUS 4.0
+    #define FARTHEST_MEETING 1e5
+    // Windows are joined at one of so many crossings at least, at most: what was not joined at one seldom is at the next.
+    #define OFTEN 2
+    #define SELDOM 64
+    // Joining begins when more than so many lists, and more than one in so many, had so many windows: it costs time in
+    // shorter ones.
+    #define LONG_LISTS 256
+    #define ONE_IN 8
+    #define LONG 16
+    // How often is decided after so many pairs: less often if fewer than one in so many were joined.
+    #define PAIRS 4096
+    #define FEW_JOINED 16
+    // By how much more than the tolerance a path that bends along a side is taken for longer.
+    #define BENT_MORE 2.0
     """
     double ROUNDING
     double WIDEST
@@ -209,6 +235,16 @@ cdef extern from *:
     double FLATNESS
     int TRIES
     int PER_LIST
+    double NEAREST_FOCUS
+    double FARTHEST_MEETING
+    int OFTEN
+    int SELDOM
+    int LONG_LISTS
+    int ONE_IN
+    int LONG
+    int PAIRS
+    int FEW_JOINED
+    double BENT_MORE
 
 
 # Twice the scalar product of two sides p and q of a triangle, by the third side. The difference of squares is that of
@@ -269,16 +305,35 @@ cdef inline double straight(const Search* s, int v) noexcept nogil:
     return sqrt(x * x + y * y + z * z)
 
 
+cdef inline bint is_joined(const Window* w) noexcept nogil:
+    return w.corner < 0
+
+
 # What a window adds to its offset at a point of its half-edge.
 cdef inline double reach(const Window* w, double at) noexcept nogil:
     if w.is_plane:
         return w.x * at
-    return sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
+    cdef double found = sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
+    if is_joined(w):
+        return w.turn_x * at + (found if w.depth > 0.0 else -found)
+    return found
 
 
 # Length of the path of a window through a point of its half-edge to a point of the face.
 cdef inline double bent(const Window* w, double at, double x, double y) noexcept nogil:
     return w.offset + reach(w, at) + sqrt((at - x) * (at - x) + y * y)
+
+
+# Largest error of the distance by a window.
+cdef inline double error_of(const Search* s, const Window* w) noexcept nogil:
+    if is_joined(w):
+        return w.turn_y
+    return s.error[w.root] if s.is_joining and w.root < s.n else 0.0
+
+
+# The direction of the line of a window through a point of its half-edge: how far it goes along while it rises by 1.
+cdef inline double direction(const Window* w, double at) noexcept nogil:
+    return w.x / w.depth if w.is_plane else (at - w.x) / w.depth
 
 
 # Whether a length exceeds another by no more than rounding, of that and of the sides of its last face.

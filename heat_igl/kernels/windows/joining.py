@@ -1,0 +1,404 @@
+"""Neighbouring windows become one, as far as the tolerance allows.
+
+A joined window has the first line of its first part and the last line of its last part, so that its lines lead to the
+same places: its neighbours end where it begins, before and behind every face. The two lines meet in a point, the root;
+they may meet ahead of the half-edge, since a front behind which there is positive curvature contracts, and distance
+is then the offset less the distance of that point. The offset grows linearly along the half-edge, such that distance
+stays what it was at both ends: it is continuous from one window to the next, and no window takes from its neighbour
+what its neighbour's lines lead to.
+
+What a window has lost of distance by joining is carried along: the largest difference on the half-edge, and what the
+offset may change when lines are no longer crossed at equal shares of their side. A window is not joined beyond the
+fraction `accuracy` of its distance. Where lines of two windows separate behind a cut, neither is cut there.
+"""
+
+import cython
+from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge
+from cython.cimports.heat_igl.kernels.windows.front import has_room
+from cython.cimports.heat_igl.kernels.windows.structures import (
+    AROUND_APEX,
+    CROSSED_AROUND_APEX,
+    FARTHEST_MEETING,
+    FEW_JOINED,
+    LEFT_OF_APEX,
+    LONG,
+    LONG_LISTS,
+    NARROW,
+    NEAR,
+    NEAREST_FOCUS,
+    OFTEN,
+    ONE_IN,
+    PAIRS,
+    RIGHT_OF_APEX,
+    SELDOM,
+    Apex,
+    List,
+    Search,
+    Window,
+    backward,
+    direction,
+    error_of,
+    reach,
+)
+from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.libc.string import memmove
+
+# Each step makes the error of a place smaller by how fast the offset changes along the half-edge, some thousandths.
+_STEPS = cython.declare(cython.int, 4)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _distance(w: cython.pointer(cython.const[Window]), at: cython.double) -> cython.double:
+    return w.offset + reach(w, at)
+
+
+def join(s: cython.pointer(Search), one: cython.pointer(List), n: cython.int, h: cython.int) -> cython.int:
+    """Join the n windows of a list on half-edge h where it pays, and close gaps; how many there are then."""
+    if not s.is_joining:
+        s.n_long += n >= LONG
+        s.is_joining = s.n_long > LONG_LISTS and ONE_IN * s.n_long > s.n_lists_done
+        if not s.is_joining:
+            return n
+    n = _fill_gaps(s, one, n, h)
+    if s.n_lists_done % s.join_every == 0 and not s.failed:
+        n = _join_neighbours(s, one.windows, n, h)
+    return n
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _join_neighbours(
+    s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int
+) -> cython.int:
+    """Join windows that lie side by side on half-edge h; how many are left."""
+    i: cython.int
+    k: cython.int = 1
+    length: cython.double = s.length[h]
+    u: cython.pointer(Window)
+    w: cython.pointer(Window)
+    room: cython.double
+    # No distance here is larger than that of an end and the length.
+    most: cython.double = s.accuracy * (s.upper[s.vertex[next_half_edge(h)]] + length)
+    for i in range(1, n):
+        u, w = windows + (k - 1), windows + i
+        room = most - max(error_of(s, u), error_of(s, w))
+        if room > 0.0 and not _is_bent(u, w, room) and _join(s, u, w, length):
+            continue
+        if k < i:
+            windows[k] = windows[i]
+        k += 1
+    s.n_pairs += n - 1
+    s.n_joined += n - k
+    if s.n_pairs > PAIRS:
+        s.join_every = min(2 * s.join_every, SELDOM) if FEW_JOINED * s.n_joined < s.n_pairs else OFTEN
+        s.n_pairs = s.n_joined = 0
+    return k
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_bent(u: cython.pointer(Window), w: cython.pointer(Window), most: cython.double) -> cython.bint:
+    """Whether joining would change distance by more than `most`.
+
+    The usual case for windows that were not joined before, found without a square root. Where both meet, a kink of
+    distance becomes even: by half of it, times the product of the widths over their sum. The kink is the change of
+    ``x / sqrt(1 + x x)`` for a direction x.
+    """
+    at: cython.double = 0.5 * (u.stop + w.start)
+    a: cython.double = direction(u, at)
+    b: cython.double = direction(w, at)
+    square: cython.double = max(a * a, b * b)
+    p: cython.double = u.stop - u.start
+    q: cython.double = w.stop - w.start
+    return fabs(a - b) * p * q > 2.0 * most * (p + q) * (1.0 + square) * (1.0 + 0.5 * square)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _span(
+    u: cython.pointer(Window),
+    start: cython.double,
+    w: cython.pointer(Window),
+    stop: cython.double,
+    length: cython.double,
+    one: cython.pointer(Window),
+) -> cython.double:
+    """Make the window between a line of u and one of w, with the distances of both; the change of its offset between.
+
+    -1 if the lines are parallel to rounding, or meet ahead before a few faces are crossed.
+    """
+    rise: cython.double = direction(u, start)
+    spread: cython.double = direction(w, stop) - rise
+    first: cython.double = _distance(u, start)
+    last: cython.double = _distance(w, stop)
+    one[0] = u[0]
+    one.corner = -1
+    one.start, one.stop = start, stop
+    if fabs(spread) * FARTHEST_MEETING * length <= stop - start:
+        return -1.0
+    one.depth = (stop - start) / spread
+    if -NEAREST_FOCUS * length < one.depth < 0.0:
+        return -1.0
+    one.x = start - rise * one.depth
+    square: cython.double = one.depth * one.depth
+    first -= _signed(sqrt((start - one.x) * (start - one.x) + square), one.depth)
+    last -= _signed(sqrt((stop - one.x) * (stop - one.x) + square), one.depth)
+    one.turn_x = (last - first) / (stop - start)
+    one.offset = first - one.turn_x * start
+    return fabs(last - first)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _join(
+    s: cython.pointer(Search), u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double
+) -> cython.bint:
+    """Let u take the place of both, if distance stays within the tolerance."""
+    one: Window
+    at: cython.double = 0.5 * (u.stop + w.start)
+    error: cython.double = max(error_of(s, u), error_of(s, w))
+    more: cython.double
+    # Side by side: neither is inside the other.
+    if w.start - u.stop > NEAR * length or w.start <= u.start or w.stop <= u.stop or u.is_plane or w.is_plane:
+        return False
+    room: cython.double = s.accuracy * min(_distance(u, u.start), _distance(w, w.stop)) - error
+    if room <= 0.0:
+        return False
+    more = _span(u, u.start, w, w.stop, length, cython.address(one))
+    if more < 0.0:
+        return False
+    # Where the lines diverge, or meet ahead, equal shares of a side do not stay equal.
+    if one.depth > 0.0:
+        more *= min(1.0, (one.stop - one.start) / one.depth)
+    if more > room:
+        return False
+    more = max(more, fabs(_distance(cython.address(one), at) - min(_distance(u, at), _distance(w, at))))
+    if more > room:
+        return False
+    more = max(more, _change_at(cython.address(one), u, 0.5 * (u.start + at)))
+    more = max(more, _change_at(cython.address(one), w, 0.5 * (w.stop + at)))
+    if more > room or (u.root != w.root and s.label[u.root] != s.label[w.root]):
+        return False
+    one.turn_y = error + more
+    u[0] = one
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _fill_gaps(s: cython.pointer(Search), one: cython.pointer(List), n: cython.int, h: cython.int) -> cython.int:
+    """Windows between neighbours on half-edge h whose lines separate: how many there are then.
+
+    Errors may shift distances against each other so that what lay between is gone. As in a joined window, the lines
+    are those between the last line of one and the first of the other.
+    """
+    i: cython.int = 1
+    last: cython.int = 0
+    w: cython.pointer(Window)
+    gap: Window
+    while i < n:
+        if _between(s, one.windows, n, last, i, s.length[h], cython.address(gap)):
+            if not has_room(one, n - one.count + 1):
+                s.failed = True
+                return n
+            w = one.windows + i
+            memmove(w + 1, w, (n - i) * cython.sizeof(Window))
+            w[0] = gap
+            n += 1
+            i += 1
+        if one.windows[i].stop > one.windows[last].stop:
+            last = i
+        i += 1
+    return n
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _is_covered(
+    windows: cython.pointer(Window), n: cython.int, start: cython.double, stop: cython.double
+) -> cython.bint:
+    """Whether a window reaches into an interval: lists are nearly in order."""
+    j: cython.int
+    for j in range(n):
+        if windows[j].start < stop and windows[j].stop > start:
+            return True
+    return False
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _between(
+    s: cython.pointer(Search),
+    windows: cython.pointer(Window),
+    n: cython.int,
+    before: cython.int,
+    behind: cython.int,
+    length: cython.double,
+    gap: cython.pointer(Window),
+) -> cython.bint:
+    """Whether two of n windows have a gap between whose lines separate; makes the window that closes it."""
+    u: cython.pointer(Window) = windows + before
+    w: cython.pointer(Window) = windows + behind
+    more: cython.double
+    if w.start <= u.stop + NEAR * length or u.is_plane or w.is_plane:
+        return False
+    if direction(w, w.start) <= direction(u, u.stop) or _is_covered(windows, n, u.stop, w.start):
+        return False
+    more = _span(u, u.stop, w, w.start, length, gap)
+    # Nothing is known of distance between, but that it has no larger kink than that of the lines.
+    gap.turn_y = max(error_of(s, u), error_of(s, w)) + more
+    gap.turn_y += 0.125 * (w.start - u.stop) * (direction(w, w.start) - direction(u, u.stop))
+    return more >= 0.0 and gap.turn_y < 2.0 * s.accuracy * _distance(u, u.stop)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _signed(distance: cython.double, depth: cython.double) -> cython.double:
+    return distance if depth > 0.0 else -distance
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _change_at(u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double) -> cython.double:
+    return fabs(_distance(u, at) - _distance(w, at))
+
+
+def cut_joined_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) -> cython.bint:
+    """Cut what is nearer over the ends of the half-edge, see `crossing._cut_by_ends`; whether anything is left."""
+    at_start: cython.double = reach(w, w.start)
+    at_stop: cython.double = reach(w, w.stop)
+    if at_stop > a + w.stop or at_start > b - w.start:
+        return False
+    if at_start > a + w.start:
+        w.start = _as_long(w, a, 1.0, w.start)
+    if at_stop > b - w.stop:
+        w.stop = _as_long(w, b, -1.0, w.stop)
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def _as_long(
+    w: cython.pointer(cython.const[Window]), more: cython.double, sign: cython.double, at: cython.double
+) -> cython.double:
+    """Where the way over an end is as long, starting from `at`: with a fixed offset it is a point of a hyperbola."""
+    _: cython.int
+    constant: cython.double
+    for _ in range(_STEPS):
+        constant = more - w.turn_x * at
+        at = constant + sign * w.x
+        if at == 0.0:
+            break
+        at = 0.5 * (w.x + sign * (w.depth * w.depth / at - constant))
+    return min(max(at, w.start), w.stop)
+
+
+def find_side(
+    w: cython.pointer(Window), apex: cython.pointer(cython.const[Apex]), start: cython.p_double, stop: cython.p_double
+) -> cython.void:
+    """On which side the lines of a joined window pass the apex; how far beside it the first and the last line pass.
+
+    Both come times the depth, without its sign.
+    """
+    start[0] = (w.start - apex.x) * w.depth + (w.start - w.x) * apex.y
+    stop[0] = (w.stop - apex.x) * w.depth + (w.stop - w.x) * apex.y
+    if w.depth < 0.0:
+        start[0], stop[0] = -start[0], -stop[0]
+    w.side = AROUND_APEX
+    if start[0] > stop[0]:
+        start[0], stop[0] = stop[0], start[0]
+        w.side = CROSSED_AROUND_APEX
+    if stop[0] < 0.0:
+        w.side = LEFT_OF_APEX
+    elif start[0] > 0.0:
+        w.side = RIGHT_OF_APEX
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+@cython.exceptval(check=False)
+def _along_side(
+    at: cython.double,
+    along: cython.double,
+    depth: cython.double,
+    cosine: cython.double,
+    sine: cython.double,
+    length: cython.double,
+) -> cython.double:
+    """Where a line that goes `along` while it rises by `depth` meets a side, from its lower end; at most the apex."""
+    place: cython.double = at * depth / (cosine * depth - along * sine)
+    # A line that separates from the side meets it behind its end.
+    return min(place, length) if place >= 0.0 else length
+
+
+def carry_joined(
+    w: cython.pointer(cython.const[Window]),
+    apex: cython.pointer(cython.const[Apex]),
+    to_left: cython.bint,
+    out: cython.pointer(Window),
+) -> cython.bint:
+    """Make the window over the side to the left or right of the apex; true if there is one.
+
+    Each line keeps its offset. If the lines meet inside the face, they are in reverse order behind.
+    """
+    # Of the first line over this side, from its lower end, and of the last: places, and offsets.
+    low: cython.double
+    high: cython.double
+    of_low: cython.double = w.offset + w.turn_x * w.start
+    of_high: cython.double = w.offset + w.turn_x * w.stop
+    at: cython.double
+    length: cython.double
+    is_around: cython.bint = w.side == AROUND_APEX or w.side == CROSSED_AROUND_APEX
+    out[0] = w[0]
+    if to_left:
+        length = apex.left_length
+        out.x = w.x * apex.cos_left - w.depth * apex.sin_left
+        out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
+        low = _along_side(w.start, w.start - w.x, w.depth, apex.cos_left, apex.sin_left, length)
+        high = _along_side(w.stop, w.stop - w.x, w.depth, apex.cos_left, apex.sin_left, length)
+    else:
+        length = apex.right_length
+        at = apex.length - w.x
+        out.x = length - (at * apex.cos_right - w.depth * apex.sin_right)
+        out.depth = at * apex.sin_right + w.depth * apex.cos_right
+        at = apex.length - w.start
+        low = length - _along_side(at, w.x - w.start, w.depth, apex.cos_right, apex.sin_right, length)
+        at = apex.length - w.stop
+        high = length - _along_side(at, w.x - w.stop, w.depth, apex.cos_right, apex.sin_right, length)
+    if out.depth == 0.0:
+        return False
+    if is_around:
+        at = min(max(backward(w, apex.x, apex.y), w.start), w.stop)
+        if to_left:
+            if w.side == CROSSED_AROUND_APEX:
+                low, of_low = high, of_high
+            high, of_high = length, w.offset + w.turn_x * at
+        else:
+            if w.side == CROSSED_AROUND_APEX:
+                high, of_high = low, of_low
+            low, of_low = 0.0, w.offset + w.turn_x * at
+    elif low > high:
+        low, high, of_low, of_high = high, low, of_high, of_low
+    out.start, out.stop = low, high
+    if not out.stop - out.start > NARROW * length:
+        return False
+    out.turn_x = (of_high - of_low) / (high - low)
+    out.offset = of_low - out.turn_x * low
+    return True
