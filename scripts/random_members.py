@@ -1,6 +1,7 @@
 """Random members of families that once were answered wrongly, each determined by its seed.
 
     python scripts/random_members.py exact --members 2000           # those of the seeds 0 to 1999
+    python scripts/random_members.py tolerance --members 100 --docs docs/engines_theory.md
     python scripts/random_members.py cuts --members 100 --first 500
     python scripts/random_members.py log-maps
     python scripts/random_members.py signed
@@ -13,6 +14,9 @@ exact: distance by windows on nearly flat surfaces (validation/zoo/nearly_flat.p
 vertices, on the intrinsic Delaunay triangulation and on the triangles as given. "edges": by how much distance grows
 faster than along an edge, inf where a vertex has none. "triangulations": the difference of both. "straight lines": on
 at most 60 vertices, the difference to `straight_lines`. All as shares of the largest distance.
+
+tolerance: smooth surfaces of some ten thousand vertices, on which windows are joined, from two vertices: for each
+tolerance the largest error over the tolerance and the largest distance, before answers are checked.
 
 cuts: small meshes cut along curves across, through and along everything. "area": how far the parts of a face are from
 its area. "length": how far the curves among the edges are from their length. "distance": how far exact distances
@@ -60,6 +64,7 @@ from heat_igl.intrinsic import intrinsic_triangulation, mollify
 from heat_igl.mesh import region_boundary
 from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.operators import operators
+from heat_igl.plan import joining_accuracy
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES
 from heat_igl.validation.zoo.registry import hull
@@ -71,7 +76,8 @@ from harness import Row, Table, on_sphere, parsed, publish
 Random = np.random.Generator
 # Kind, figures, and what of them the rounding of lengths explains.
 Member = tuple[str, dict[str, float], float]
-LARGEST = {"exact": 1e-9, "cuts": 1e-12, "log-maps": 1e-8, "signed": 1e-12}
+LARGEST = {"exact": 1e-9, "tolerance": 1.0, "cuts": 1e-12, "log-maps": 1e-8, "signed": 1e-12}
+TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6)
 _MOST_COMPARED, _COARSE = 60, 30
 
 
@@ -202,6 +208,43 @@ def exact(seed: int) -> Member:
     if mesh.n_vertices <= _MOST_COMPARED:
         off["straight lines"] = float(np.abs(straight_lines(mesh, sources) - found).max())
     return name, {key: max(each / float(found.max()), 0.0) for key, each in off.items()}, rounding(mesh)
+
+
+# Windows within a tolerance.
+
+
+def waves(P: FloatArray, rng: Random) -> FloatArray:
+    """Smooth values at points."""
+    k, phase = rng.normal(size=(5, P.shape[1])) * rng.uniform(1, 6), rng.uniform(0, 2 * np.pi, 5)
+    return np.sin(P @ k.T + phase).mean(axis=1)
+
+
+def hills(rng: Random) -> Mesh:
+    P = rng.random((10_000, 2))
+    return Mesh(np.column_stack([P, rng.uniform(0, 0.3) * waves(P, rng)]), Delaunay(P).simplices)
+
+
+SPHERE = shapes.icosphere(5)
+SMOOTH: dict[str, Callable[[Random], Mesh]] = {
+    "sphere": lambda rng: hull(on_sphere(10_000, rng)),
+    "ellipsoid": lambda rng: Mesh(SPHERE.V * rng.uniform(0.3, 1, 3), SPHERE.F),
+    "blob": lambda rng: Mesh(SPHERE.V * (1 + rng.uniform(0, 0.5) * waves(SPHERE.V, rng))[:, None], SPHERE.F),
+    "torus": lambda rng: shapes.torus(*(int(n) for n in rng.integers(80, 200, 2))),
+    "hills": hills,
+}
+
+
+def tolerance(seed: int) -> Member:
+    name = list(SMOOTH)[seed % len(SMOOTH)]
+    rng = np.random.default_rng(seed)
+    mesh = SMOOTH[name](rng)
+    surface, figures = ExactSurface(from_mesh(mesh, 0)), dict.fromkeys((f"{t:.0e}" for t in TOLERANCES), 0.0)
+    for source in rng.integers(0, mesh.n_vertices, (2, 1)):
+        truth = surface.distance(source)
+        for t in TOLERANCES:
+            off = np.abs(surface.distance(source, accuracy=joining_accuracy(t)) - truth).max() / (t * truth.max())
+            figures[f"{t:.0e}"] = max(figures[f"{t:.0e}"], float(off))
+    return name, figures, 0.0
 
 
 # Cuts.
@@ -394,7 +437,13 @@ def signed(seed: int) -> Member:
     return f"{spread}, {100 * exchanged:.0f} % exchanged", {"difference": off}, 0.0
 
 
-TABLES: dict[str, Callable[[int], Member]] = {"exact": exact, "cuts": cuts, "log-maps": log_maps, "signed": signed}
+TABLES: dict[str, Callable[[int], Member]] = {
+    "exact": exact,
+    "tolerance": tolerance,
+    "cuts": cuts,
+    "log-maps": log_maps,
+    "signed": signed,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> bool:

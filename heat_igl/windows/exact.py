@@ -499,10 +499,9 @@ def search(
     asks_for_all = not len(wanted.place.faces) and goals is None and not directed
     if not (asks_for_all and tables.is_delaunay and not len(starts.segments.faces)):
         accuracy = 0.0
-    # Joined windows depend on those beside them, which are not the same on two threads.
-    shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all and accuracy == 0.0
+    shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all
     if shares and not (tables.kind == FLAT_VERTEX).any():
-        statistics = _beside(tables, starts, found, run)
+        statistics = _beside(tables, starts, found, accuracy, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
@@ -517,10 +516,14 @@ def _require(is_done: bool) -> None:
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 
-def _beside(tables: Tables, starts: Starts, found: Found, run: _Run) -> IntArray | None:
-    """Search on two threads; returns the statistics of both, or None if one thread must repeat the search."""
+def _beside(tables: Tables, starts: Starts, found: Found, accuracy: float, run: _Run) -> IntArray | None:
+    """Search on two threads; returns the statistics of both, or None if one thread must repeat the search.
+
+    Windows are joined by the first thread alone.
+    """
     also, statistics, done = Found.of(tables.n, len(found.label)), np.zeros((2, 3), np.int64), []
-    first, second = (windows.Front(tables, each, TOLERANCE) for each in (found, also))
+    first = windows.Front(tables, found, TOLERANCE, None, None, accuracy)
+    second = windows.Front(tables, also, TOLERANCE)
     bounds = np.full((2, tables.n), np.inf)
     windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(tables.edges.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [

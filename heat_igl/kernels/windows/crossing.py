@@ -921,7 +921,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     assert memcpy(s.to_left, windows, n * cython.sizeof(Window)) != cython.NULL
     i = n
     n = trim(s, windows, n, h)
-    assert s.accuracy > 0.0 or is_covered(s, s.to_left, i, windows, n, h)
+    assert s.is_joining or is_covered(s, s.to_left, i, windows, n, h)
     if s.accuracy > 0.0 and n > 1:
         n = join(s, one, n, h)
         if s.failed:
@@ -948,11 +948,11 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
             or (w.side == LEFT_OF_APEX and not apex.nearest + margin <= bent(w, w.stop, apex.x, apex.y))
         ):
             if _to_left(w, cython.address(apex), s.to_left + n_left):
-                assert s.accuracy > 0.0 or _continues(w, cython.address(apex), s.to_left + n_left, True)
+                assert s.is_joining or _continues(w, cython.address(apex), s.to_left + n_left, True)
                 n_left += 1
         else:
             assert (
-                s.accuracy > 0.0
+                s.is_joining
                 or w.side == RIGHT_OF_APEX
                 or _is_behind(w, cython.address(apex), windows + apex.best, True)
             )
@@ -962,11 +962,11 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
             or (w.side == RIGHT_OF_APEX and not apex.nearest + margin <= bent(w, w.start, apex.x, apex.y))
         ):
             if _to_right(w, cython.address(apex), s.to_right + n_right):
-                assert s.accuracy > 0.0 or _continues(w, cython.address(apex), s.to_right + n_right, False)
+                assert s.is_joining or _continues(w, cython.address(apex), s.to_right + n_right, False)
                 n_right += 1
         else:
             assert (
-                s.accuracy > 0.0
+                s.is_joining
                 or w.side == LEFT_OF_APEX
                 or _is_behind(w, cython.address(apex), windows + apex.best, False)
             )

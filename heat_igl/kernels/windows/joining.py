@@ -20,6 +20,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     CROSSED_AROUND_APEX,
     FARTHEST_MEETING,
     FEW_JOINED,
+    FIRST,
     LEFT_OF_APEX,
     LONG,
     LONG_LISTS,
@@ -55,9 +56,16 @@ def _distance(w: cython.pointer(cython.const[Window]), at: cython.double) -> cyt
     return w.offset + reach(w, at)
 
 
+def may_join(s: cython.pointer(Search)) -> cython.bint:
+    """Whether windows are joined, or it is not yet decided that they are not."""
+    return s.accuracy > 0.0 and (s.is_joining or FIRST * s.n_lists_done < s.n_half_edges)
+
+
 def join(s: cython.pointer(Search), one: cython.pointer(List), n: cython.int, h: cython.int) -> cython.int:
     """Join the n windows of a list on half-edge h where it pays, and close gaps; how many there are then."""
     if not s.is_joining:
+        if not may_join(s):
+            return n
         s.n_long += n >= LONG
         s.is_joining = s.n_long > LONG_LISTS and ONE_IN * s.n_long > s.n_lists_done
         if not s.is_joining:

@@ -211,11 +211,12 @@ cdef extern from *:
     // Windows are joined at one of so many crossings at least, at most: what was not joined at one seldom is at the next.
     #define OFTEN 2
     #define SELDOM 64
-    // Joining begins when more than so many lists, and more than one in so many, had so many windows: it costs time in
-    // shorter ones.
+    // Joining begins when more than so many lists, and more than one in so many, had so many windows, within the first
+    // crossings, one for so many half-edges: it costs time in shorter lists, and on two threads.
     #define LONG_LISTS 256
     #define ONE_IN 8
     #define LONG 16
+    #define FIRST 3
     // How often is decided after so many pairs: less often if fewer than one in so many were joined.
     #define PAIRS 4096
     #define FEW_JOINED 16
@@ -242,6 +243,7 @@ cdef extern from *:
     int LONG_LISTS
     int ONE_IN
     int LONG
+    int FIRST
     int PAIRS
     int FEW_JOINED
     double BENT_MORE
