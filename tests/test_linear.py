@@ -13,7 +13,7 @@ from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, shapes
 from heat_igl.errors import FactorizationError
-from heat_igl.linear import analyse, factorize
+from heat_igl.linear import analyse, backends, factorize
 from heat_igl.linear.dissection import dissect
 from heat_igl.linear.factor_memory import factor_bytes
 from heat_igl.operators import operators
@@ -262,3 +262,14 @@ def test_estimate_bounds_what_the_factors_hold():
         A = -operators(mesh).L
         held = analyse(A, "multifrontal").nonzeros * 12
         assert 1 < factor_bytes(A.shape[0], A.nnz) / held < 4
+
+
+def test_factors_that_do_not_fit_are_an_error_before_they_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = shapes.icosphere(4)
+    needed = 2 * factor_bytes(mesh.n_vertices, operators(mesh).L.nnz)
+    monkeypatch.setattr(backends, "available_memory", lambda: 0.9 * needed)
+    with pytest.raises(MemoryError, match=r"two factors of 2562 rows take about .* take GeodesicSolver"):
+        HeatMethodSolver(mesh)
+    HeatMethodSolver(mesh, backend="scipy")
+    monkeypatch.setattr(backends, "available_memory", lambda: 1.1 * needed)
+    HeatMethodSolver(mesh)
