@@ -215,7 +215,7 @@ cdef extern from *:
     // crossings, one for so many half-edges: it costs time in shorter lists, and on two threads.
     #define LONG_LISTS 256
     #define ONE_IN 8
-    #define LONG 16
+    #define LONG 20
     #define FIRST 3
     // How often is decided after so many pairs: less often if fewer than one in so many were joined.
     #define PAIRS 4096
