@@ -66,6 +66,14 @@ def test_labels_are_those_of_the_nearest_source() -> None:
     np.testing.assert_allclose(each[cells.labels, np.arange(mesh.n_vertices)], each.min(axis=0), atol=2e-4 * each.max())
 
 
+def test_derivatives_are_those_of_exact_distance() -> None:
+    mesh = SMOOTH["torus"]()
+    phi, pull_back = GeodesicSolver(mesh, tolerance=1e-4).distance_vjp(5)
+    assert np.array_equal(phi, geodesic_distance(mesh, 5, method="exact"))
+    assert not np.array_equal(phi, GeodesicSolver(mesh, tolerance=1e-4).distance(5))
+    assert len(pull_back.inexact) == 0
+
+
 @pytest.mark.parametrize("make", [bumpy, lambda: perturbed(shapes.icosphere(4), 0.2)], ids=["bumpy", "rough"])
 def test_where_windows_are_few_the_answer_is_exact(make) -> None:
     mesh = make()

@@ -191,10 +191,7 @@ class DistanceDerivative:
 
     @cached_property
     def inexact(self) -> IntArray:
-        """Vertices whose distance is not the length of the path that is differentiated.
-
-        A tolerance changes distances. The derivative is that of the path as it is.
-        """
+        """Vertices whose distance is not the length of the path that is differentiated."""
         reached = np.flatnonzero(np.isfinite(self.distance))
         distance = self.distance[reached]
         return np.asarray(reached[np.abs(self._paths.lengths()[reached] - distance) > _SAME * distance])

@@ -310,8 +310,8 @@ class GeodesicSolver(BatchedSolver):
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
         Arguments and errors as for `distance`; a ValueError also if the engine is a sweep, and for what has no
-        derivative, see `differentiable_surface`. The derivative is that of the exact paths. Of the Hopf-Lax formula,
-        it is that of its fixed point, which ``phi`` is to rounding, see `SimplexDerivative`.
+        derivative, see `differentiable_surface`. Both are those of the exact paths, whatever the tolerance. Of the
+        Hopf-Lax formula, the derivative is that of its fixed point, which ``phi`` is to rounding: `SimplexDerivative`.
         """
         from heat_igl.sweep.simplex_engine import SimplexEngine
 
@@ -330,7 +330,7 @@ class GeodesicSolver(BatchedSolver):
         sides = SideLengths(domain) if isinstance(domain, Mesh) else None
         if isinstance(domain, Operators):
             sides = domain.metric
-        distance = self.distance(sources)
+        distance = engine.exact.distance(chosen, np.inf, n_threads())
         return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.paths(chosen))
 
     def _windows(self, what: str) -> GuardedEngine:

@@ -500,6 +500,13 @@ class GuardedEngine(Engine):
     ) -> None:
         self.windows, self._invariants, self._tolerance, self._others = windows, invariants, tolerance, others
 
+    @cached_property
+    def exact(self) -> GuardedEngine:
+        """The same engine without a tolerance."""
+        if self.windows.accuracy == 0:
+            return self
+        return GuardedEngine(self.windows.exact, self._invariants, 0.0, self._others)
+
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
         """Distance (n,)."""
         found = self.windows.distance(sources, cutoff, threads)
@@ -537,13 +544,9 @@ class GuardedEngine(Engine):
     def _replacement(
         self, problem: str, sources: SourceSet, cutoff: float, threads: int
     ) -> tuple[FloatArray, IntArray]:
-        """Of exact windows, if those asked have a tolerance; else, and if these fail too, of another engine."""
+        """Of exact windows, if those asked have a tolerance; else of another engine."""
         if self.windows.accuracy > 0:
-            found = self.windows.exact.labelled(sources, cutoff, threads)
-            remaining = self.problem(found[0], sources, cutoff)
-            if remaining is None:
-                return found
-            problem = remaining
+            return self.exact.labelled(sources, cutoff, threads)
         return self._another(problem, sources, cutoff, threads)
 
     def _another(self, problem: str, sources: SourceSet, cutoff: float, threads: int) -> tuple[FloatArray, IntArray]:
