@@ -55,8 +55,8 @@ class GeodesicSolver(BatchedSolver):
     Notes
     -----
     The solver is immutable; threads may share it, and a pickled copy gives the same bits. A single query may use
-    several threads, and `distances` uses all of them. Directions, paths and derivatives are exact whatever the
-    tolerance.
+    several threads, and `distances` uses all of them. Cells, directions, paths and derivatives are exact whatever
+    the tolerance.
 
     Examples
     --------

@@ -220,14 +220,22 @@ class WindowEngine(TriangleEngine):
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
         """Distance (n,)."""
         if not sources.on_vertices_alone or sources.vertex_offset.any():
-            return super().distance(sources, cutoff, threads)
+            return self._labelled(sources, cutoff, threads, self.accuracy)[0]
         found = self._from_vertices.distance(sources.vertices, None, cutoff, threads, self.accuracy)
         return self._with_copies(found)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
-        """Distance (n,), and the source (n,) that it is measured from."""
+        """Exact distance (n,), and the source (n,) that it is measured from.
+
+        Within a tolerance cells would not be connected.
+        """
+        return self._labelled(sources, cutoff, threads, 0.0)
+
+    def _labelled(
+        self, sources: SourceSet, cutoff: float, threads: int, accuracy: float
+    ) -> tuple[FloatArray, IntArray]:
         query = Query.of(sources, self._triangles)
-        found = self.solution(query, query.cutoff(cutoff), threads=threads, accuracy=self.accuracy)
+        found = self.solution(query, query.cutoff(cutoff), threads=threads, accuracy=accuracy)
         labels = labels_of(sources)[found.origin.label]
         return self._with_copies(query.with_begin(found.distance)), self._with_copies(labels)
 
@@ -511,7 +519,11 @@ class GuardedEngine(Engine):
         """Distance (n,)."""
         found = self.windows.distance(sources, cutoff, threads)
         problem = self.problem(found, sources, cutoff)
-        return found if problem is None else self._replacement(problem, sources, cutoff, threads)[0]
+        if problem is None:
+            return found
+        if self.windows.accuracy > 0:
+            return self.exact.distance(sources, cutoff, threads)
+        return self._replacement(problem, sources, cutoff, threads)[0]
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from."""
@@ -527,7 +539,7 @@ class GuardedEngine(Engine):
             return found
         if isinstance(targets, SurfacePoints):
             raise contradicted(problem)
-        return self._another(problem, sources, np.inf, 1)[0][targets]
+        return self._replacement(problem, sources, np.inf, 1)[0][targets]
 
     def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
         """Distance and directions, see `WindowEngine.directed`: no other engine finds these."""
@@ -544,12 +556,6 @@ class GuardedEngine(Engine):
     def _replacement(
         self, problem: str, sources: SourceSet, cutoff: float, threads: int
     ) -> tuple[FloatArray, IntArray]:
-        """Of exact windows, if those asked have a tolerance; else of another engine."""
-        if self.windows.accuracy > 0:
-            return self.exact.labelled(sources, cutoff, threads)
-        return self._another(problem, sources, cutoff, threads)
-
-    def _another(self, problem: str, sources: SourceSet, cutoff: float, threads: int) -> tuple[FloatArray, IntArray]:
         for make in self._others:
             found = make().labelled(sources, cutoff, threads)
             if self.problem(found[0], sources, cutoff) is None:

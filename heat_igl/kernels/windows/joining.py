@@ -193,7 +193,7 @@ def _join(
         return False
     more = max(more, _change_at(cython.address(one), u, 0.5 * (u.start + at)))
     more = max(more, _change_at(cython.address(one), w, 0.5 * (w.stop + at)))
-    if more > room or (u.root != w.root and s.label[u.root] != s.label[w.root]):
+    if more > room:
         return False
     one.turn_y = error + more
     u[0] = one
