@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import perturbed
-from surfaces import bumpy
+from surfaces import bumpy, moebius_strip
 
 from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, shapes
 from heat_igl.plan import joining_accuracy
@@ -81,7 +81,14 @@ def test_derivatives_are_those_of_exact_distance() -> None:
     assert len(pull_back.inexact) == 0
 
 
-@pytest.mark.parametrize("make", [bumpy, lambda: perturbed(shapes.icosphere(4), 0.2)], ids=["bumpy", "rough"])
+ROUGH = {
+    "bumpy": bumpy,
+    "rough": lambda: perturbed(shapes.icosphere(4), 0.2),
+    "with a boundary": lambda: moebius_strip(150, 8),
+}
+
+
+@pytest.mark.parametrize("make", ROUGH.values(), ids=ROUGH)
 def test_where_windows_are_few_the_answer_is_exact(make) -> None:
     mesh = make()
     assert np.array_equal(geodesic_distance(mesh, 3, tolerance=1e-3), geodesic_distance(mesh, 3, method="exact"))

@@ -193,7 +193,7 @@ class WindowEngine(TriangleEngine):
     Parameters
     ----------
     triangles, originals
-        As for the class above.
+        As for `TriangleEngine`.
     accuracy : float
         Windows are joined as far as distances keep this fraction of themselves; 0 for exact.
     """

@@ -208,14 +208,14 @@ def _reach_ends(
     """Distances along the two sides of corner k from its vertex v.
 
     Before the first line from a bend, and behind the last, a path along a side bends where straight ones pass the
-    vertex. Within a tolerance such a path may seem to be shorter than these, which would leave the directions between
+    vertex. Among joined windows such a path may seem to be shorter than these, which would leave the directions between
     without a window, so it is taken for longer by more than the tolerance.
     """
     head: cython.int = next_half_edge(k)
     tail: cython.int = previous_half_edge(k)
     a: cython.double = s.length[tail]
     b: cython.double = s.length[head]
-    more: cython.double = BENT_MORE * s.accuracy * offset
+    more: cython.double = BENT_MORE * s.accuracy * offset if s.is_joining else 0.0
     relax(s, s.vertex[head], offset + a + (more if bends_before else 0.0), v, head, b, k, 1.0, 0.0)
     x: cython.double = 0.5 * twice_product(a, b, s.length[k]) / a
     length: cython.double = offset + b + (more if bends_behind else 0.0)
