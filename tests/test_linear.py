@@ -16,8 +16,9 @@ from heat_igl.errors import FactorizationError
 from heat_igl.linear import analyse, backends, factorize
 from heat_igl.linear.dissection import dissect
 from heat_igl.linear.factor_memory import factor_bytes
+from heat_igl.linear.multifrontal import MultifrontalAnalysis
 from heat_igl.operators import operators
-from heat_igl.runtime import threads
+from heat_igl.runtime import PeakMemory, threads
 from heat_igl.validation.zoo import SHAPES
 
 
@@ -264,9 +265,25 @@ def test_estimate_bounds_what_the_factors_hold():
         assert 1 < factor_bytes(A.shape[0], A.nnz) / held < 4
 
 
+@pytest.mark.parametrize("n_per_vertex", [1, 2])
+def test_the_memory_of_two_factors_is_known_before(n_per_vertex: int) -> None:
+    """One row per vertex, as in diffusion of scalars, and two, as in that of tangent vectors."""
+    A = sp.kron(-operators(shapes.torus(200, 200)).L, np.eye(n_per_vertex) + 0.1).tocsc()
+    A += sp.identity(A.shape[0], format="csc")
+    analysis = analyse(A)
+    assert isinstance(analysis, MultifrontalAnalysis)
+    with PeakMemory() as peak:
+        factors = [analysis.factorize(A) for _ in range(2)]
+    assert len(factors) == 2
+    assert peak.bytes is not None
+    assert 0.7 < peak.bytes / analysis.two_factors_bytes < 1.05
+
+
 def test_factors_that_do_not_fit_are_an_error_before_they_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = shapes.icosphere(4)
-    needed = 2 * factor_bytes(mesh.n_vertices, operators(mesh).L.nnz)
+    analysis = analyse(operators(mesh).L)
+    assert isinstance(analysis, MultifrontalAnalysis)
+    needed = analysis.two_factors_bytes
     monkeypatch.setattr(backends, "available_memory", lambda: 0.9 * needed)
     with pytest.raises(MemoryError, match=r"two factors of 2562 rows take about .* take GeodesicSolver"):
         HeatMethodSolver(mesh)

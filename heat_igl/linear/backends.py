@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
-from heat_igl.linear.factor_memory import factor_bytes, is_of_volume
+from heat_igl.linear.factor_memory import is_of_volume
 from heat_igl.linear.multifrontal import MultifrontalAnalysis
 from heat_igl.linear.protocols import Analysis, Factorization
 from heat_igl.linear.superlu import SuperLUAnalysis
@@ -48,23 +48,24 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
     ------
     MemoryError
         If two factors, of heat and of Poisson's problem, would not fit into the memory available now; not if a backend
-        is named.
+        is named. Their entries are counted, not estimated.
     ValueError
         If there is no such backend.
     """
     require_choice("backend", backend, get_args(Backend))
     n = pattern.shape[0]
-    needed, there = 2 * factor_bytes(n, pattern.nnz), available_memory()
-    if backend == "auto" and needed > there:
+    if backend != "auto" or n < SMALLEST_MULTIFRONTAL:
+        return _ANALYSES["scipy" if backend == "auto" else backend](pattern)
+    found = MultifrontalAnalysis(pattern)
+    if found.nonzeros > MOST_FILL * n * np.log2(n) and not is_of_volume(n, pattern.nnz):
+        return SuperLUAnalysis(pattern)
+    needed, there = found.two_factors_bytes, available_memory()
+    if needed > there:
         raise MemoryError(
             f"two factors of {n} rows take about {needed / 2**30:.1f} GiB, and {there / 2**30:.1f} GiB are available: "
             "take GeodesicSolver, which factors nothing, or name a backend to try it all the same"
         )
-    if backend != "auto" or n < SMALLEST_MULTIFRONTAL:
-        return _ANALYSES["scipy" if backend == "auto" else backend](pattern)
-    found = MultifrontalAnalysis(pattern)
-    is_poor = found.nonzeros > MOST_FILL * n * np.log2(n) and not is_of_volume(n, pattern.nnz)
-    return SuperLUAnalysis(pattern) if is_poor else found
+    return found
 
 
 def factorize(A: sp.csc_matrix, backend: Backend = "auto", free: BoolArray | None = None) -> Factorization:
