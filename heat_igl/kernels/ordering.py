@@ -21,7 +21,6 @@ def ascending(key: cython.double[::1]):
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _sort(
     key: cython.double[::1], digits: cython.ulonglong[:, ::1], order: cython.int[:, ::1], place: cython.longlong[:, ::1]
 ) -> cython.void:
@@ -52,7 +51,6 @@ def _sort(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _leading_bits(key: cython.double) -> cython.ulonglong:
     """The first bits of `key` as a number in the same order: doubles are ordered like their bits, signs apart."""
     bits: cython.ulonglong

@@ -124,7 +124,6 @@ class _Search(FittedBends):
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def search(self, i: cython.int) -> cython.void:
         """Give the vertices around an edge their ways around it, as far as they see it and may need it."""
         bend = cython.address(self.bends[i])
@@ -156,7 +155,6 @@ class _Search(FittedBends):
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def push_around(self, v: cython.int, size: cython.int, stamp: cython.int) -> cython.int:
         """Put the neighbours of v that the search has not come to at the end of the queue; returns its size."""
         k: cython.int
@@ -170,7 +168,6 @@ class _Search(FittedBends):
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def is_hidden_from_before(self, i: cython.int, v: cython.int) -> cython.bint:
         """Whether v lies behind the edge, or beside that at most so far as was allowed; sets `is_below`.
 

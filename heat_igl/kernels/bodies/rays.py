@@ -153,7 +153,6 @@ class Ray:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def side(self, a: cython.int, b: cython.int) -> cython.double:
         """On which side the edge ab passes the line: the determinant of w, a - p and b - p."""
         ax: cython.double = self.positions[a, 0] - self.p[0]
@@ -182,7 +181,6 @@ class Ray:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def volume(self, o: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.double:
         """Six times the volume of oabc, with the sign of the order of its corners."""
         found: cython.double = 0.0

@@ -92,7 +92,6 @@ class _Sight:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def look(self, v: cython.int) -> cython.int:
         """Give v the shortest line from a source of its neighbours that stays inside; returns whether there is one."""
         below: cython.double = self.d[v]
@@ -125,7 +124,6 @@ class _Sight:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def take(self, v: cython.int, label: cython.int) -> cython.void:
         """Give v the straight line from a source, and wake those around it that may have use for this source."""
         self.d[v], self.begin[v], self.label[v] = self.line(v, label), self.offset[label], label
@@ -137,7 +135,6 @@ class _Sight:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def nearest_around(
         self, centre: cython.int, v: cython.int, above: cython.double, below: cython.double, nearest: cython.int
     ) -> cython.int:
@@ -159,7 +156,6 @@ class _Sight:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def line(self, v: cython.int, label: cython.int) -> cython.double:
         """The value at v along the straight line from a source."""
         source: cython.int = self.sources[label]
@@ -169,7 +165,6 @@ class _Sight:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def is_lit(self, v: cython.int, label: cython.int) -> cython.bint:
         """Whether the way to v is known to be a straight line from this source."""
         if self.label[v] != label:
@@ -178,7 +173,6 @@ class _Sight:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def sees(self, v: cython.int, label: cython.int) -> cython.bint:
         """Whether the straight line from v to a source stays in the tetrahedra."""
         source: cython.int = self.sources[label]
@@ -200,7 +194,6 @@ class _Sight:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def arrives_from(self, v: cython.int, begin: cython.int, label: cython.int) -> cython.bint:
         """Whether the line from v that begins in the tetrahedron of a corner gets to the source.
 
@@ -220,7 +213,6 @@ class _Sight:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def arrives(self, label: cython.int) -> cython.bint:
         """Whether the ray gets to the source before it leaves the body.
 

@@ -67,7 +67,6 @@ def agreement(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _row_of(
     first: cython.const[cython.longlong][::1],
     triangles: cython.const[cython.int][:, ::1],

@@ -59,7 +59,6 @@ def roomiest_normals(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _invert(
     P: cython.const[cython.double][:, ::1],
     index: cython.const[cython.int][::1],
@@ -88,7 +87,6 @@ def _invert(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _shares(
     inverted: cython.double[:, ::1], directions: cython.const[cython.double][:, ::1], share: cython.double[:, ::1]
 ) -> cython.void:
@@ -110,7 +108,6 @@ def _shares(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _share(inverted: cython.double[:, ::1], u: cython.double[::1], sign: cython.double) -> cython.double:
     j: cython.Py_ssize_t
     most: cython.double = 1.0
@@ -121,7 +118,6 @@ def _share(inverted: cython.double[:, ::1], u: cython.double[::1], sign: cython.
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _average(
     directions: cython.const[cython.double][:, ::1],
     share: cython.double[:, ::1],
@@ -156,7 +152,6 @@ def _average(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _along(
     directions: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, u: cython.double[::1]
 ) -> cython.double:
@@ -217,7 +212,6 @@ def on_one_side(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _sees_the_same(
     P: cython.const[cython.double][:, ::1],
     i: cython.Py_ssize_t,

@@ -47,7 +47,6 @@ def fitting_triangles(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _find_sector(
     P: cython.const[cython.double][:, ::1],
     axes: cython.const[cython.double][:, :, ::1],
@@ -72,7 +71,6 @@ def _find_sector(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _direction(
     P: cython.const[cython.double][:, ::1],
     axes: cython.const[cython.double][:, :, ::1],
@@ -89,7 +87,6 @@ def _direction(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _overlaps(
     vertex: cython.Py_ssize_t,
     f: cython.Py_ssize_t,

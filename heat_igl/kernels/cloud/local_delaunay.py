@@ -59,7 +59,6 @@ def delaunay_stars(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _neighbours_around(
     i: cython.Py_ssize_t,
     P: cython.const[cython.double][:, ::1],
@@ -123,7 +122,6 @@ def _neighbours_around(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _squared_distance(
     P: cython.const[cython.double][:, ::1], i: cython.Py_ssize_t, j: cython.Py_ssize_t
 ) -> cython.double:
@@ -136,7 +134,6 @@ def _squared_distance(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _copy(
     star: cython.double[:, ::1], members: cython.int[::1], source: cython.Py_ssize_t, target: cython.Py_ssize_t
 ) -> cython.void:
@@ -146,7 +143,6 @@ def _copy(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.Py_ssize_t:
     """The scan around the point, from the neighbour that is nearest in the plane: `stack` gets the corners of the hull.
 
@@ -173,7 +169,6 @@ def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: c
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _reach(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.double:
     """Squared distance beyond which neighbours are in no circle of the star; infinite if it is not around the point."""
     a: cython.Py_ssize_t
@@ -192,7 +187,6 @@ def _reach(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.in
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _triangles(
     i: cython.Py_ssize_t,
     top: cython.Py_ssize_t,
@@ -224,7 +218,6 @@ def _triangles(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _square(star: cython.double[:, ::1], a: cython.Py_ssize_t) -> cython.double:
     return star[a, X] * star[a, X] + star[a, Y] * star[a, Y]
 
@@ -232,7 +225,6 @@ def _square(star: cython.double[:, ::1], a: cython.Py_ssize_t) -> cython.double:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _is_hidden(
     star: cython.double[:, ::1], p: cython.Py_ssize_t, q: cython.Py_ssize_t, r: cython.Py_ssize_t
 ) -> cython.bint:

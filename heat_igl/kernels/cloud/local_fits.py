@@ -100,7 +100,6 @@ def _room_for(k: cython.Py_ssize_t):
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _principal_axes(
     P: cython.const[cython.double][:, ::1],
     index: cython.const[cython.int][::1],
@@ -118,7 +117,6 @@ def _principal_axes(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _around(
     P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][::1], local: cython.double[:, ::1]
 ) -> cython.double:
@@ -150,7 +148,6 @@ def _around(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cython.void:
     """The covariance in rows 0 to 2 of `work`."""
     part: cython.double[40]
@@ -191,7 +188,6 @@ def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cy
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _turn(local: cython.double[:, ::1], axes: cython.double[:, ::1]) -> cython.void:
     """Turn rows 0 to 2 of `local` into the axes."""
     j: cython.Py_ssize_t
@@ -206,7 +202,6 @@ def _turn(local: cython.double[:, ::1], axes: cython.double[:, ::1]) -> cython.v
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _normal_equations(local: cython.double[:, ::1], system: cython.double[:, ::1]) -> cython.void:
     """The upper half of the matrix (6, 6) of least squares for the terms 1, x, y, xx, xy, yy of z; z in column 6."""
     moment: cython.double[84]
@@ -264,7 +259,6 @@ def _normal_equations(local: cython.double[:, ::1], system: cython.double[:, ::1
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _eliminate(system: cython.double[:, ::1]) -> cython.void:
     """Gaussian elimination; the matrix is symmetric and positive definite, so its upper half is enough."""
     a: cython.int
@@ -283,7 +277,6 @@ def _eliminate(system: cython.double[:, ::1]) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1]) -> cython.double:
     """The weighted sum of the squared deviations from the quadric whose coefficients are column 6 of `system`."""
     squares: cython.double[4]
@@ -303,7 +296,6 @@ def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _principal(work: cython.double[:, ::1], axes: cython.double[:, ::1], variances: cython.double[::1]) -> cython.void:
     """The axes of most, less and least variance, and the variances, ascending, of the covariance in rows 0 to 2."""
     x: cython.int
@@ -330,7 +322,6 @@ def _principal(work: cython.double[:, ::1], axes: cython.double[:, ::1], varianc
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _rotate(work: cython.double[:, ::1], p: cython.int, q: cython.int) -> cython.bint:
     """One rotation of Jacobi's eigenvalue algorithm; False if entry (p, q) is zero already.
 

@@ -70,7 +70,6 @@ def filling_triangles(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _loop(
     start: cython.Py_ssize_t,
     ends: cython.const[cython.int][:, ::1],
@@ -97,7 +96,6 @@ def _loop(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _fill(
     P: cython.const[cython.double][:, ::1],
     ring: cython.int[::1],
@@ -148,7 +146,6 @@ def _fill(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _ear(
     P: cython.const[cython.double][:, ::1],
     ring: cython.int[::1],
@@ -179,7 +176,6 @@ def _ear(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _is_edge(
     edges: cython.const[cython.longlong][::1], lower: cython.longlong, upper: cython.longlong, n: cython.longlong
 ) -> cython.bint:
@@ -197,7 +193,6 @@ def _is_edge(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _circumradius(
     P: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, b: cython.Py_ssize_t, c: cython.Py_ssize_t
 ) -> cython.double:
@@ -221,7 +216,6 @@ def _circumradius(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _fold(
     P: cython.const[cython.double][:, ::1],
     a: cython.Py_ssize_t,

@@ -55,7 +55,6 @@ def laplacian(F: cython.const[cython.int][:, ::1], weight: cython.const[cython.d
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _column(F: cython.const[cython.int][:, ::1], entry: cython.Py_ssize_t) -> cython.int:
     """The column of an entry: entry 2 h of side h is in that of its tail, 2 h + 1 in that of its head."""
     side: cython.Py_ssize_t = entry >> 1
@@ -66,7 +65,6 @@ def _column(F: cython.const[cython.int][:, ::1], entry: cython.Py_ssize_t) -> cy
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _distribute(
     F: cython.const[cython.int][:, ::1],
     entries: cython.uint[::1],
@@ -87,7 +85,6 @@ def _distribute(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _fill_column(
     F: cython.const[cython.int][:, ::1],
     weight: cython.const[cython.double][::1],

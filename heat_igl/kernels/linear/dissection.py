@@ -79,7 +79,6 @@ class Dissecting:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _push(
     d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, above: cython.Py_ssize_t, number: cython.int
 ) -> cython.void:
@@ -90,7 +89,6 @@ def _push(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
     """Cut a piece in two, or make it a block; the parts wait on the stack."""
     i: cython.Py_ssize_t
@@ -133,7 +131,6 @@ def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Set f to the difference of the distances of a vertex from both ends of the piece.
 
@@ -163,7 +160,6 @@ def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> 
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _breadth_first(d: Dissecting, root: cython.int, distance: cython.int[::1]) -> cython.Py_ssize_t:
     """Number the vertices of root's piece by their distance from it; the queue keeps them in that order."""
     p: cython.Py_ssize_t
@@ -189,7 +185,6 @@ def _breadth_first(d: Dissecting, root: cython.int, distance: cython.int[::1]) -
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _split_off(d: Dissecting, low: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.void:
     """Move the first vertices of the queue to the front of a piece and make them one of their own."""
     i: cython.Py_ssize_t
@@ -204,7 +199,6 @@ def _split_off(d: Dissecting, low: cython.Py_ssize_t, count: cython.Py_ssize_t) 
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _average(
     d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, f: cython.float[::1], smooth: cython.float[::1]
 ) -> cython.void:
@@ -225,7 +219,6 @@ def _average(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _fill_buckets(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
     """Divide the range of f evenly; false if f is constant. `near` takes the buckets."""
     i: cython.Py_ssize_t
@@ -243,7 +236,6 @@ def _fill_buckets(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _best_cut(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> Cut:
     """The cut whose separator is smallest for how evenly it divides the piece.
 
@@ -295,7 +287,6 @@ def _best_cut(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _assign(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, cut: Cut) -> cython.void:
     """Turn buckets into parts: 0 and 1 for the two sides and 2 for the separator, encoded as -1 - part."""
     i: cython.Py_ssize_t
@@ -315,7 +306,6 @@ def _assign(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, cut:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _side(code: cython.int, cut: Cut) -> cython.int:
     """The side of a vertex by bucket, or by part; a separator is on the side that gives it."""
     if code >= 0:
@@ -325,7 +315,6 @@ def _side(code: cython.int, cut: Cut) -> cython.int:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _arrange(
     d: Dissecting, position: cython.Py_ssize_t, low: cython.Py_ssize_t, high: cython.Py_ssize_t, part: cython.int
 ) -> cython.Py_ssize_t:

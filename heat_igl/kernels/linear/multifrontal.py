@@ -104,7 +104,6 @@ def _largest_stack(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _front(e: Elimination, b: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Assemble and eliminate front b; -1, or the place in the order of the pivot that failed."""
     i: cython.Py_ssize_t
@@ -153,7 +152,6 @@ def _front(e: Elimination, b: cython.Py_ssize_t) -> cython.Py_ssize_t:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _add_matrix(
     e: Elimination, start: cython.Py_ssize_t, columns: cython.Py_ssize_t, size: cython.Py_ssize_t, panel: numbers
 ) -> cython.void:
@@ -174,7 +172,6 @@ def _add_matrix(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _add_child(
     e: Elimination,
     child: cython.Py_ssize_t,
@@ -209,7 +206,6 @@ def _add_child(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _eliminate_columns(panel: numbers, columns: cython.Py_ssize_t, size: cython.Py_ssize_t) -> cython.bint:
     """LDL^T of the columns of a front in place; false if a pivot is not positive.
 
@@ -239,7 +235,6 @@ def _eliminate_columns(panel: numbers, columns: cython.Py_ssize_t, size: cython.
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _divide(column: numbers, n: cython.Py_ssize_t) -> cython.bint:
     """Divide a column by the pivot on top of it; false if that is not positive."""
     i: cython.Py_ssize_t
@@ -254,7 +249,6 @@ def _divide(column: numbers, n: cython.Py_ssize_t) -> cython.bint:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _subtract_from_update(
     update: numbers, left: cython.Py_ssize_t, panel: entries, columns: cython.Py_ssize_t
 ) -> cython.void:
@@ -279,7 +273,6 @@ def _subtract_from_update(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _subtract(
     c: numbers,
     length: cython.Py_ssize_t,
@@ -321,7 +314,6 @@ def _subtract(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _subtract_two(
     c: numbers,
     d: numbers,

@@ -84,7 +84,6 @@ class Substitution:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _forward_one(
     f: Substitution,
     x: cython.double[::1],
@@ -130,7 +129,6 @@ def _forward_one(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _back_one(
     f: Substitution, x: cython.double[::1], first: cython.Py_ssize_t, end: cython.Py_ssize_t, room: cython.double[::1]
 ) -> cython.void:
@@ -167,7 +165,6 @@ def _back_one(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _forward_block(
     f: Substitution,
     x: cython.double[:, ::1],
@@ -208,7 +205,6 @@ def _forward_block(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _back_block(
     f: Substitution,
     x: cython.double[:, ::1],
@@ -246,7 +242,6 @@ def _back_block(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _all_zero(x: entries, n: cython.Py_ssize_t) -> cython.bint:
     i: cython.Py_ssize_t
     for i in range(n):
@@ -258,7 +253,6 @@ def _all_zero(x: entries, n: cython.Py_ssize_t) -> cython.bint:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _subtract_row(target: numbers, entry: cython.double, row: entries) -> cython.void:
     """Subtract a row, times an entry of the factor, from another."""
     c: cython.Py_ssize_t
@@ -269,7 +263,6 @@ def _subtract_row(target: numbers, entry: cython.double, row: entries) -> cython
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _add_below(
     panel: entries, columns: cython.Py_ssize_t, left: cython.Py_ssize_t, own: entries, below: numbers
 ) -> cython.void:
@@ -301,7 +294,6 @@ def _add_below(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _subtract_below(column: entries, left: cython.Py_ssize_t, below: entries, own: numbers) -> cython.void:
     """Subtract the rows below one column of a front, times `below`, from `own`; four rows per turn."""
     c: cython.Py_ssize_t

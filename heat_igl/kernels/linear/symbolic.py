@@ -45,7 +45,6 @@ def front_rows(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _rows_of_front(
     b: cython.Py_ssize_t,
     ends: cython.const[cython.int][::1],
@@ -86,7 +85,6 @@ def _rows_of_front(
 
 
 @cython.cfunc
-@cython.exceptval(check=False)
 def _sort_rows(
     first_row: cython.const[cython.longlong][::1],
     rows: cython.const[cython.int][::1],

@@ -128,7 +128,6 @@ def shorten(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _lowered(
     ends: cython.const[cython.int][:, ::1],
     length: cython.const[cython.double][::1],
@@ -149,7 +148,6 @@ def _lowered(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _far_end(
     ends: cython.const[cython.int][:, ::1],
     length: cython.const[cython.double][::1],

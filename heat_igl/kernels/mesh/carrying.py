@@ -66,7 +66,6 @@ def carry(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _split(at: cython.double[::1], b: cython.double[::1]) -> cython.longlong:
     """Which of the three faces around a new vertex with coordinates `at` holds a point, whose coordinates are changed.
 
@@ -87,7 +86,6 @@ def _split(at: cython.double[::1], b: cython.double[::1]) -> cython.longlong:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _flip(
     edge: cython.longlong[::1], lengths: cython.double[::1], face: cython.longlong, b: cython.double[::1]
 ) -> cython.longlong:

@@ -47,7 +47,6 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _by_lower_end(
     F: cython.const[cython.longlong][:, ::1],
     vertex: cython.int[::1],
@@ -86,7 +85,6 @@ def _by_lower_end(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _glue_sides(
     V: cython.const[cython.double][:, ::1],
     scale: cython.double,

@@ -57,7 +57,6 @@ def edges_of_triangles(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ss
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _end(
     F: cython.const[cython.longlong][:, ::1], half_edge: cython.longlong, is_lower: cython.bint
 ) -> cython.longlong:
@@ -71,7 +70,6 @@ def _end(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _by_end(
     F: cython.const[cython.longlong][:, ::1],
     sides: cython.longlong[::1],
@@ -119,7 +117,6 @@ def components(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _join(above: cython.longlong[::1], a: cython.longlong, b: cython.longlong) -> cython.void:
     """Put the component of the higher lowest vertex below that of the other; paths are halved on the way."""
     while above[a] != a:

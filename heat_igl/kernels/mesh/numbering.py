@@ -90,7 +90,6 @@ class _Numbering:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def go_on_from(self, first: cython.int) -> cython.void:
         """Number the faces of the component of this one, unless it has a number."""
         c: cython.int
@@ -117,7 +116,6 @@ class _Numbering:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def meet(self, f: cython.int) -> cython.void:
         if self.place[f] < 0:
             self.place[f] = self.n_met

@@ -30,7 +30,6 @@ def polar_angles(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _around(
     angle: cython.double[::1],
     twin: cython.longlong[::1],

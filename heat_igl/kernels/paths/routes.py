@@ -94,7 +94,6 @@ class EdgeRoutes:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def reach(self, v: cython.int, length: cython.double, before: cython.int, face: cython.int) -> cython.void:
         """Take a way to v if it is the shortest so far."""
         if not length < self.length[v]:
@@ -111,7 +110,6 @@ class EdgeRoutes:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def forget(self) -> cython.void:
         """Make ready for the next search."""
         i: cython.int

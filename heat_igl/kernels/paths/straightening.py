@@ -367,7 +367,6 @@ class Passing:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _angle(ax: cython.double, ay: cython.double, bx: cython.double, by: cython.double) -> cython.double:
     """Angle between two directions, 0 to pi."""
     return atan2(fabs(ax * by - ay * bx), ax * bx + ay * by)

@@ -96,7 +96,6 @@ class Detour:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def find(
         self,
         s: FaceTable,
@@ -321,7 +320,6 @@ class Funnel:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def _bend_at(self, count: cython.int, side: cython.int, at: cython.int) -> cython.void:
         """Make an end of the crossing `at` the next bend."""
         v: cython.int = self.gate[at].vertex[side]

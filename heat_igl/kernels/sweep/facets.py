@@ -17,7 +17,6 @@ class Facet:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def is_flat(self) -> cython.bint:
         """Whether v and the facet lie nearly in one plane: then slopes across it may come from the wrong side."""
         m = cython.address(self.product[0])
@@ -28,7 +27,6 @@ class Facet:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def dual(self, k: cython.int, e: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """The square of the slope that rises by e towards the corners, in the inverse of the metric k of `product`."""
         m = cython.address(self.product[9 * k])
@@ -216,7 +214,6 @@ class Facet:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def on_triangle(self, x: cython.pointer[cython.const[cython.double]]) -> tuple[cython.double, cython.double]:
         """The step, in shares of the last two corners, to the least value of the quadratic model on the triangle."""
         gb: cython.double = self.g[1] - self.g[0]
@@ -252,7 +249,6 @@ class Facet:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _on_interval(slope: cython.double, bend: cython.double, low: cython.double, high: cython.double) -> cython.double:
     """Where slope x + bend x^2 / 2 is least between two bounds."""
     if bend > 0.0:
@@ -263,7 +259,6 @@ def _on_interval(slope: cython.double, bend: cython.double, low: cython.double, 
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _model(
     gb: cython.double,
     ge: cython.double,

@@ -111,7 +111,6 @@ class HopfLax(Facet):
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def wait(self, v: cython.int) -> cython.void:
         """Put v into the queue, by its distance."""
         self.queue.set_key(v, 1.0 / (1.0 + (self.d[v] - self.low) / self.unit))
@@ -159,7 +158,6 @@ class HopfLax(Facet):
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def nearest_corner(self) -> cython.int:
         """The corner of the simplex that has the largest share of the best place."""
         most: cython.int = 0
@@ -172,7 +170,6 @@ class HopfLax(Facet):
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def face(self, c: cython.int) -> cython.void:
         """Look at the facet opposite corner c."""
         k: cython.int = 0
@@ -338,7 +335,6 @@ class HopfLax(Facet):
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def rests_on(self, v: cython.int, u: cython.int) -> cython.bint:
         """Whether u is in the simplex through which v got its distance."""
         c: cython.int

@@ -71,7 +71,6 @@ def fill(edges, first: cython.const[cython.int][::1], spoke: Spoke[::1]):
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _shapes(length: cython.const[cython.double][::1], corner: Corner[::1]) -> cython.void:
     """Place and angle of each corner."""
     h: cython.int
@@ -91,7 +90,6 @@ def _shapes(length: cython.const[cython.double][::1], corner: Corner[::1]) -> cy
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _side(k: cython.int, is_left: cython.bint) -> cython.int:
     """The side at the left of corner k // 2, or at its right: they change places if k is odd, the face turned over."""
     return next_half_edge(k // 2) if is_left != (k & 1) else previous_half_edge(k // 2)
@@ -100,7 +98,6 @@ def _side(k: cython.int, is_left: cython.bint) -> cython.int:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _beyond(
     twin: cython.const[cython.int][::1],
     aligned: cython.const[cython.uchar][::1],
@@ -119,7 +116,6 @@ def _beyond(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _fans(
     vertex: cython.const[cython.int][::1],
     twin: cython.const[cython.int][::1],
@@ -179,7 +175,6 @@ def _fans(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _fill_spokes(
     vertex: cython.const[cython.int][::1],
     length: cython.const[cython.double][::1],

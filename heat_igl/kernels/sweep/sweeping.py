@@ -98,7 +98,6 @@ class _Sweep:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def run(self) -> cython.void:
         """Visit all that is stale, in order, going back where need be."""
         n: cython.Py_ssize_t = self.order.shape[0]
@@ -132,7 +131,6 @@ class _Sweep:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def read_ahead(self, i: cython.Py_ssize_t) -> cython.void:
         """Prefetch the data of the next visits: on large meshes that takes longer than the visits."""
         k: cython.int
@@ -151,7 +149,6 @@ class _Sweep:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def visit(self, v: cython.int) -> cython.Py_ssize_t:
         """Give v the best value from the triangles at it; returns the lowest rank that becomes stale, or n."""
         old: cython.double = self.d[v]
@@ -165,7 +162,6 @@ class _Sweep:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def lower(self, v: cython.int) -> cython.void:
         """Lower v to the best value from the triangles at it, if there is one source.
 
@@ -201,7 +197,6 @@ class _Sweep:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def lower_labelled(self, v: cython.int) -> cython.bint:
         """Lower v to the best value from the triangles at it, with the source of that; whether there is one."""
         k: cython.int
@@ -244,7 +239,6 @@ class _Sweep:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def seen_from_beyond(
         self, k: cython.int, across: cython.double, source: cython.pointer[cython.int]
     ) -> cython.double:
@@ -276,14 +270,12 @@ class _Sweep:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def is_of_one_curve(self, one: cython.int, other: cython.int) -> cython.bint:
         """Whether two sources, -1 for none, are points of the same curve."""
         return one >= 0 and other >= 0 and self.group[one] == self.group[other]
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def between_cells(self, k: cython.int, below: cython.double, source: cython.pointer[cython.int]) -> cython.double:
         """Distance across the triangle left of spoke k, whose ends are measured from different sources.
 
@@ -306,7 +298,6 @@ class _Sweep:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def mark(self, v: cython.int, old: cython.double, begin: cython.double) -> cython.Py_ssize_t:
         """Mark the vertices that a decrease of v's distance from `old` can improve; returns their lowest rank, or n.
 
@@ -325,7 +316,6 @@ class _Sweep:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def mark_farther(self, v: cython.int) -> cython.Py_ssize_t:
         """Mark the farther neighbours, which a smaller d[v] can improve. Those still to come are stale anyway."""
         lowest: cython.Py_ssize_t = self.order.shape[0]
@@ -341,7 +331,6 @@ class _Sweep:
 
     @cython.cfunc
     @cython.nogil
-    @cython.exceptval(check=False)
     def mark_nearer(self, v: cython.int, begin: cython.double) -> cython.Py_ssize_t:
         """Mark the nearer neighbours that a smaller d[v] can improve.
 
@@ -375,7 +364,6 @@ class _Sweep:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def kept(self, v: cython.int) -> cython.double:
         """The part of v's distance that a shorter one must fall below to count."""
         return 1 - SWEEP_ROUNDING if self.is_flat[v] else 1 - NEGLIGIBLE
@@ -383,7 +371,6 @@ class _Sweep:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _keep_smallest(values: cython.pointer[cython.double], at: cython.pointer[cython.int]) -> cython.int:
     """Keep the smallest of `SIDES` values, and the place of it; returns how many are left, one."""
     i: cython.int

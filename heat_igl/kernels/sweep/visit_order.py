@@ -64,7 +64,6 @@ class VisitOrder:
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    @cython.exceptval(check=False)
     def reach_neighbours(self) -> cython.void:
         """Put the neighbours of the next vertex that was passed into the queue."""
         k: cython.int

@@ -56,7 +56,6 @@ from cython.cimports.libc.string import memcpy, memmove
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
     """Derivative, along the half-edge, of the length `reached` that a window adds to its offset."""
     if is_joined(w):
@@ -67,7 +66,6 @@ def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double)
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _has_one_root(w: cython.pointer(Window)) -> cython.bint:
     """Whether all lines come from one point, at the same offset."""
     return not (w.is_plane or is_joined(w))
@@ -76,7 +74,6 @@ def _has_one_root(w: cython.pointer(Window)) -> cython.bint:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _bend(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
     """A bound of the derivative of `_slope` over a quarter of the distance of the root."""
     if w.is_plane:
@@ -87,7 +84,6 @@ def _bend(w: cython.pointer(Window), at: cython.double, reached: cython.double) 
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _change(
     u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, a: cython.double, b: cython.double
 ) -> cython.double:
@@ -99,7 +95,6 @@ def _change(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _meeting(
     u: cython.pointer(Window),
     w: cython.pointer(Window),
@@ -152,7 +147,6 @@ def _meeting(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _compare_squares(
     u: cython.pointer(Window),
     w: cython.pointer(Window),
@@ -187,7 +181,6 @@ def _compare_squares(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _ordered(
     u: cython.pointer(Window),
     w: cython.pointer(Window),
@@ -234,7 +227,6 @@ def _ordered(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _compare(
     u: cython.pointer(Window),
     w: cython.pointer(Window),
@@ -272,7 +264,6 @@ def _compare(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _gives_way(
     u: cython.pointer(Window),
     w: cython.pointer(Window),
@@ -305,7 +296,6 @@ def _gives_way(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _separate(
     u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, has_errors: cython.bint
 ) -> cython.bint:
@@ -315,7 +305,6 @@ def _separate(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _settle(
     s: cython.pointer(Search), u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double
 ) -> cython.int:
@@ -363,7 +352,6 @@ def _settle(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) -> cython.bint:
     """Cut what is nearer over the ends of the half-edge; whether anything is left.
 
@@ -416,7 +404,6 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double) -> cython.bint:
     """Whether w continues u: two halves that passed a flat vertex.
 
@@ -439,7 +426,6 @@ def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cytho
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _insert(
     windows: cython.pointer(Window),
     k: cython.int,
@@ -492,7 +478,6 @@ def _insert(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double) -> cython.double:
     """What windows may take to an end of their half-edge, compared with the distance of that vertex.
 
@@ -506,7 +491,6 @@ def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double)
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
     """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
     i: cython.int
@@ -547,7 +531,6 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def is_covered(
     s: cython.pointer(Search),
     before: cython.pointer(cython.const[Window]),
@@ -582,7 +565,6 @@ def is_covered(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
     """The corner opposite half-edge h."""
     apex: Apex
@@ -601,7 +583,6 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _arrive(
     s: cython.pointer(Search),
     h: cython.int,
@@ -627,7 +608,6 @@ def _arrive(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _straight(w: cython.pointer(Window), apex: cython.pointer(Apex)) -> cython.double:
     """Distance of the apex by the straight line of a window."""
     x: cython.double = apex.x - w.x
@@ -637,7 +617,6 @@ def _straight(w: cython.pointer(Window), apex: cython.pointer(Apex)) -> cython.d
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _reach_over_joined(
     s: cython.pointer(Search),
     h: cython.int,
@@ -666,7 +645,6 @@ def _reach_over_joined(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _reach_apex(
     s: cython.pointer(Search),
     h: cython.int,
@@ -734,7 +712,6 @@ def _reach_apex(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
     """Make the window over the side between the tail and the apex; true if there is one."""
     scale: cython.double
@@ -765,7 +742,6 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
     """Make the window over the side between the apex and the head; true if there is one."""
     scale: cython.double
@@ -800,7 +776,6 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _place(
     apex: cython.pointer(Apex), to_left: cython.bint, at: cython.double, x: cython.p_double, y: cython.p_double
 ) -> cython.void:
@@ -815,7 +790,6 @@ def _place(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _longest(apex: cython.pointer(Apex)) -> cython.double:
     """The longest side of the face, which places on its sides are rounded to."""
     return max(apex.length, apex.left_length, apex.right_length)
@@ -823,7 +797,6 @@ def _longest(apex: cython.pointer(Apex)) -> cython.double:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _continues(
     w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), to_left: cython.bint
 ) -> cython.bint:
@@ -852,7 +825,6 @@ def _continues(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _is_behind(
     w: cython.pointer(Window),
     apex: cython.pointer(Apex),
@@ -883,7 +855,6 @@ def _is_behind(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
     """Prefetch the data for windows over half-edge t."""
     prefetch(s.slot + t)
@@ -893,7 +864,6 @@ def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     """Carry the windows that wait at half-edge h over its face."""
     place: cython.int = s.slot[h]
@@ -982,7 +952,6 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _measure(
     s: cython.pointer(Search),
     h: cython.int,
@@ -1028,7 +997,6 @@ def _measure(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def over_corners(s: cython.pointer(Search), j: cython.int) -> cython.void:
     """Distance of target j over the corners of its face."""
     f: cython.int = s.target_face[j]

@@ -18,7 +18,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import apart
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _piece(
     side: cython.pointer[cython.const[cython.double]],
     one: cython.p_double,
@@ -74,7 +73,6 @@ def _follow(tracer: PathTracer, v: cython.int) -> cython.int:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _along(
     tracer: PathTracer,
     weight: cython.double,

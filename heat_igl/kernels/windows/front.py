@@ -189,7 +189,6 @@ def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(W
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def relax(
     s: cython.pointer(Search),
     v: cython.int,
@@ -270,7 +269,6 @@ def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> c
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _joined_key(w: cython.pointer(Window), length: cython.double, bulge: cython.double) -> cython.double:
     """As of other windows. Where lines meet ahead, outside of the circle, the root is its reflection in infinity."""
     power: cython.double = w.x * (w.x - length) + w.depth * (w.depth + bulge)
@@ -285,7 +283,6 @@ def _joined_key(w: cython.pointer(Window), length: cython.double, bulge: cython.
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _lowest_key(
     s: cython.pointer(Search), run: cython.pointer(Window), n: cython.int, length: cython.double, bulge: cython.double
 ) -> cython.double:
@@ -333,7 +330,6 @@ def has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _mirrored(w: Window, length: cython.double) -> Window:
     """A window in the frame that begins at the other end of its half-edge."""
     start: cython.double = w.start
@@ -399,7 +395,6 @@ def append(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _free_list(s: cython.pointer(Search)) -> cython.int:
     """A list that is not in use, with the room that it had before; -1 without memory."""
     place: cython.int = s.free_list

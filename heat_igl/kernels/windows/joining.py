@@ -51,7 +51,6 @@ _STEPS = cython.declare(cython.int, 4)
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _distance(w: cython.pointer(cython.const[Window]), at: cython.double) -> cython.double:
     return w.offset + reach(w, at)
 
@@ -78,7 +77,6 @@ def join(s: cython.pointer(Search), one: cython.pointer(List), n: cython.int, h:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _join_neighbours(
     s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int
 ) -> cython.int:
@@ -110,7 +108,6 @@ def _join_neighbours(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _is_bent(u: cython.pointer(Window), w: cython.pointer(Window), most: cython.double) -> cython.bint:
     """Whether joining would change distance by more than `most`.
 
@@ -129,7 +126,6 @@ def _is_bent(u: cython.pointer(Window), w: cython.pointer(Window), most: cython.
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _span(
     u: cython.pointer(Window),
     start: cython.double,
@@ -165,7 +161,6 @@ def _span(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _join(
     s: cython.pointer(Search), u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double
 ) -> cython.bint:
@@ -202,7 +197,6 @@ def _join(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _fill_gaps(s: cython.pointer(Search), one: cython.pointer(List), n: cython.int, h: cython.int) -> cython.int:
     """Windows between neighbours on half-edge h whose lines separate: how many there are then.
 
@@ -231,7 +225,6 @@ def _fill_gaps(s: cython.pointer(Search), one: cython.pointer(List), n: cython.i
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _is_covered(
     windows: cython.pointer(Window), n: cython.int, start: cython.double, stop: cython.double
 ) -> cython.bint:
@@ -245,7 +238,6 @@ def _is_covered(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _between(
     s: cython.pointer(Search),
     windows: cython.pointer(Window),
@@ -273,7 +265,6 @@ def _between(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _signed(distance: cython.double, depth: cython.double) -> cython.double:
     return distance if depth > 0.0 else -distance
 
@@ -281,7 +272,6 @@ def _signed(distance: cython.double, depth: cython.double) -> cython.double:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _change_at(u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double) -> cython.double:
     return fabs(_distance(u, at) - _distance(w, at))
 
@@ -301,7 +291,6 @@ def cut_joined_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.do
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _as_long(
     w: cython.pointer(cython.const[Window]), more: cython.double, sign: cython.double, at: cython.double
 ) -> cython.double:
@@ -341,7 +330,6 @@ def find_side(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _along_side(
     at: cython.double,
     along: cython.double,

@@ -39,7 +39,6 @@ _ASK = cython.declare(cython.longlong, 4096)
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
     """Whether the result cannot change any more by windows with this key or a larger one."""
     j: cython.int
@@ -60,7 +59,6 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
     """Let a list cross its face, or windows leave a vertex, point or segment, unless the entry is out of date."""
     v: cython.int
@@ -84,7 +82,6 @@ def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _first(s: cython.pointer(Search)) -> Entry:
     """Take the first entry of the queue, and prefetch what the next one reads."""
     first: Entry = pop(s)
@@ -189,7 +186,6 @@ def forget(s: cython.pointer(Search)) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
     """Carry lists with keys below `until`; if that is infinite, until there is work for two threads.
 
@@ -206,7 +202,6 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
 @cython.cfunc
 @cython.inline
 @cython.nogil
-@cython.exceptval(check=False)
 def _load(s: cython.pointer(Search)) -> cython.longlong:
     """Estimated work on the front, counted in windows; 0 if there is none."""
     return s.n_waiting + PER_LIST * s.n_heap
@@ -214,7 +209,6 @@ def _load(s: cython.pointer(Search)) -> cython.longlong:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
     """Wait for the other thread: first without sleep, since rounds are short."""
     _: cython.int
@@ -227,7 +221,6 @@ def _meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int) -> cython.void:
     """Take distances that the other search has found as upper bounds."""
     i: cython.int
@@ -263,7 +256,6 @@ def run_beside(s: cython.pointer(Search)) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _balance(s: cython.pointer(Search)) -> cython.bint:
     """Hand windows over if one thread has more work; true if one got all, because there is too little work for two."""
     o: cython.pointer(Search) = s.other
@@ -288,7 +280,6 @@ def _balance(s: cython.pointer(Search)) -> cython.bint:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _next_seed(s: cython.pointer(Search)) -> cython.int:
     """A half-edge with windows that wait, if possible next to the part of the other thread; -1 if there is none."""
     i: cython.int
@@ -309,7 +300,6 @@ def _next_seed(s: cython.pointer(Search)) -> cython.int:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.int) -> cython.longlong:
     """Hand over the windows that wait at half-edge h; returns their work."""
     place: cython.int = s.slot[h]
@@ -330,7 +320,6 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython.int) -> cython.longlong:
     """Hand over a vertex from which windows are to start; returns the work."""
     if (
@@ -361,7 +350,6 @@ def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _hand_over(s: cython.pointer(Search), o: cython.pointer(Search), amount: cython.longlong) -> cython.void:
     """Give a connected piece of the front to the other search, which waits until this is done."""
     queue: cython.p_int = cython.cast(cython.p_int, malloc((s.n_lists + 1) * cython.sizeof(cython.int)))

@@ -117,7 +117,6 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _segment_distance(s: cython.pointer(Search), i: cython.int, point: cython.p_double) -> cython.double:
     """Distance of a point in the face of segment i from the segment."""
     found: cython.double[3]
@@ -127,7 +126,6 @@ def _segment_distance(s: cython.pointer(Search), i: cython.int, point: cython.p_
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _emit_parallel(
     s: cython.pointer(Search), h: cython.int, ends: cython.p_double, root: cython.int, offset: cython.double
 ) -> cython.void:
@@ -165,7 +163,6 @@ def _emit_parallel(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _emit_from_bend(
     s: cython.pointer(Search),
     k: cython.int,
@@ -196,7 +193,6 @@ def _emit_from_bend(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _reach_ends(
     s: cython.pointer(Search),
     k: cython.int,
@@ -224,7 +220,6 @@ def _reach_ends(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _straighten(
     s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Direction), margin: cython.double
 ) -> cython.bint:
@@ -256,7 +251,6 @@ def _straighten(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _reach(s: cython.pointer(Search), ray: cython.pointer(Direction)) -> cython.double:
     """How far the ray meets the half-edge opposite its corner from the end on the side of the ray."""
     k: cython.int = ray.corner
@@ -274,7 +268,6 @@ def _reach(s: cython.pointer(Search), ray: cython.pointer(Direction)) -> cython.
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _fill(
     s: cython.pointer(Search), v: cython.int, first: cython.pointer(Direction), last: cython.pointer(Direction)
 ) -> cython.void:

@@ -76,6 +76,7 @@ class Front:
 
 
 @cython.cfunc
+@cython.exceptval(check=True)
 def _take_surface(s: cython.pointer(Search), tables) -> cython.void:
     edges = tables.edges
     s.vertex, s.twin, s.ring = _ints(edges.vertex), _ints(edges.twin), _ints(edges.ring)
@@ -162,6 +163,7 @@ def search(
 
 
 @cython.cfunc
+@cython.exceptval(check=True)
 def _take_sources(s: cython.pointer(Search), starts) -> cython.void:
     """Sources inside faces."""
     point: cython.double[:, ::1] = starts.points.barycentric
@@ -174,6 +176,7 @@ def _take_sources(s: cython.pointer(Search), starts) -> cython.void:
 
 
 @cython.cfunc
+@cython.exceptval(check=True)
 def _take_targets(s: cython.pointer(Search), targets) -> cython.void:
     found = targets.found
     target: cython.double[:, ::1] = targets.place.barycentric
@@ -188,7 +191,6 @@ def _take_targets(s: cython.pointer(Search), targets) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _write_within(
     s: cython.pointer(Search),
     name: cython.p_longlong,
@@ -222,7 +224,6 @@ def _write_within(
 
 @cython.cfunc
 @cython.nogil
-@cython.exceptval(check=False)
 def _write_nearest(
     s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
 ) -> cython.int:
