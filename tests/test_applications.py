@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import zoo
 
 import heat_igl
 from heat_igl import shapes
@@ -207,21 +206,3 @@ def test_offset_of_a_curve_drawn_on_the_plane():
     off = np.abs(np.linalg.norm(points - nearest, axis=1) - 0.2)
     assert off.mean() < 1 / 60
     assert off.max() < 2 / 60
-
-
-def test_offset_of_a_curve_drawn_on_a_part():
-    """Of a path over sharp edges, against exact distance from the vertices of the faces that it crosses."""
-    pytest.importorskip("pygeodesic")
-    mesh = zoo("pill")
-    solver = heat_igl.HeatMethodSolver(mesh)
-    drawn = heat_igl.shortest_paths(mesh, 0, 900)[0]
-    radius = 4 * mesh.edge_lengths.mean()
-    curves = heat_igl.curves.offset_curves(mesh, solver, drawn, radius)
-    assert curves
-    # Those are an edge from the path at most, and an offset point lies in a face as well.
-    exact = heat_igl.reference.exact(mesh, np.unique(mesh.F[drawn.faces]))
-    slack = mesh.edge_lengths.max()
-    for curve in curves:
-        corners = (exact[mesh.F[curve.faces]] * curve.start).sum(axis=1)
-        assert corners.max() < radius + slack
-        assert corners.min() > radius - 2 * slack

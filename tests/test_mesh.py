@@ -309,13 +309,6 @@ def test_two_cones_that_touch_in_a_point() -> None:
     assert connectivity.boundary_loops(connectivity.facets(F, 7), 7) == 0
 
 
-def test_three_pages_of_a_book() -> None:
-    V = np.array([[0.0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, -1, 0]])
-    report = Mesh(V, [[0, 1, 2], [0, 1, 3], [0, 1, 4]]).report()
-    assert report.nonmanifold_edges.tolist() == [[0, 1]]
-    assert report.nonmanifold_vertices.tolist() == [0, 1]
-
-
 def test_distance_along_edges_of_length_zero() -> None:
     """Two vertices in one place are at distance 0 from each other, however the edge between them is stored."""
     mesh = Mesh([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 2, 0], [5, 5, 5]], [[0, 1, 2], [1, 0, 3]])

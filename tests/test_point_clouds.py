@@ -51,12 +51,6 @@ def plane(n: int, seed: int = 0) -> np.ndarray:
     return np.append(np.random.default_rng(seed).random((n, 2)), np.zeros((n, 1)), axis=1)
 
 
-def cylinder(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Points, and their angle and height."""
-    angle, height = np.random.default_rng(seed).random((2, n)) * [[2 * np.pi], [3]]
-    return np.stack([np.cos(angle), np.sin(angle), height], axis=1), np.stack([angle, height], axis=1)
-
-
 # The triangles.
 
 
@@ -111,15 +105,6 @@ def test_distance_on_a_sphere(options: dict[str, str], most: float) -> None:
     P = sphere(4000)
     distances = SolverChoice.of(**options).on(PointCloud(P)).distances([0, 1, 2])
     assert mean_error(distances, np.stack([on_sphere(P, i) for i in range(3)])) < most
-
-
-@pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.002), ({"method": "exact"}, 0.001)])
-def test_distance_on_a_cylinder_with_two_boundaries(options: dict[str, str], most: float) -> None:
-    P, at = cylinder(4000)
-    difference = np.abs(at - at[0])
-    difference[:, 0] = np.minimum(difference[:, 0], 2 * np.pi - difference[:, 0])
-    distance = SolverChoice.of(**options).on(PointCloud(P)).distance(0)
-    assert mean_error(distance, np.linalg.norm(difference, axis=1)) < most
 
 
 def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:

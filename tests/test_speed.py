@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import flat_perturbed, mean_error, perturbed
+from steiner import graph_distance
 
 import heat_igl
 from heat_igl import metric_operators, shapes, speed_operators
-from heat_igl.mesh import Mesh, connectivity
+from heat_igl.mesh import Mesh
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
+from heat_igl.validation.domains import by_fermat, moved_inside
 
 
 def solver(mesh: Mesh, speed: FloatArray, method: str | None = None, **options: Any) -> Any:
@@ -82,58 +84,23 @@ def test_stereographic_projection_of_a_hemisphere():
     assert errors[2][1] < 0.0003
 
 
-def test_hyperbolic_space_on_tetrahedra():
-    """Speed (1 - r^2) / 2: Poincare's ball, in which a cube about the centre is convex."""
-    errors = []
-    for n in (6, 12, 24):
-        mesh = perturbed(shapes.box(n))
-        mesh = Mesh(mesh.V - 0.5, mesh.F)
-        r2 = (mesh.V**2).sum(axis=1)
-        source = int(np.argmin(np.linalg.norm(mesh.V - [0.3, 0, 0], axis=1)))
-        apart = ((mesh.V - mesh.V[source]) ** 2).sum(axis=1)
-        exact = np.arccosh(1 + 2 * apart / ((1 - r2) * (1 - r2[source])))
-        speed = (1 - (mesh.V[mesh.F].mean(axis=1) ** 2).sum(axis=1)) / 2
-        errors.append(np.abs(solver(mesh, speed).distance(source) - exact).mean() / exact.mean())
-    assert errors[1] < 0.7 * errors[0]
-    assert errors[2] < 0.7 * errors[1]
-    assert errors[2] < 0.005
-
-
-def by_fermat(source: FloatArray, points: FloatArray, above: float, below: float) -> FloatArray:
-    """Time from a source above y = 0: straight, refracted where the way crosses, or along the faster side."""
-    crossing = np.linspace(-0.5, 1.5, 4001)
-    to_crossing = np.hypot(source[0] - crossing, source[1]) / above
-    refracted = np.array([(to_crossing + np.hypot(x - crossing, y) / below).min() for x, y in points])
-    straight = np.linalg.norm(points - source, axis=1) / above
-    if below > above:
-        critical = np.arcsin(above / below)  # Snell: along the border the refracted ray is at 90 degrees
-        depth, along = source[1] + points[:, 1], np.abs(points[:, 0] - source[0])
-        head = np.where(along >= depth * np.tan(critical), depth * np.cos(critical) / above + along / below, np.inf)
-        straight = np.minimum(straight, head)
-    return np.where(points[:, 1] < 0, refracted, straight)
-
-
 @pytest.mark.parametrize("speeds", [(1.0, 2.0), (2.0, 1.0), (1.0, 1e3), (1e3, 1.0), (1.0, 1e6), (1e6, 1.0)])
 def test_refraction_at_a_straight_border(speeds):
     errors = []
-    for n in (16, 32, 64):
+    for n in (32, 64):
         square = shapes.grid(n)
-        moved = flat_perturbed(square, 0.25).V - [0, 0.5, 0]
-        border = square.V[:, 1] == 0.5
-        moved[border] = square.V[border] - [0, 0.5, 0]
-        mesh = Mesh(moved, square.F)
-        source = int(np.argmin(np.linalg.norm(mesh.V - [0.25, 0.3, 0], axis=1)))
-        speed = np.where(mesh.V[mesh.F][:, :, 1].mean(axis=1) > 0, *speeds)
-        exact = by_fermat(mesh.V[source, :2], mesh.V[:, :2], *speeds)
+        mesh = moved_inside(square, np.random.default_rng(0), 0.25 / n, square.V[:, 0] == 0.5)
+        source = int(np.argmin(np.linalg.norm(mesh.V - [0.2, 0.25, 0], axis=1)))
+        speed = np.where(mesh.V[mesh.F][:, :, 0].mean(axis=1) < 0.5, *speeds)
+        exact = by_fermat(mesh.V, source, *speeds)
         errors.append(mean_error(solver(mesh, speed).distance(source), exact))
     assert errors[1] < max(0.8 * errors[0], 5e-5)
-    assert errors[2] < max(0.8 * errors[1], 5e-5)
-    assert errors[2] < (1e-4 if speeds != (1.0, 2.0) else 5e-4)
+    assert errors[1] < (1e-4 if speeds != (1.0, 2.0) else 5e-4)
     # From the border itself, straight lines in the slow half and the waves that the fast half sends there: they part at
     # the source, and what is wrong on the first ring of vertices stays, a hundredth of an edge.
-    source = int(np.argmin(np.linalg.norm(mesh.V - [0.25, 0, 0], axis=1)))
-    exact = by_fermat(mesh.V[source, :2], mesh.V[:, :2], *speeds)
-    assert np.nanmean(np.abs(solver(mesh, speed).distance(source) - exact)) * min(speeds) < 0.01 / 64
+    source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.25, 0], axis=1)))
+    off = np.abs(solver(mesh, speed).distance(source) - by_fermat(mesh.V, source, *speeds))
+    assert off.mean() * min(speeds) < 0.01 / 64
 
 
 @pytest.mark.parametrize(
@@ -147,21 +114,6 @@ def test_refraction_at_a_straight_border(speeds):
 def test_wrong_speeds_are_refused(speed, message):
     with pytest.raises(ValueError, match=message):
         speed_operators(shapes.grid(3), speed)
-
-
-def test_speed_that_grows_exponentially():
-    """In the metric exp(-2 k x) |dz|^2 exp(-k z) / k unrolls the plane: every way is a straight line."""
-    k = np.log(1e6) / 120
-    mesh = flat_perturbed(shapes.strip(120, 12), 0.25)
-    w = np.exp(-k * (mesh.V[:, 0] + 1j * mesh.V[:, 1])) / k
-    source = int(np.argmin(np.linalg.norm(mesh.V - [60, 6, 0], axis=1)))
-    exact = abs(w - w[source])
-    speed = np.exp(k * mesh.V[mesh.F][:, :, 0].mean(axis=1))
-    domain = speed_operators(mesh, speed)
-    assert domain.contrast > 9e5
-    found = {method: solver(mesh, speed, method=method).distance(source) for method in ("auto", "sweep", "exact")}
-    for method, time in found.items():
-        assert mean_error(time, exact) < 0.003, method
 
 
 def test_faces_without_area_at_a_jump():
@@ -184,20 +136,5 @@ def test_checkerboard_of_speeds():
     column, row, _ = np.floor(mesh.V[mesh.F].mean(axis=1) * 4).astype(int).T
     for contrast in (2.0, 1e6):
         speed = np.where((column + row) % 2, contrast, 1.0)
-        exact = on_graph(mesh, speed, 80, points=20)
+        exact = graph_distance(mesh, 80, 20, speed)[0]
         assert mean_error(solver(mesh, speed).distance(80), exact) < 0.025
-
-
-def on_graph(mesh: Mesh, speed: FloatArray, source: int, points: int) -> FloatArray:
-    """Travel times along straight lines between points on the edges of one face."""
-    share = (1 - np.cos(np.pi * np.arange(1, points + 1) / (points + 1)))[:, None] / 2
-    tail, head = mesh.edges.T
-    inside = (1 - share) * mesh.V[tail, None] + share * mesh.V[head, None]
-    nodes = np.concatenate([mesh.V, inside.reshape(-1, 3)])
-    of_edge = mesh.n_vertices + np.arange(len(tail) * points).reshape(-1, points)
-    i, j = np.triu_indices(3 + 3 * points, 1)
-    of_face = np.concatenate([mesh.F, of_edge[mesh.facets.of_face].reshape(mesh.n_faces, -1)], axis=1)
-    pairs = np.stack([of_face[:, i], of_face[:, j]], axis=-1).reshape(-1, 2)
-    times = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1) / np.repeat(speed, len(i))
-    graph = connectivity.shortest_edge_graph(pairs, times, len(nodes))
-    return connectivity.edge_distance(graph, np.array([source]))[: mesh.n_vertices]

@@ -47,14 +47,6 @@ def test_insulated_boundary_conserves_heat(disk):
     assert (u > 0).all()
 
 
-def test_heat_falls_exponentially_along_a_strip():
-    """On a strip the step is one-dimensional: u falls by acosh(1 + h^2 / (2 t)) e-foldings per cell."""
-    domain = operators(shapes.strip(120, 1))
-    u = diffuse(domain, dirac(domain.n, 0) + dirac(domain.n, 121), t=2.0)
-    rate = np.diff(np.log(u[:121]))[5:50]
-    np.testing.assert_allclose(rate, -np.arccosh(1 + 1 / (2 * 2.0)), rtol=1e-9)
-
-
 def test_boundary_conditions(disk):
     u0 = dirac(disk.n, 0)
     neumann, dirichlet, average = (

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import Delaunay, cKDTree
 
 import heat_igl
-from heat_igl import GeodesicSolver, SourceError, shapes
+from heat_igl import GeodesicSolver, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.typing import BoolArray, FloatArray
@@ -51,15 +51,6 @@ def around_the_edge(V: FloatArray, source: int) -> FloatArray:
     apart = np.abs(angle - angle[source])
     bent = np.hypot(np.hypot(x, y) + np.hypot(x[source], y[source]), z)
     return np.where(apart > np.pi, bent, np.linalg.norm(V - V[source], axis=1))
-
-
-@pytest.mark.parametrize("body", ["cube", "ball"])
-def test_straight_lines_in_convex_bodies(body):
-    mesh = scattered(2500, body)
-    solver = GeodesicSolver(mesh)
-    for source in (0, 700):
-        exact = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
-        np.testing.assert_allclose(solver.distance(source), exact, rtol=2e-5, atol=1e-12)
 
 
 @pytest.mark.parametrize(("n", "jitter"), [(6, 0.25), (12, 0.25), (24, 0.0), (24, 0.25)])
@@ -319,33 +310,3 @@ def test_vertices_of_no_tetrahedron():
         np.testing.assert_allclose(solver.distance(sources)[:-1], exact, rtol=1e-9)
     assert np.isinf(solver.distance(5)[-1])
     assert np.isinf(solver.distance(box.n_vertices)[:-1]).all()
-
-
-def test_depth_below_a_surface():
-    """All boundary vertices as sources; in the middle the depth is that below the nearest of them."""
-    mesh = scattered(4000, "cube", 3)
-    sources = np.flatnonzero(mesh.boundary)
-    exact = cKDTree(mesh.V[sources]).query(mesh.V)[0]
-    found = GeodesicSolver(mesh).distance(mesh.boundary)
-    inner = exact > 0
-    assert (found >= exact - 1e-12).all()
-    assert np.mean(found[inner] / exact[inner] - 1) < 1e-4
-    assert (found <= 1.02 * exact).all()
-
-
-def test_depth_below_boundary_faces():
-    """As docs/metrics.md has it: the nearest point of the boundary is always seen."""
-    rng = np.random.default_rng(0)
-    box = shapes.box(4)
-    V = box.V.copy()
-    inner = ~box.boundary
-    V[inner] += rng.uniform(-0.1, 0.1, (int(inner.sum()), 3))
-    mesh = Mesh(V, box.F)
-    walls = Mesh(mesh.V, mesh.facets.vertices[mesh.facets.n_faces == 1])
-    depth = heat_igl.closest_points(walls, mesh.V).gap
-    np.testing.assert_allclose(depth, np.minimum(mesh.V, 1 - mesh.V).min(axis=1), atol=1e-15)
-    assert (GeodesicSolver(mesh).distance(mesh.boundary) >= depth - 1e-15).all()
-    with pytest.raises(
-        SourceError, match="points and curves lie on triangles, and this domain has none: name vertices"
-    ):
-        GeodesicSolver(mesh).distance(heat_igl.SurfacePoints([3], [[0.2, 0.3, 0.5]]))
