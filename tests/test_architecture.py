@@ -23,6 +23,7 @@ dask
 distributed
 ezdxf
 gdist
+jax
 matplotlib
 meshio
 nibabel
@@ -37,6 +38,7 @@ rich
 selenium
 skfmm
 skimage
+torch
 typer
 zarr
 """.split()
@@ -68,18 +70,10 @@ def loaded(statement: str, names: list[str]) -> list[str]:
     return result.stdout.split()
 
 
-def test_import_loads_no_extra():
-    assert loaded("import heat_igl", EXTRAS) == []
-    assert loaded("from heat_igl import *", EXTRAS) == []
-
-
 def test_import_loads_what_a_distance_needs_and_little_else():
-    others = [
-        f"heat_igl.{name}"
-        for name in ("cluster", "reference", "reference.baselines", "validation", "validation.metrics")
-    ] + ["ssl"]
-    assert loaded("import heat_igl", others) == []
-    assert loaded("from heat_igl import *", others[-1:]) == []
+    others = [f"heat_igl.{name}" for name in ("cluster", "reference.baselines", "validation", "validation.metrics")]
+    assert loaded("import heat_igl, heat_igl.applications", [*EXTRAS, *others, "ssl"]) == []
+    assert loaded("from heat_igl import *", [*EXTRAS, "ssl"]) == []
 
 
 def test_a_distance_by_windows_loads_no_other_engine():
@@ -130,3 +124,17 @@ def test_the_walks_of_the_page_are_the_files_that_calls_enter() -> None:
     for call, files in load_script("walks").walks().items():
         part = page.split(f"<!-- {call} -->")[1].split(f"<!-- /{call} -->")[0]
         assert sorted(re.findall(r"`([\w/]+\.py)`", part)) == sorted(files), call
+
+
+def test_extras_and_libraries_in_messages_are_those_of_the_project():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    code = "\n".join(path.read_text() for path in PACKAGE.rglob("*.py"))
+    without_examples = re.sub(r"^ *(?:>>>|\.\.\. ).*$", "", code, flags=re.MULTILINE)
+    calls = re.findall(
+        r"MissingExtraError\.(?:of|guard|check)\(\s*f?(?:\"[^\"]*\"|'[^']*'),\s*[\"']([^\"']+)[\"'],\s*[\"'](\w+)[\"']",
+        without_examples,
+    )
+    assert len(calls) > 10
+    for packages, extra in calls:
+        held = {re.split(r"[<>=\[;]", requirement)[0].strip().lower() for requirement in extras[extra]}
+        assert set(packages.split(" and ")) <= held, (packages, extra)

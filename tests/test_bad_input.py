@@ -211,7 +211,7 @@ def argument_cases() -> Iterator[Case]:
     yield from array_type_cases()
     yield from choice_cases()
     for ask, pattern in REFUSED:
-        yield argument_case(pattern, ask, pattern, error="ValueError|SourceError|MeshError")
+        yield argument_case(pattern, ask, pattern, error="ValueError|SourceError|MeshError|TypeError")
     for name, ask in ACCEPTED.items():
         yield argument_case(f"{name}, neighbour", ask)
 
@@ -221,6 +221,8 @@ CURVE = heat_igl.SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0]
 CENTRE = [[1 / 3] * 3]
 GRID = heat_igl.shapes.grid(4)
 TRIANGLE, SQUARE = [[0, 1, 2]], V4[[0, 1, 3, 2]]
+SOLVER = heat_igl.HeatMethodSolver(heat_igl.shapes.icosphere(1))
+HIDDEN = np.ma.masked_array([1, 2], mask=[True, False])
 # What is asked of a sphere of 42 vertices and 80 faces, and how it is refused.
 REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: heat_igl.closest_points(m, [[0, 0, 1], [0, 1e200, 0]]), r"positions\[1\] .* too far"),
@@ -343,6 +345,32 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         r"vectors\[1\] = \[nan, 0.0\] is not finite",
     ),
     (lambda m: heat_igl.tangent_frames(m).from_world(["a"], [0]), "vectors must be real numbers"),
+    # Unknown arguments, and the argument that holds the offender.
+    (lambda m: heat_igl.geodesic_distance(m, 0, cut_off=1.0), r"geodesic_distance\(\) .* Did you mean 'cutoff'\?"),
+    (lambda m: heat_igl.geodesic_distance(m, source=0), r"'source'. Did you mean 'sources'\?"),
+    (lambda m: heat_igl.HeatMethodSolver(m, laplace=0), r"HeatMethodSolver.*'laplace'. Did you mean 'laplacian'\?"),
+    (lambda _: SOLVER.distances([[0]], radius=1.0), "It takes source_sets, out, progress, dtype, cutoff$"),
+    (lambda m: heat_igl.shortest_paths(m, target=3, sources=0), r"Did you mean 'targets'\?"),
+    (lambda m: heat_igl.shortest_paths(m, 42, 0), r"^targets\[0\] = 42 is no vertex"),
+    (lambda m: heat_igl.shortest_paths(m, [], 0), "^targets is empty"),
+    (
+        lambda m: heat_igl.shortest_paths(m, heat_igl.SurfacePoints([99], CENTRE), 0),
+        r"^targets: faces\[0\] = 99 is no face",
+    ),
+    (lambda _: heat_igl.farthest_points(SOLVER, 3, start=42), r"^start\[0\] = 42 is no vertex"),
+    (lambda m: heat_igl.farthest_points(m, 3, start=[0.5]), "^start must be a vertex index.* not floats such as 0.5"),
+    (lambda _: heat_igl.voronoi_cells(SOLVER, [1, 42]), r"^sites\[1\] = 42 is no vertex"),
+    # What numpy would take for something else.
+    (lambda m: heat_igl.geodesic_path(m, [0, 1], closed="no"), "^closed must be True or False, not 'no'"),
+    (lambda _: heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]], 2), "^is_closed must be True or False, not 2"),
+    (lambda _: SOLVER.distances([0], progress="bar"), "^progress must be True or False, not 'bar'"),
+    (lambda m: heat_igl.geodesic_distance(m, HIDDEN), "^sources has 1 masked entries: fill or remove them"),
+    (lambda _: heat_igl.SurfacePoints(HIDDEN, np.eye(3)[:2]), "^faces has 1 masked entries"),
+    (lambda m: heat_igl.karcher_mean(m, [0, 1], HIDDEN), "^weights has 1 masked entries"),
+    (lambda _: heat_igl.shapes.grid(np.inf), "^n must be an integer of at least 1, not inf"),
+    (lambda _: heat_igl.shapes.icosphere(162), "^subdivisions must be at most 12, not 162"),
+    (lambda m: heat_igl.exp_map(m, 0, np.empty((0, 2))), r"^vectors must be one vector or more.* \(0, 2\)"),
+    (lambda m: heat_igl.tangent_frames(m).from_angles("1"), "^angles must be real numbers, not '?"),
 )
 ACCEPTED: dict[str, Callable[[heat_igl.Mesh], Any]] = {
     "far positions": lambda m: heat_igl.closest_points(m, [[0, 1e149, 0]]),

@@ -301,3 +301,25 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         write_curves(tmp_path / "nowhere" / "lines.obj", mesh, groups)
     assert target.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["lines.obj"]
+
+
+def test_curves_are_written_from_lists_of_any_depth(tmp_path):
+    mesh = shapes.icosphere(2)
+    levels = isolines(mesh, mesh.V[:, 2], [-0.5, 0.1, 0.5])
+    flat = [curve for level in levels for curve in level]
+    written = {}
+    for name, curves in {"nested": levels, "flat": flat, "deep": [levels[:1], [[levels[1:]]]], "one": flat[0]}.items():
+        write_curves(tmp_path / f"{name}.obj", mesh, curves)
+        written[name] = (tmp_path / f"{name}.obj").read_text()
+    assert written["nested"] == written["flat"] == written["deep"]
+    assert written["flat"].count("\nl ") == len(flat)
+    assert written["one"].count("\nl ") == 1
+    write_curves(tmp_path / "named.obj", mesh, {"near": levels[:1], "far": levels[2]})
+    assert "g near" in (tmp_path / "named.obj").read_text()
+    for curves, message in (
+        ([levels, [3]], r"curves\[1\]\[0\] must be a SurfaceCurve or a list of such, not int"),
+        ({"a": mesh.V}, r"curves\['a'\] must be a SurfaceCurve or a list of such, not ndarray"),
+    ):
+        with pytest.raises(TypeError, match=message):
+            write_curves(tmp_path / "wrong.obj", mesh, curves)
+    assert not (tmp_path / "wrong.obj").exists()
