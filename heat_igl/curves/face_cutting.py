@@ -26,25 +26,10 @@ _MOST_CHECKS_PER_EDGE = 100
 def cut_triangle(
     points: list[Point], segments: list[tuple[int, int]], corners: FloatArray
 ) -> tuple[list[Point], list[tuple[int, int, int]], list[list[int]]]:
-    """Triangulate a triangle with points in it and segments between them.
+    """Triangulate a triangle, its corners at (3, 2) in the plane, with points in it and segments between pairs of them.
 
-    Parameters
-    ----------
-    points : list of Point
-        The corners first; others inside the triangle or on its sides, all distinct.
-    segments : list of (int, int)
-        Pairs of points. Segments may cross, overlap, and run along sides.
-    corners : (3, 2) float64
-        Positions of the corners in the plane.
-
-    Returns
-    -------
-    points : list of Point
-        The given ones, and the crossings of segments.
-    triangles : list of (int, int, int)
-        Points of each, in the sense of the corners.
-    chains : list of list of int
-        The points along each segment: edges of the triangles join each with the next.
+    The corners come first in `points`, which are distinct. Segments may cross, overlap and run along sides. Returns the
+    points with the crossings, the triangles, oriented like the corners, and the points along each segment.
     """
     points = [_reduced(point) for point in points]
     number = {point: i for i, point in enumerate(points)}

@@ -24,13 +24,7 @@ class Router:
         self._routes = kernel.EdgeRoutes(faces, mesh.V)
 
     def legs(self, faces: IntArray, barycentric: FloatArray) -> list[FaceSequence]:
-        """The k - 1 courses between places (k,), each from one to the next.
-
-        Raises
-        ------
-        SourceError
-            If no path leads from a place to the next.
-        """
+        """The k - 1 courses between places (k,), each from one to the next; a `SourceError` if no path leads there."""
         found = []
         for i in range(len(faces) - 1):
             vertices, between = self._leg(faces, barycentric, i)

@@ -32,18 +32,11 @@ _GAP = 1e-6
 
 
 class FaceSequence(NamedTuple):
-    """The faces that a curve runs through, one after another.
+    """The faces (s,) that a curve runs through, one after another; a face may come twice in a row.
 
-    Attributes
-    ----------
-    faces : (s,) int32
-        A face may come twice in a row.
-    joins : (s - 1, 3) int32, for loops (s, 3)
-        From each face to the next: the half-edges on both sides of the edge between them, or else the vertex to turn
-        around, the shorter way; -1 for none.
-    ends : (2, 3) float64
-        Barycentric coordinates of the start in the first face and of the end in the last; a loop begins and ends in the
-        first.
+    A row of `joins`, s - 1 and of loops s, leads from each face to the next: the half-edges on both sides of the edge
+    between them, or else the vertex to turn around, the shorter way; -1 for none. `ends` (2, 3) are barycentric
+    coordinates of the start in the first face and of the end in the last; a loop begins and ends in the first.
     """
 
     faces: AnyArray
@@ -60,13 +53,9 @@ class Shortened(NamedTuple):
 
 
 def course_of(mesh: Mesh, curve: SurfaceCurve) -> FaceSequence:
-    """The course of a curve, whose segments are checked to be joined.
+    """The course of a curve.
 
-    Raises
-    ------
-    SourceError
-        If a face is not one of the mesh, a segment does not start where the one before it ends, or a closed curve has
-        no length.
+    A `SourceError` if its segments do not join, a face is none of the mesh, or a closed curve has no length.
     """
     faces = curve.faces
     if faces.min() < 0 or faces.max() >= mesh.n_faces:
@@ -116,13 +105,7 @@ def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArr
 
 
 class Shortener:
-    """Shortens curves on a triangle mesh, one after another.
-
-    Attributes
-    ----------
-    faces : FaceTable
-        The triangles, for other kernels.
-    """
+    """Shortens curves on a triangle mesh, one after another; `faces` is the table of the triangles."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh

@@ -168,12 +168,7 @@ class Comparisons:
     """Compares answers with those of an engine that shares nothing with heat, where heat may be wrong.
 
     These are the first three answers from every kind of sources in each component. If all are near, later ones are
-    trusted; if one is not, each later one is compared.
-
-    Parameters
-    ----------
-    domain : Operators
-        With triangles.
+    trusted; if one is not, each later one is compared. The domain has triangles.
     """
 
     def __init__(self, domain: Operators) -> None:
@@ -241,14 +236,7 @@ def _kind(sources: SourceSet) -> Kind:
 class Checker:
     """Checks answers on one domain.
 
-    Parameters
-    ----------
-    surface : Surface or None
-        The triangles of the domain.
-    referenced : (n,) bool
-        Vertices that a face uses.
-    V : (n, 3) float64, optional
-        Positions of the vertices; straight lines are left out without them.
+    Of the vertices, `referenced` are used by a face. Straight lines need positions V (n, 3).
     """
 
     def __init__(self, surface: Surface | None, referenced: BoolArray, V: FloatArray | None) -> None:

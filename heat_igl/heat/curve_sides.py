@@ -70,13 +70,7 @@ def _on_boundary(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> BoolAr
 
 
 def zero_curve_in_gaps(mesh: Mesh, phi: FloatArray, distance: FloatArray, h: float) -> SurfaceCurve | None:
-    """The parts of the zero curve of `phi` (n,) far from the curves that `distance` (n,) is measured from.
-
-    Returns
-    -------
-    SurfaceCurve or None
-        The segments, in the order of faces; None if there is none.
-    """
+    """The zero curve of `phi` (n,) where it is far from the curves that `distance` (n,) is from; None if nowhere."""
     faces, start, end, _ = level_segments(mesh, phi, 0.0)
     # Where no distance is known, it is large.
     middle = np.einsum("sc,sc->s", (start + end) / 2, np.minimum(distance, _FAR)[mesh.F[faces]])
@@ -100,21 +94,8 @@ def left_of_closed(
 
     The surface without the curves falls into regions. Vertices are in one if an edge joins them that no curve meets; so
     are a face that no curve crosses and its vertices off the curves, and two such faces if no curve runs along the edge
-    between them. A region is on the side of the segments that are seen from inside.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    triangulation : IntrinsicTriangulation
-        The faces of the mesh, before any flip.
-    sources : OrientedSet
-        Curves.
-
-    Returns
-    -------
-    left, is_known : (n,) bool
-        Nothing is known of vertices on curves, of regions that see both sides, and of components without a curve.
+    between them. A region is on the side of the segments that are seen from inside. Nothing is known of vertices on
+    curves, of regions that see both sides, and of components without a curve. `triangulation` is the faces of the mesh.
     """
     n, m, twin = mesh.n_vertices, mesh.n_faces, triangulation.twin
     edge = mesh.facets.of_face
@@ -179,19 +160,8 @@ def left_of_nearest(
 ) -> tuple[BoolArray, BoolArray]:
     """Which vertices (n,) are on the left of the nearest segment, and which (n,) have that in one of their faces.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        The faces that the curves refer to.
-    sources : OrientedSet
-        Curves.
-    distance : (n,) float64
-        Distance from them.
-
-    Returns
-    -------
-    left, is_known : (n,) bool
-        Nothing is known of vertices that see the segment almost along it, nor of vertices on it.
+    Nothing is known of vertices that see the segment almost along it, nor of vertices on it. `triangulation` is the
+    faces of the mesh, and `distance` (n,) that from the curves.
     """
     seen = _seen(triangulation, sources)
     face, place = np.divmod(seen.place, 6)
@@ -207,16 +177,9 @@ def left_of_nearest(
 
 
 class _Seen(NamedTuple):
-    """Segments as they are seen from the corners of their faces and from the middles of the sides.
+    """Segments (q,) as they are seen from places of their faces: distance and sine of the angle, positive on the left.
 
-    Attributes
-    ----------
-    place : (q,) int64
-        6 f + c for corner c of face f, 6 f + 3 + c for the middle of the side opposite.
-    away : (q,) float64
-        Distance of the nearest place of the segment.
-    sine : (q,) float64
-        Sine of the angle between the segment and the line from there to the place: positive on the left.
+    Place 6 f + c is corner c of face f, 6 f + 3 + c the middle of the side opposite.
     """
 
     place: IntArray

@@ -88,14 +88,7 @@ def directions(
 def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: PolarAngles) -> AnyArray:
     """Unit numbers (n,) that components are multiplied by on the way from the source; 1 at sources, 0 without a path.
 
-    Parameters
-    ----------
-    angles, labels : PathAngles, (n,) int64
-        Of paths from vertices.
-    sources : (k,) int64
-        The vertex of each label.
-    polar : PolarAngles
-        Around the vertices.
+    Paths start at vertices: `sources` (k,) has the one of each label.
     """
     start = sources[np.maximum(labels, 0)]
     departure = rigid_angles(angles.departure, polar, start)

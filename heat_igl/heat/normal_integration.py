@@ -42,16 +42,8 @@ _SMOOTH_STEPS = 3
 class NormalIntegration:
     """Diffuses the normals of oriented sources, and integrates the field of unit vectors (Feng and Crane 2024).
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Triangles that are oriented alike.
-    faces : IntrinsicTriangulation
-        The same triangles by the lengths of their edges.
-    triangulation : IntrinsicTriangulation
-        The triangles that are solved on.
-    parts : SolverParts
-        The heat flow on these, the options, and the Poisson problem.
+    `faces` are the triangles of the mesh by the lengths of their edges, and `triangulation` those that are solved on,
+    by the flows of `parts`.
     """
 
     def __init__(
@@ -73,10 +65,7 @@ class NormalIntegration:
     def distance(self, chosen: OrientedSet, level: Level) -> FloatArray:
         """The signed distance (n,): steps 1 to 3 of the method, less the level.
 
-        Raises
-        ------
-        SourceError
-            If the normals of all curves cancel, or one of a point is that of the face.
+        A `SourceError` if the normals of all curves cancel, or one of a point is that of the face.
         """
         pieces = self._pieces(chosen)
         phi = self._integrated(pieces)
@@ -161,20 +150,10 @@ def _unit(numbers: AnyArray) -> AnyArray:
 
 
 class Pieces(NamedTuple):
-    """Segments and points of oriented sources, as they are diffused.
+    """The middles of segments, and points, as they are diffused: q of both, which `is_point` tells apart.
 
-    Attributes
-    ----------
-    faces, barycentric : (q,) int64, (q, 3) float64
-        The middle of each segment, and the points.
-    normal : (q,) complex128
-        Unit normal to the right of a segment, or of a point, in the plane of the face.
-    weight : (q,) float64
-        Length of each segment; h for a point.
-    label : (q,) int64
-        Curve, region or set of points.
-    is_point : (q,) bool
-        Which are points.
+    A unit normal to the right is complex, in the plane of the face. The weight of a segment is its length, that of a
+    point the mean edge length.
     """
 
     faces: IntArray
@@ -186,29 +165,13 @@ class Pieces(NamedTuple):
 
     def at(self, chosen: BoolArray) -> Pieces:
         """Some of the pieces, by a mask (q,)."""
-        return Pieces(
-            self.faces[chosen],
-            self.barycentric[chosen],
-            self.normal[chosen],
-            self.weight[chosen],
-            self.label[chosen],
-            self.is_point[chosen],
-        )
+        return Pieces._make(field[chosen] for field in self)
 
 
 class CurveLevels:
-    """Extends values on curves to all vertices of one domain.
+    """Extends values on curves to all vertices of one domain; pieces of curves refer to `faces` (m, 3).
 
-    Parameters
-    ----------
-    domain : Operators
-        The domain.
-    faces : (m, 3) int64
-        The faces that pieces of curves refer to.
-    heat_flow : HeatFlow
-        By which each vertex finds the nearest place on the curves.
-    poisson : PoissonProblem
-        By which functions of small gradient are found.
+    Each vertex finds the nearest place on the curves by `heat_flow`; `poisson` gives functions of small gradient.
     """
 
     def __init__(self, domain: Operators, faces: IntArray, heat_flow: HeatFlow, poisson: PoissonProblem) -> None:
@@ -296,17 +259,7 @@ class CurveLevels:
 
 
 class _OnCurves:
-    """Values and integrals of functions on the pieces of curves.
-
-    Attributes
-    ----------
-    pieces : Pieces
-        The pieces.
-    component : (q,) int64
-        The component that each piece lies on.
-    length : (n_components,) float64
-        Length of the pieces on each component.
-    """
+    """Values and integrals of functions on the pieces (q,) of curves, by components."""
 
     def __init__(self, domain: Operators, faces: IntArray, pieces: Pieces) -> None:
         corners = faces[pieces.faces]

@@ -106,12 +106,8 @@ class SolverOptions:
 def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[float | FloatArray, float | FloatArray]:
     """The time step for `domain`, and the one that was asked for: ``options.t``, or ``t_coef * h**2``.
 
-    Each is a number, or one (n_components,) for each component if their mean edge lengths h differ.
-
-    Warns
-    -----
-    AccuracyWarning
-        If an explicit t had to be raised for the heat to cross the domain.
+    Each is a number, or one (n_components,) for each component if their mean edge lengths h differ. Warns if an
+    explicit t had to be raised for the heat to cross the domain.
     """
     if options.t is not None:
         step = max(options.t, smallest_time_step(domain, fitted))
@@ -165,38 +161,9 @@ def check_large_step(options: SolverOptions, domain: Operators) -> None:
 class SolverParts:
     """The parts of a heat method solver.
 
-    Attributes
-    ----------
-    options : SolverOptions
-        As the user gave them.
-    operators : Operators
-        The domain.
-    analysis : Analysis
-        The order of elimination that all matrices share.
-    assembler : SourceAssembler
-        From sources to right-hand sides.
-    heat_flow : HeatFlow
-        Step 1, factored.
-    divergence : NormalizedDivergence
-        Step 2, for the field without known distances near the sources.
-    poisson : PoissonProblem
-        Step 3, factored.
-    time_steps : (n_components,) float64
-        Time step of each component.
-    t_damping : float, (n_components,) float64 or None
-        Time step for `damping`; None for a field of length 1.
-    fitted : bool
-        Whether the heat flow is fitted to the lengths of edges.
-    checker : Checker
-        Checks answers against bounds that need no reference.
-    comparisons : Comparisons or None
-        Compares the first answers with those of another engine; None if answers are not held to bounds.
-    is_default : bool
-        Whether answers are held to bounds: neither the paper's field, a time step nor a boundary was asked for.
-    plan : Plan
-        For the user.
-    diagnostics : Diagnostics
-        For the user.
+    `analysis` is the order of elimination that all matrices share, `time_steps` (n_components,) has a step for each
+    component, and `t_damping` is the step for `damping`, None for a field of length 1. `comparisons` is None if answers
+    are not held to bounds.
     """
 
     options: SolverOptions
@@ -259,18 +226,8 @@ def prepare(
 ) -> SolverParts:
     """The parts of a solver on `domain`: resolve the options, then factor the matrices.
 
-    Parameters
-    ----------
-    domain : Operators
-        The domain.
-    options : SolverOptions
-        The options.
-    known : callable
-        An order of elimination, taken if it fits; called when it is needed.
-    seconds_operators : float
-        Time spent before, for the diagnostics.
-    V : (n, 3) float64, optional
-        Positions, to check answers against straight lines.
+    `known` is called, when it is needed, for an order of elimination, which is taken if it fits. Positions V (n, 3) are
+    for the check of answers against straight lines.
     """
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None

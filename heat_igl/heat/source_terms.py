@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,28 +33,25 @@ _OVERTAKEN = 5.0
 _BLOCK = 8
 
 
-@dataclass(frozen=True, eq=False)
-class Seeds:
+class Seeds(NamedTuple):
     """Exactly known distances: `value` (k,) at distinct vertices `vertex` (k,), from the source `label` (k,)."""
 
     vertex: IntArray
     value: FloatArray
     label: IntArray
 
-    @classmethod
-    def nearest(cls, several: Seeds) -> Seeds:
+    def nearest(self) -> Seeds:
         """The smallest of several values at each vertex."""
-        kept = nearest_first(several.vertex, several.value, several.label)
-        return cls(several.vertex[kept], several.value[kept], several.label[kept])
+        return self.at(nearest_first(*self))
 
     @classmethod
     def joined(cls, *parts: Seeds) -> Seeds:
         """Several seeds, at vertices that need not be distinct."""
-        return cls(*(np.concatenate(each) for each in zip(*((p.vertex, p.value, p.label) for p in parts), strict=True)))
+        return cls(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
-    def at(self, chosen: BoolArray) -> Seeds:
-        """Some of the seeds, by a mask (k,)."""
-        return Seeds(self.vertex[chosen], self.value[chosen], self.label[chosen])
+    def at(self, chosen: BoolArray | IntArray) -> Seeds:
+        """Some of the seeds, by a mask (k,) or their positions."""
+        return Seeds._make(field[chosen] for field in self)
 
 
 _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
@@ -63,27 +61,10 @@ _NONE = Seeds(np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64))
 class SourceTerm:
     """One set of sources on a domain: a right-hand side of step 1, and the distances that are known beside it.
 
-    Attributes
-    ----------
-    sources : SourceSet
-        As the user gave it.
-    vertex, label : (e,) int64
-        Vertices that initial heat is put on, and the source that it belongs to.
-    share, delay : (e,) float64
-        How much of it: ``unit * share * exp(-delay)``.
-    mass : (e,) float64
-        Mass of those vertices, in units of the mean mass.
-    largest_heat : float
-        Largest value that heat may reach.
-    anchors : Seeds
-        Known distances that fix the level of the integrated phi.
-    near : Seeds
-        Known distances that the result takes over: at the sources and around them.
-    seen : (g,) bool
-        Which of `near` have their distance by windows. On faces with such corners, the field of step 2 is the gradient
-        of these distances.
-    far : Seeds
-        Known distances of corners of the sources' own faces that are too far away to be among `near`.
+    Initial heat of ``unit * share * exp(-delay)`` is put on each `vertex` (e,), of a `mass` in units of the mean mass,
+    for the source `label`; heat reaches `largest_heat` at most. `anchors` fix the level of phi. The result takes over
+    `near`, of which those `seen` have their distance by windows: on faces with such corners the field is the gradient
+    of these. `far` are corners of the sources' own faces beyond these.
     """
 
     sources: SourceSet
@@ -120,17 +101,8 @@ class SourceTerm:
     def restricted(self, labels: IntArray, anchors: Seeds, kept: BoolArray) -> SourceTerm:
         """The term of the sources in `labels` alone, with other anchors and those of `near` that are `kept` (g,)."""
         alive = np.isin(self.label, labels)
-        return replace(
-            self,
-            vertex=self.vertex[alive],
-            label=self.label[alive],
-            share=self.share[alive],
-            delay=self.delay[alive],
-            mass=self.mass[alive],
-            anchors=anchors,
-            near=self.near.at(kept),
-            seen=self.seen[kept],
-        )
+        heat = {name: getattr(self, name)[alive] for name in ("vertex", "label", "share", "delay", "mass")}
+        return replace(self, **heat, anchors=anchors, near=self.near.at(kept), seen=self.seen[kept])
 
 
 def right_hand_side(n: int, terms: Sequence[SourceTerm], shares: Sequence[FloatArray] | None = None) -> FloatArray:
@@ -143,19 +115,10 @@ def right_hand_side(n: int, terms: Sequence[SourceTerm], shares: Sequence[FloatA
 
 
 class SourceAssembler:
-    """Makes the `SourceTerm` of each set of sources on one domain.
+    """Makes the `SourceTerm` of each set of sources on one domain, for the time step t of the heat flow.
 
-    Parameters
-    ----------
-    domain : Operators
-        The domain.
-    t : float or (n_components,) float64
-        Time step of the heat flow.
-    mass_unit : float or (n,) float64
-        The mean mass by which the heat flow divides.
-    plain : bool
-        Around source vertices take every distance from heat, as the paper does, and none from edges.
-
+    `mass_unit` is the mean mass by which the flow divides. If `plain`, every distance around source vertices comes from
+    heat, as in the paper, and none from edges.
     """
 
     def __init__(
@@ -194,7 +157,7 @@ class SourceAssembler:
         rim = self._rim(sources)
         ring = self._ring(sources, rim)
         found, far = self._known_by_windows(sources, rim)
-        near = Seeds.nearest(Seeds.joined(ring, found))
+        near = Seeds.joined(ring, found).nearest()
         seen = np.zeros(len(near.vertex), bool)
         if len(found.vertex):
             seen = np.isin(near.vertex, found.vertex) & ~np.isin(near.vertex, sources.vertices)

@@ -33,16 +33,8 @@ _VECTOR_STEP = 2.0
 class HeatTransport:
     """Extension, transport and the logarithmic map by heat flows, factored when made.
 
-    Parameters
-    ----------
-    solver : HeatMethodSolver
-        The distance, the flow of scalar heat, and the time step.
-    rotations : (n, n) csc_matrix of complex128
-        The connection, see `VectorHeatSolver.from_operators`.
-    mass : (n,) float64, optional
-        Mass of each vertex for the flow of vectors; the default is that of the operators.
-    outward : OutwardField, optional
-        Needed for `log_map`.
+    `rotations` are the connection, see `VectorHeatSolver.from_operators`, and `mass` (n,) is that of each vertex for
+    the flow of vectors, by default that of the operators. `outward` is needed for `log_map`.
     """
 
     def __init__(
@@ -86,13 +78,7 @@ class HeatTransport:
         return self._directions(vertices, vectors @ [1, 1j]) * lengths
 
     def log_map(self, vertex: int) -> FloatArray:
-        """Vectors (n, 2) from `vertex`, by the angle between the radial field and a transported axis.
-
-        Raises
-        ------
-        MeshError
-            Without the triangles around the source.
-        """
+        """Vectors (n, 2) from `vertex`, by the angle between the radial field and a transported axis."""
         if self._outward is None:
             raise MeshError("the log map needs the triangles around the source, which this domain does not have")
         at, outward = self._outward.dipole(vertex)
@@ -128,18 +114,7 @@ def _unit(Y: AnyArray) -> AnyArray:
 
 
 class OutwardField:
-    """Radial fields around the vertices of an oriented manifold of triangles.
-
-    Parameters
-    ----------
-    surface : Surface
-        Triangles, and the faces that they were flipped from.
-
-    Raises
-    ------
-    ValueError
-        If the faces are not known.
-    """
+    """Radial fields around the vertices of an oriented manifold of triangles, whose faces are known."""
 
     def __init__(self, surface: Surface) -> None:
         if surface.faces is None:
@@ -149,10 +124,7 @@ class OutwardField:
         self._turn = transport_angles(self._triangulation, self._angles)
 
     def ring(self, vertex: int) -> tuple[IntArray, FloatArray]:
-        """The neighbours (k,) of a vertex, and the directions (k,) at the vertex of the edges to them.
-
-        Those only that one edge joins with the vertex.
-        """
+        """The neighbours (k,) that one edge alone joins with a vertex, and the directions (k,) of these edges there."""
         tri = self._triangulation
         corner, _ = tri.corners_at(np.array([vertex]))
         out = previous_half_edge(corner)
@@ -172,19 +144,13 @@ class OutwardField:
         return np.asarray(np.abs(directions) * np.exp(1j * angle))
 
     def dipole(self, vertex: int) -> tuple[IntArray, AnyArray]:
-        """Vectors whose heat flow points away from a vertex, on the corners of the triangles around it.
+        """Vectors whose heat flow points away from a vertex, on the corners (3 k,) of the k triangles around it.
 
         They sum to 0, and the sum of their products with the positions in the tangent plane of the vertex is a multiple
         of the identity: vectors b_j in positions x_j give the sum of b_j G(x_j) = grad G for a linear function G. Taken
         for G the heat that a vertex far away sends, which rises in the direction in which the shortest geodesic to that
-        vertex departs. The b_j are the gradients of the hat functions times the areas of the triangles.
-
-        Returns
-        -------
-        vertices : (3 k,) int64
-            The corners of k triangles: a vertex comes once for each.
-        values : (3 k,) complex128
-            In the frames of these vertices.
+        vertex departs. The b_j are the gradients of the hat functions times the areas of the triangles. Returns the
+        vertices, each once for each of its triangles, and complex numbers in their frames.
         """
         tri, angles = self._triangulation, self._angles
         corner, _ = tri.corners_at(np.array([vertex]))
@@ -203,15 +169,7 @@ class OutwardField:
 
 
 class PathTransport:
-    """Extension, transport and the logarithmic map by exact shortest paths.
-
-    Parameters
-    ----------
-    engine : WindowEngine
-        Finds the paths.
-    polar : PolarAngles
-        Around the vertices, of the frames in which vectors are given.
-    """
+    """Extension, transport and the logarithmic map by exact shortest paths, in frames with these polar angles."""
 
     def __init__(self, engine: WindowEngine, polar: PolarAngles) -> None:
         self._engine, self._polar = engine, polar
@@ -249,17 +207,8 @@ class TwoSidedTransport:
 
     Vertex v of the surface is v and v + n on the cover, see `two_sided_cover`. A source sends its vector from both: a
     mirror image from the second, so that at each vertex the two copies get mirror images, too. This is the vector heat
-    method with a connection that reflects where neighbours are oriented differently, as Sharp, Soliman and Crane
-    (2019) have it for points.
-
-    Parameters
-    ----------
-    on_cover : HeatTransport or PathTransport
-        On the cover.
-    frames : TangentFrames
-        Of the cover.
-    n : int
-        Vertices of the surface.
+    method with a connection that reflects where neighbours are oriented differently, as Sharp, Soliman and Crane (2019)
+    have it for points.
     """
 
     def __init__(self, on_cover: HeatTransport | PathTransport, frames: TangentFrames, n: int) -> None:

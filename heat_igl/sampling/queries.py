@@ -19,24 +19,7 @@ _BLOCK = 8
 
 
 def checked_vertices(name: str, vertices: ArrayLike, n: int, distinct: bool = True) -> IntArray:
-    """Indices of `vertices`, in the given order.
-
-    Parameters
-    ----------
-    name : str
-        Name of the argument, for messages.
-    vertices : (k,) array_like of int, or (n,) mask of bool
-        Vertices, validated like sources.
-    n : int
-        Number of vertices of the domain.
-    distinct : bool
-        Whether a vertex may come only once.
-
-    Raises
-    ------
-    SourceError
-        If an entry is no vertex, or comes twice though it should not.
-    """
+    """Indices of distinct `vertices`, in the given order; a `SourceError` that calls them `name` for any others."""
     named = named_vertices(cast(Any, vertices), n, name)
     values, counts = np.unique(named, return_counts=True)
     if distinct and len(values) < len(named):

@@ -80,18 +80,9 @@ Oriented = SurfaceCurve | OrientedPoints | Sequence[Any] | AnyArray
 
 @dataclass(frozen=True, eq=False)
 class OrientedSet:
-    """Oriented sources, checked.
+    """Oriented sources, checked: directed segments (s,) in faces, negative on their left, and points (k,) with normals.
 
-    Attributes
-    ----------
-    faces, start, end, label : (s,) int64, (s, 3) float64, (s, 3) float64, (s,) int64
-        Directed segments in faces, negative on their left, and the curve that each belongs to.
-    point_faces, point_barycentric, point_label : (k,) int64, (k, 3) float64, (k,) int64
-        Points, and the set of `OrientedPoints` that each belongs to.
-    normals : (k, 3) float64
-        Normals of the points in space.
-    n_labels : int
-        Number of curves, regions and sets of points.
+    Labels count curves, regions and sets of points.
     """
 
     faces: IntArray
@@ -115,21 +106,10 @@ class OrientedSet:
 
 
 def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
-    """All that a user may pass as oriented sources, as one checked object.
+    """All that a user may pass as oriented sources, as one checked object; a `SourceError` names the first wrong one.
 
-    Parameters
-    ----------
-    curves : oriented sources
-        A `SurfaceCurve`, `OrientedPoints`, a mask of bool of the faces (m,) or the vertices (n,) of a region, or a list
-        of these kinds, or of such lists.
-    mesh : Mesh
-        Triangles that they lie on.
-
-    Raises
-    ------
-    SourceError
-        If there is no source, one is of another kind, a face is not one of the mesh, or a curve has no length; the
-        message names the first such.
+    That is a `SurfaceCurve` with a length, `OrientedPoints`, a mask of bool of the faces (m,) or the vertices (n,) of a
+    region, or a list of these kinds, or of such lists.
     """
     parts = named_entries(curves, "curves")
     if not parts:

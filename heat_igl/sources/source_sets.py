@@ -60,18 +60,10 @@ NO_SEGMENTS = SourceSegments(_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWH
 
 @dataclass(frozen=True, eq=False)
 class SourceSet:
-    """One set of sources, checked.
+    """One set of sources, checked: vertices (k,), ascending, each once, and points and segments of curves in faces.
 
-    Attributes
-    ----------
-    vertices : (k,) int64
-        Source vertices, ascending, each once.
-    vertex_label, vertex_offset : (k,) int64, (k,) float64
-        Which source a vertex is, and the value at which distance begins there.
-    points, segments
-        Points and curves in faces. The ends of segments are not among the points.
-    n_labels : int
-        How many sources there are, as the user counts them.
+    The label says which of `n_labels` sources each is, as the user counts them, and the offset at which value distance
+    begins. The ends of segments are not among the points.
     """
 
     vertices: IntArray
@@ -167,25 +159,11 @@ Sources = int | np.integer[Any] | Sequence[Any] | AnyArray | SurfacePoints | Sur
 
 
 def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
-    """All that a user may pass as sources, as one checked object.
+    """All that a user may pass as sources, as one checked object; a `SourceError` names the first that is none.
 
     Sources are counted as they are given: the i-th vertex of a sequence, the i-th set entry of a mask, the i-th of
-    `SurfacePoints`, a curve as one; over the entries of a list one after another.
-
-    Parameters
-    ----------
-    sources : sources
-        A vertex index, a sequence of them, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`, or
-        a list or tuple of such, also nested, as `isolines` returns curves.
-    n : int
-        Number of vertices of the domain.
-    F : (m, 3) int64 or None
-        The triangles that points and curves refer to; None if there are none.
-
-    Raises
-    ------
-    SourceError
-        If there is no source, or one is not on the domain; the message names the first such.
+    `SurfacePoints`, a curve as one; over the entries of a list, which may be nested, one after another. The domain has
+    n vertices, and points and curves lie on the triangles F, None if there are none.
     """
     builder = _Builder(n, F)
     builder.add(sources)
@@ -193,20 +171,7 @@ def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
 
 
 def require_resolved(sources: SourceSet, mean_edge_length: float) -> SourceSet:
-    """The same sources, if distances can be told from the offsets at which they begin.
-
-    Parameters
-    ----------
-    sources : SourceSet
-        Sources on a domain.
-    mean_edge_length : float
-        Of the domain.
-
-    Raises
-    ------
-    SourceError
-        If doubles as large as an offset are farther apart than a thousandth of the mean edge length.
-    """
+    """The same sources, if distances can be told from their offsets in double precision; else a `SourceError`."""
     offsets = sources.offsets
     wrong = np.spacing(offsets) > _COARSEST * mean_edge_length
     if wrong.any():
@@ -220,33 +185,12 @@ def require_resolved(sources: SourceSet, mean_edge_length: float) -> SourceSet:
 
 
 def vertex_sources(sources: Sources, n: int, name: str = "sources") -> IntArray:
-    """The vertices that `sources` names, ascending, each once.
-
-    Parameters
-    ----------
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices; repeated ones count once.
-    n : int
-        Number of vertices of the mesh.
-    name : str
-        Name of the argument, for errors.
-
-    Returns
-    -------
-    (k,) int64
-        At least one vertex index in ``range(n)``.
-
-    Raises
-    ------
-    SourceError
-        If there is no source, an index is not in ``range(n)``, the mask has the wrong length, or `sources` is not
-        made of integers or booleans.
-    """
+    """The vertices (k,) that `sources` names, ascending, each once; else a `SourceError` that calls them `name`."""
     return np.asarray(np.unique(named_vertices(sources, n, name)), dtype=np.int64)
 
 
 def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
-    """The vertices that `sources` names, in the order in which they are named; arguments as for `vertex_sources`."""
+    """The vertices of n that `sources` names, in the order in which they are named; errors as for `vertex_sources`."""
     if isinstance(sources, _PLACES):
         raise SourceError(f"{name} must be {_ACCEPTED} here, not {type(sources).__name__}")
     refuse_masked(name, sources, SourceError)

@@ -291,16 +291,9 @@ def _front_rate(operators: Operators, t: float | FloatArray) -> FloatArray:
 class DivergenceTables(NamedTuple):
     """All that the divergence takes of a triangulation, a row per face, so that a pass reads little memory.
 
-    Attributes
-    ----------
-    order : (n,) int
-        The vertices as they are visited.
-    corners : (m, 3) int32
-        Places in `order`; the faces in the order of their first corners there.
-    numbers : (m, 5) float64
-        One over the length of the side from corner 0 to corner 1; the foot of corner 2 on it, from 0 to 1 between the
-        two; one over the height. Then the area, and one over the square of the rate below which a direction is not
-        trusted fully.
+    `order` (n,) are the vertices as they are visited, and `corners` (m, 3) their places in it. The `numbers` (m, 5) of
+    a face are one over the length of the side from corner 0 to corner 1; the foot of corner 2 on it, from 0 to 1; one
+    over the height; the area; one over the square of the rate below which a direction is not trusted fully.
     """
 
     order: IntArray
