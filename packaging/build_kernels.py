@@ -39,6 +39,7 @@ DIRECTIVES = {
     "wraparound": False,
     "initializedcheck": CHECKED,
     "cdivision": True,
+    "infer_types": True,
     "freethreading_compatible": True,
     # C functions raise nothing, unless they say `exceptval`; in the checked build each call asks whether one did.
     "legacy_implicit_noexcept": not CHECKED,

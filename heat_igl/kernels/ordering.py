@@ -25,9 +25,7 @@ def _sort(
     key: cython.double[::1], digits: cython.ulonglong[:, ::1], order: cython.int[:, ::1], place: cython.longlong[:, ::1]
 ) -> cython.void:
     """Sort by three digits, least significant first; `place` counts the keys of each digit, then holds their places."""
-    i: cython.Py_ssize_t
     n: cython.Py_ssize_t = key.shape[0]
-    p: cython.int
     digit: cython.ulonglong
     for i in range(n):
         digits[0, i] = _leading_bits(key[i])

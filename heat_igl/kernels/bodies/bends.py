@@ -91,8 +91,6 @@ def bend_around(
     one.beside, one.sources, one.offset = beside, sources, offset
     one.d, one.begin, one.label, one.way = d, begin, label, way
     one.seen, one.lit, one.queue = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
-    i: cython.int
-    _rounds: cython.int
     with cython.nogil:
         for _rounds in range(MOST_ROUNDS):
             before: cython.int = one.stamp
@@ -157,7 +155,6 @@ class _Search(FittedBends):
     @cython.nogil
     def push_around(self, v: cython.int, size: cython.int, stamp: cython.int) -> cython.int:
         """Put the neighbours of v that the search has not come to at the end of the queue; returns its size."""
-        k: cython.int
         for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
             u: cython.int = self.neighbours[k]
             if self.seen[u] != stamp:
@@ -182,7 +179,6 @@ class _Search(FittedBends):
         before_side: cython.double = 0.0
         out: cython.double = 0.0
         side: cython.double = 0.0
-        k: cython.int
         for k in range(3):
             j: cython.int = (k + 1) % 3
             m: cython.int = (k + 2) % 3

@@ -20,7 +20,6 @@ class BentWays:
         value: cython.double = self.d[v]
         if self.way[v] == -1:
             source, value = self.sources[self.label[v]], self.offset[self.label[v]]
-        k: cython.int
         squared: cython.double = 0.0
         for k in range(3):
             self.x[k] = self.positions[source, k]
@@ -30,7 +29,6 @@ class BentWays:
     def around(self, i: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """Length of the way to a point that bends around an edge last; sets `x`, `share` and `beyond`."""
         bend = cython.address(self.bends[i])
-        k: cython.int
         away: cython.double = 0.0
         along: cython.double = 0.0
         for k in range(3):
@@ -51,7 +49,6 @@ class BentWays:
             if 0 < self.share < 1:
                 best = bend.start + sqrt((along - bend.along) * (along - bend.along) + both * both)
         if best == INFINITY:
-            j: cython.int
             for j in range(5):
                 if bend.fits and 0 < j < 4:
                     continue
@@ -65,7 +62,6 @@ class BentWays:
 
     def away(self, v: cython.int) -> cython.double:
         """Distance of v from `x`."""
-        k: cython.int
         squared: cython.double = 0.0
         for k in range(3):
             squared += (self.positions[v, k] - self.x[k]) * (self.positions[v, k] - self.x[k])

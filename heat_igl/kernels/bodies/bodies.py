@@ -41,7 +41,6 @@ class Body:
         n_around: cython.int[::1] = counts
         mark: cython.int[::1] = all_marks
         one_list: cython.int[::1] = np.empty(n, np.int32)
-        i: cython.Py_ssize_t
         with cython.nogil:
             for i in range(4 * m):
                 if self.behind[i // 4, i % 4] == UNKNOWN:
@@ -75,8 +74,6 @@ class Body:
         a: cython.int = self.corners[t, (o + 1) % 4]
         b: cython.int = self.corners[t, (o + 2) % 4]
         c: cython.int = self.corners[t, (o + 3) % 4]
-        k: cython.int
-        i: cython.int
         for k in range(self.first[a], self.first[a + 1]):
             other: cython.int = self.incident[k] // 4
             if other != t:
@@ -97,8 +94,6 @@ class Body:
 
     def list_around(self, v: cython.int, mark: cython.int[::1], into: cython.int[::1], at: cython.int) -> cython.int:
         """Write the neighbours of v down from a place on; returns the place behind them."""
-        k: cython.int
-        c: cython.int
         mark[v] = v
         for k in range(self.first[v], self.first[v + 1]):
             for c in range(4):
@@ -111,8 +106,6 @@ class Body:
 
     def longest_edge(self, v: cython.int) -> cython.double:
         """The distance of v from its farthest neighbour."""
-        k: cython.int
-        i: cython.int
         longest: cython.double = 0.0
         for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
             squared: cython.double = 0.0

@@ -17,7 +17,6 @@ class EdgeSight(BentWays):
         bend = cython.address(self.bends[i])
         has_a: cython.bint = self.share > 1 - NUDGE
         has_b: cython.bint = self.share < NUDGE
-        c: cython.int
         for c in range(4):
             has_a = has_a or self.corners[t, c] == bend.a
             has_b = has_b or self.corners[t, c] == bend.b
@@ -28,7 +27,6 @@ class EdgeSight(BentWays):
 
         It does once it passes between three vertices that see the edge.
         """
-        k: cython.int
         for k in range(self.first[v], self.first[v + 1]):
             if self.has_end(self.incident[k] // 4, i):
                 return True
@@ -48,7 +46,6 @@ class EdgeSight(BentWays):
     def arrives(self, i: cython.int) -> cython.bint:
         """Whether the ray gets to edge i before it leaves the body."""
         stamp: cython.int = self.stamp
-        _steps: cython.int
         for _steps in range(MOST_STEPS):
             if self.lit[self.ray.a] == stamp and self.lit[self.ray.b] == stamp and self.lit[self.ray.c] == stamp:
                 return True
@@ -67,7 +64,6 @@ class EdgeSight(BentWays):
         """Whether the source from which the way to v is straight sees a point of edge i."""
         if self.way[v] != -1:
             return False
-        k: cython.int
         for k in range(3):
             self.x[k] = x[k]
         self.share = share

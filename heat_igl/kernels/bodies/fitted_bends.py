@@ -23,8 +23,6 @@ class FittedBends(EdgeSight):
     def fit(self, i: cython.int) -> cython.void:
         """Find distance along an edge from the ways to its ends."""
         bend = cython.address(self.bends[i])
-        j: cython.int
-        k: cython.int
         x: cython.double[3]
         to_a: cython.double = self.d[bend.a]
         to_b: cython.double = self.d[bend.b]
@@ -83,7 +81,6 @@ class FittedBends(EdgeSight):
         if not bend.fits:
             return
         bend.height = sqrt(squared)
-        j: cython.int
         for j in range(1, 4):
             off: cython.double = 0.25 * j * size - bend.along
             if fabs(bend.start + sqrt(off * off + squared) - bend.at[j]) > MISFIT * size:

@@ -31,8 +31,6 @@ class Ray:
         """
         k: cython.int = self.incident[self.first[v]]
         self.aim(v, k // 4, goal, -1, 0.0)
-        _turns: cython.int
-        i: cython.int
         for _turns in range(MOST_TURNS):
             side: cython.int = self.worst_side(k)
             if side < 0:
@@ -93,8 +91,6 @@ class Ray:
         A line along edges and faces, as on a grid, would touch several tetrahedra at once. The end stays if `into` is
         negative, and the beginning is moved towards one corner of t if `toward` names it.
         """
-        i: cython.int
-        c: cython.int
         for i in range(3):
             p: cython.double = (1 - nudge) * self.positions[v, i]
             q: cython.double = goal[i]
@@ -109,7 +105,6 @@ class Ray:
 
     def enters(self, t: cython.int, o: cython.int) -> cython.bint:
         """Find the triangle through which the line, which begins inside t, leaves it; opposite corner o at first."""
-        i: cython.int
         self.t = t
         for i in range(o, o + 4):
             self.a = self.corners[t, (i + 1) % 4]
@@ -122,7 +117,6 @@ class Ray:
 
     def cross(self) -> cython.int:
         """Go through abc; returns the fourth vertex of the tetrahedron behind it, or -1 on the boundary."""
-        i: cython.int
         for i in range(4):
             u: cython.int = self.corners[self.t, i]
             if u != self.a and u != self.b and u != self.c:
@@ -184,7 +178,6 @@ class Ray:
     def volume(self, o: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.double:
         """Six times the volume of oabc, with the sign of the order of its corners."""
         found: cython.double = 0.0
-        i: cython.int
         for i in range(3):
             j: cython.int = (i + 1) % 3
             k: cython.int = (i + 2) % 3

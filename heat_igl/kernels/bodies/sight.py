@@ -55,8 +55,6 @@ def look_around(
     one.d, one.begin, one.label = d, begin, label
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
     one.is_waiting = is_waiting
-    i: cython.Py_ssize_t
-    _passes: cython.int
     with cython.nogil:
         for _passes in range(MOST_PASSES):
             n_changed: cython.Py_ssize_t = 0
@@ -108,7 +106,6 @@ class _Sight:
                 self.take(v, nearest)
                 return True
         above: cython.double = -INFINITY
-        _looks: cython.int
         for _looks in range(looks):
             nearest = self.nearest_around(v, v, above, below, -1)
             if self.label[v] >= 0:
@@ -127,7 +124,6 @@ class _Sight:
     def take(self, v: cython.int, label: cython.int) -> cython.void:
         """Give v the straight line from a source, and wake those around it that may have use for this source."""
         self.d[v], self.begin[v], self.label[v] = self.line(v, label), self.offset[label], label
-        k: cython.int
         for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
             u: cython.int = self.neighbours[k]
             if self.label[u] != label or not self.is_lit(u, label):
@@ -142,7 +138,6 @@ class _Sight:
         if nearest >= 0:
             below = self.line(v, nearest)
         before: cython.int = nearest
-        k: cython.int
         for k in range(self.first_neighbour[centre] - 1, self.first_neighbour[centre + 1]):
             at_centre: cython.bint = k < self.first_neighbour[centre]
             label: cython.int = self.label[centre if at_centre else self.neighbours[k]]
@@ -179,7 +174,6 @@ class _Sight:
         if self.first[v] == self.first[v + 1] or self.first[source] == self.first[source + 1]:
             return False
         goal = cython.address(self.positions[source, 0])
-        k: cython.int
         for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
             if self.neighbours[k] == source:
                 return True
@@ -201,7 +195,6 @@ class _Sight:
         """
         source: cython.int = self.sources[label]
         into: cython.int = -1 if self.turns[label] else self.incident[self.first[source]] // 4
-        toward: cython.int
         for toward in range(-1, 4 if self.is_concave else 0):
             if toward == begin % 4:
                 continue
@@ -220,7 +213,6 @@ class _Sight:
         may stand between such vertices.
         """
         source: cython.int = self.sources[label]
-        _steps: cython.int
         for _steps in range(MOST_STEPS):
             a: cython.int = self.ray.a
             b: cython.int = self.ray.b

@@ -41,8 +41,6 @@ def agreement(
     count: cython.uchar[::1] = counts
     radius: cython.double[::1] = largest
     is_settled: cython.uchar[::1] = settled
-    i: cython.Py_ssize_t
-    row: cython.Py_ssize_t
     with cython.nogil:
         for i in range(begin, end):
             is_settled[i - begin] = is_closed[i]
@@ -75,7 +73,6 @@ def _row_of(
     b: cython.int,
 ) -> cython.Py_ssize_t:
     """The row of the triangle of i, a and b in the star of i, or -1."""
-    row: cython.Py_ssize_t
     for row in range(first[i], first[i + 1]):
         p: cython.int = triangles[row, 1]
         q: cython.int = triangles[row, 2]

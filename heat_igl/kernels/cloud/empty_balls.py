@@ -43,8 +43,6 @@ def roomiest_normals(
     inverted: cython.double[:, ::1] = np.empty((index.shape[1], 3))
     shares: cython.double[:, ::1] = np.empty((2, directions.shape[1]))
     local: cython.double[::1] = np.empty(3)
-    row: cython.Py_ssize_t
-    x: cython.int
     with cython.nogil:
         for row in range(index.shape[0]):
             reach: cython.double = _invert(P, index[row], axes[row], inverted)
@@ -67,8 +65,6 @@ def _invert(
 ) -> cython.double:
     """The neighbours d as 2 R d / |d|^2 (R is returned): the ball of radius R / max(that . u) along u is empty."""
     way: cython.double[3]
-    j: cython.Py_ssize_t
-    x: cython.Py_ssize_t
     last: cython.int = index[index.shape[0] - 1]
     square: cython.double = 0.0
     for x in range(3):
@@ -91,8 +87,6 @@ def _shares(
     inverted: cython.double[:, ::1], directions: cython.const[cython.double][:, ::1], share: cython.double[:, ::1]
 ) -> cython.void:
     """Radii of the largest empty balls along all directions and opposite to them, in shares of the reach, at most 1."""
-    j: cython.Py_ssize_t
-    a: cython.Py_ssize_t
     share[:, :] = 1.0
     for j in range(inverted.shape[0]):
         x: cython.double = inverted[j, 0]
@@ -109,7 +103,6 @@ def _shares(
 @cython.cfunc
 @cython.nogil
 def _share(inverted: cython.double[:, ::1], u: cython.double[::1], sign: cython.double) -> cython.double:
-    j: cython.Py_ssize_t
     most: cython.double = 1.0
     for j in range(inverted.shape[0]):
         most = max(most, sign * (inverted[j, 0] * u[0] + inverted[j, 1] * u[1] + inverted[j, 2] * u[2]))
@@ -124,8 +117,6 @@ def _average(
     normal: cython.double[::1],
 ) -> cython.void:
     """The mean direction on the side of the largest ball."""
-    a: cython.Py_ssize_t
-    x: cython.Py_ssize_t
     side: cython.Py_ssize_t
     best: cython.Py_ssize_t = 0
     of_best: cython.Py_ssize_t = 0
@@ -189,8 +180,6 @@ def on_one_side(
     """
     found = np.full((index.shape[0], index.shape[1]), -1, np.int32)
     kept: cython.int[:, ::1] = found
-    row: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     with cython.nogil:
         for row in range(index.shape[0]):
             at: cython.int = index[row, 0]
@@ -222,12 +211,10 @@ def _sees_the_same(
     radii: cython.const[cython.double][:, ::1],
 ) -> cython.bint:
     alike: cython.double = 0.0
-    x: cython.Py_ssize_t
     for x in range(3):
         alike += normals[of_i, x] * normals[of_j, x]
     # The side of j that is on the side of i towards which the normal of i points.
     other: cython.Py_ssize_t = 0 if alike >= 0.0 else 1
-    side: cython.Py_ssize_t
     for side in range(2):
         a: cython.double = radii[of_i, side] if side == 0 else -radii[of_i, side]
         of_side: cython.Py_ssize_t = side if other == 0 else 1 - side

@@ -24,8 +24,6 @@ def fitting_triangles(
     head: cython.int[::1] = np.full(P.shape[0], -1, np.int32)
     following: cython.int[:, ::1] = np.empty((m, 3), np.int32)
     sector: cython.double[:, :, ::1] = np.empty((m, 3, 2))
-    f: cython.Py_ssize_t
-    c: cython.Py_ssize_t
     with cython.nogil:
         for f in range(m):
             fits: cython.bint = True

@@ -44,7 +44,6 @@ def delaunay_stars(
     members: cython.int[::1] = np.empty(k + 1, np.int32)
     stack: cython.int[::1] = np.empty(k + 2, np.int32)
     m: cython.Py_ssize_t = 0
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(begin, end):
             before: cython.Py_ssize_t = m
@@ -75,7 +74,6 @@ def _neighbours_around(
     convex hull of the inverted neighbours that it sees, found by Graham's scan. Neighbours beyond the circles of the
     nearest ones are left out.
     """
-    a: cython.Py_ssize_t
     size: cython.Py_ssize_t = 0
     reach: cython.double = INFINITY  # squared: twice the largest radius of the circles of the star
     for a in range(neighbours.shape[1]):
@@ -148,7 +146,6 @@ def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: c
 
     Returns how many sides there are; the last corner is the first.
     """
-    a: cython.Py_ssize_t
     first: cython.Py_ssize_t = 0
     for a in range(size):
         if _square(star, a) > _square(star, first):
@@ -171,7 +168,6 @@ def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: c
 @cython.nogil
 def _reach(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.double:
     """Squared distance beyond which neighbours are in no circle of the star; infinite if it is not around the point."""
-    a: cython.Py_ssize_t
     largest: cython.double = 0.0
     for a in range(top):
         p: cython.Py_ssize_t = stack[a]
@@ -199,7 +195,6 @@ def _triangles(
     m: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:
     """Append the triangles of point i on the sides of the hull to the m that are found; return how many there are."""
-    a: cython.Py_ssize_t
     for a in range(top):
         p: cython.Py_ssize_t = stack[a]
         q: cython.Py_ssize_t = stack[a + 1]

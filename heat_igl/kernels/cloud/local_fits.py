@@ -32,7 +32,6 @@ def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[c
     variances: cython.double[::1] = np.empty(3)
     work: cython.double[:, ::1] = np.empty((6, 3))
     local: cython.double[:, ::1] = _room_for(index.shape[1])
-    row: cython.Py_ssize_t
     with cython.nogil:
         for row in range(index.shape[0]):
             k: cython.Py_ssize_t = index.shape[1]
@@ -75,7 +74,6 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
     variances: cython.double[::1] = np.empty(3)
     # Six coefficients take six degrees of freedom from the neighbours.
     freedom: cython.double = max(1.0 - 6.0 / (k - 1.0), 0.5)
-    row: cython.Py_ssize_t
     x: cython.int
     with cython.nogil:
         for row in range(b):
@@ -154,7 +152,6 @@ def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cy
     sums: cython.double[10]
     c: cython.Py_ssize_t
     lane: cython.Py_ssize_t
-    block: cython.Py_ssize_t
     for c in range(10 * LANES):
         part[c] = 0.0
     for block in range(local.shape[1] // LANES):
@@ -206,7 +203,6 @@ def _normal_equations(local: cython.double[:, ::1], system: cython.double[:, ::1
     """The upper half of the matrix (6, 6) of least squares for the terms 1, x, y, xx, xy, yy of z; z in column 6."""
     moment: cython.double[84]
     sums: cython.double[21]
-    block: cython.Py_ssize_t
     lane: cython.Py_ssize_t
     c: cython.Py_ssize_t
     for c in range(21 * LANES):
@@ -262,7 +258,6 @@ def _normal_equations(local: cython.double[:, ::1], system: cython.double[:, ::1
 def _eliminate(system: cython.double[:, ::1]) -> cython.void:
     """Gaussian elimination; the matrix is symmetric and positive definite, so its upper half is enough."""
     a: cython.int
-    b: cython.int
     c: cython.int
     for c in range(6):
         for a in range(c + 1, 6):
@@ -281,7 +276,6 @@ def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1
     """The weighted sum of the squared deviations from the quadric whose coefficients are column 6 of `system`."""
     squares: cython.double[4]
     squares[0] = squares[1] = squares[2] = squares[3] = 0.0
-    block: cython.Py_ssize_t
     lane: cython.Py_ssize_t
     for block in range(local.shape[1] // LANES):
         j: cython.Py_ssize_t = LANES * block
@@ -299,7 +293,6 @@ def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1
 def _principal(work: cython.double[:, ::1], axes: cython.double[:, ::1], variances: cython.double[::1]) -> cython.void:
     """The axes of most, less and least variance, and the variances, ascending, of the covariance in rows 0 to 2."""
     x: cython.int
-    y: cython.int
     for x in range(3):
         for y in range(3):
             work[3 + x, y] = 1.0 if x == y else 0.0

@@ -54,7 +54,6 @@ def filling_triangles(
     beyond: cython.int[::1] = np.empty(k, np.int32)
     radius: cython.double[::1] = np.empty(k)
     count: cython.Py_ssize_t = 0
-    e: cython.Py_ssize_t
     with cython.nogil:
         for e in range(k):
             if not seen[e]:
@@ -112,7 +111,6 @@ def _fill(
     count: cython.Py_ssize_t = 0
     flat: cython.Py_ssize_t = -1
     limit: cython.double = folded_back
-    i: cython.Py_ssize_t
     for i in range(size):
         radius[i] = _ear(P, ring, beyond, size, i, largest, edges, limit)
     while size > 2:
@@ -200,7 +198,6 @@ def _circumradius(
     v: cython.double = 0.0
     along: cython.double = 0.0
     third: cython.double = 0.0
-    x: cython.Py_ssize_t
     for x in range(3):
         to_a: cython.double = P[a, x] - P[b, x]
         to_c: cython.double = P[c, x] - P[b, x]
@@ -227,7 +224,6 @@ def _fold(
     square: cython.double = 0.0
     of_c: cython.double = 0.0
     of_d: cython.double = 0.0
-    x: cython.Py_ssize_t
     for x in range(3):
         square += (P[b, x] - P[a, x]) * (P[b, x] - P[a, x])
         of_c += (P[c, x] - P[a, x]) * (P[b, x] - P[a, x])

@@ -21,7 +21,6 @@ def divergence_of_descent(
     """
     divergence = np.zeros(u.shape[0])
     total: cython.double[::1] = divergence
-    f: cython.Py_ssize_t
     x: cython.double
     y: cython.double
     largest: cython.double

@@ -32,7 +32,6 @@ def laplacian(F: cython.const[cython.int][:, ::1], weight: cython.const[cython.d
     indptr: cython.int[::1] = pointers
     indices: cython.int[::1] = rows
     data: cython.double[::1] = values
-    e: cython.Py_ssize_t
     j: cython.Py_ssize_t
     count: cython.int = 0
     with cython.nogil:
@@ -73,7 +72,6 @@ def _distribute(
     other: cython.uint,
 ) -> cython.void:
     """Sort entries by column, or by the column of the other one of the side; `begin` is the same before and after."""
-    i: cython.Py_ssize_t
     for i in range(entries.shape[0]):
         j: cython.Py_ssize_t = _column(F, entries[i] ^ other)
         sorted_entries[begin[j]] = entries[i]
@@ -96,7 +94,6 @@ def _fill_column(
     data: cython.double[::1],
 ) -> cython.int:
     """Append the entries of column j, and the diagonal; returns the number of all entries so far."""
-    i: cython.Py_ssize_t
     last: cython.int = -1
     for i in range(entries.shape[0]):
         row: cython.int = _column(F, entries[i] ^ 1)

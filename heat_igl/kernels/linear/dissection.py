@@ -91,7 +91,6 @@ def _push(
 @cython.nogil
 def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
     """Cut a piece in two, or make it a block; the parts wait on the stack."""
-    i: cython.Py_ssize_t
     low: cython.Py_ssize_t = piece.low
     high: cython.Py_ssize_t = piece.high
     size: cython.Py_ssize_t = high - low
@@ -136,7 +135,6 @@ def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> 
 
     Returns the size of the piece, or that of the component in the queue if the piece is not connected.
     """
-    i: cython.Py_ssize_t
     size: cython.Py_ssize_t = high - low
     for i in range(low, high):
         d.near[d.order[i]] = d.far[d.order[i]] = -1
@@ -162,7 +160,6 @@ def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> 
 @cython.nogil
 def _breadth_first(d: Dissecting, root: cython.int, distance: cython.int[::1]) -> cython.Py_ssize_t:
     """Number the vertices of root's piece by their distance from it; the queue keeps them in that order."""
-    p: cython.Py_ssize_t
     here: cython.int = d.piece[root]
     d.queue[0] = root
     distance[root] = 0
@@ -187,7 +184,6 @@ def _breadth_first(d: Dissecting, root: cython.int, distance: cython.int[::1]) -
 @cython.nogil
 def _split_off(d: Dissecting, low: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.void:
     """Move the first vertices of the queue to the front of a piece and make them one of their own."""
-    i: cython.Py_ssize_t
     for i in range(count):
         v: cython.int = d.queue[i]
         w: cython.int = d.order[low + i]
@@ -203,8 +199,6 @@ def _average(
     d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, f: cython.float[::1], smooth: cython.float[::1]
 ) -> cython.void:
     """The mean of f over each vertex and the neighbours in the piece."""
-    i: cython.Py_ssize_t
-    p: cython.Py_ssize_t
     for i in range(low, high):
         v: cython.Py_ssize_t = d.order[i]
         total: cython.float = f[v]
@@ -221,7 +215,6 @@ def _average(
 @cython.nogil
 def _fill_buckets(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
     """Divide the range of f evenly; false if f is constant. `near` takes the buckets."""
-    i: cython.Py_ssize_t
     low: cython.float = d.f[d.order[first]]
     high: cython.float = low
     for i in range(first, end):
@@ -242,10 +235,6 @@ def _best_cut(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -
     A vertex is in the left rim of every cut between the vertex's bucket and the highest among its neighbours, so
     counting the begins and ends of such intervals gives the rims of all cuts in one pass.
     """
-    i: cython.Py_ssize_t
-    p: cython.Py_ssize_t
-    bucket: cython.int
-    side: cython.int
     count: Rims
     for i in range(BUCKETS):
         count.inside[i] = count.rim[0][i] = count.rim[1][i] = 0
@@ -289,8 +278,6 @@ def _best_cut(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -
 @cython.nogil
 def _assign(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, cut: Cut) -> cython.void:
     """Turn buckets into parts: 0 and 1 for the two sides and 2 for the separator, encoded as -1 - part."""
-    i: cython.Py_ssize_t
-    p: cython.Py_ssize_t
     for i in range(low, high):
         v: cython.Py_ssize_t = d.order[i]
         part: cython.int = d.near[v] > cut.bucket
@@ -319,7 +306,6 @@ def _arrange(
     d: Dissecting, position: cython.Py_ssize_t, low: cython.Py_ssize_t, high: cython.Py_ssize_t, part: cython.int
 ) -> cython.Py_ssize_t:
     """Collect the vertices of a part in the queue, in their old order; return their end in the new one."""
-    i: cython.Py_ssize_t
     for i in range(low, high):
         v: cython.int = d.order[i]
         if d.near[v] == -1 - part:

@@ -14,8 +14,6 @@ def breadth_first(
     order = np.empty(n, np.int32)
     queue: cython.int[::1] = order
     seen: cython.uchar[::1] = np.array(skip)
-    root: cython.Py_ssize_t
-    p: cython.Py_ssize_t
     head: cython.Py_ssize_t = 0
     tail: cython.Py_ssize_t = 0
     with cython.nogil:
@@ -44,8 +42,6 @@ def subgraph(
     """The graph among some vertices, numbered as they come: `ends` and `neighbours`, int32."""
     n: cython.Py_ssize_t = some.shape[0]
     number: cython.int[::1] = np.full(ends.shape[0] - 1, -1, np.int32)
-    i: cython.Py_ssize_t
-    p: cython.Py_ssize_t
     v: cython.Py_ssize_t
     most: cython.Py_ssize_t = 0
     count: cython.Py_ssize_t = 0

@@ -21,7 +21,6 @@ def factor(
     shrunk to less than the share `singular` of its diagonal; or after a signal the one that is next.
     """
     e = Elimination(ends, neighbours, data, free, fronts, L, singular)
-    b: cython.Py_ssize_t
     failed: cython.Py_ssize_t = -1
     work: cython.double = 0.0
     with cython.nogil:
@@ -90,7 +89,6 @@ def _largest_stack(
     waiting_for: cython.longlong[::1],
 ) -> cython.longlong:
     """How many entries of updates wait at the same time."""
-    b: cython.Py_ssize_t
     waiting: cython.longlong = 0
     largest: cython.longlong = 0
     for b in range(parent.shape[0]):
@@ -106,8 +104,6 @@ def _largest_stack(
 @cython.nogil
 def _front(e: Elimination, b: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Assemble and eliminate front b; -1, or the place in the order of the pivot that failed."""
-    i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     start: cython.Py_ssize_t = e.start[b]
     columns: cython.Py_ssize_t = e.start[b + 1] - start
     row: cython.Py_ssize_t = e.first_row[b]
@@ -156,8 +152,6 @@ def _add_matrix(
     e: Elimination, start: cython.Py_ssize_t, columns: cython.Py_ssize_t, size: cython.Py_ssize_t, panel: numbers
 ) -> cython.void:
     """Add the matrix's own entries in the columns of a front."""
-    j: cython.Py_ssize_t
-    p: cython.Py_ssize_t
     for j in range(columns):
         v: cython.Py_ssize_t = e.order[start + j]
         if not e.free[v]:
@@ -182,8 +176,6 @@ def _add_child(
     update: numbers,
 ) -> cython.Py_ssize_t:
     """Add a child's update, which ends at `end` of the stack, to a front; return the start of it."""
-    i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     size: cython.Py_ssize_t = columns + left
     row: cython.Py_ssize_t = e.first_row[child]
     m: cython.Py_ssize_t = e.first_row[child + 1] - row
@@ -237,7 +229,6 @@ def _eliminate_columns(panel: numbers, columns: cython.Py_ssize_t, size: cython.
 @cython.nogil
 def _divide(column: numbers, n: cython.Py_ssize_t) -> cython.bint:
     """Divide a column by the pivot on top of it; false if that is not positive."""
-    i: cython.Py_ssize_t
     pivot: cython.double = column[0]
     if not pivot > 0.0:
         return False
@@ -253,7 +244,6 @@ def _subtract_from_update(
     update: numbers, left: cython.Py_ssize_t, panel: entries, columns: cython.Py_ssize_t
 ) -> cython.void:
     """Subtract the contribution of the eliminated columns of a front from the other rows."""
-    j: cython.Py_ssize_t
     top: cython.Py_ssize_t
     size: cython.Py_ssize_t = columns + left
     low: cython.Py_ssize_t = 0
@@ -284,8 +274,6 @@ def _subtract(
     count: cython.Py_ssize_t,
 ) -> cython.void:
     """Subtract from c the columns `first` to `count` of a front, from `row` on, as much as eliminates `factor_row`."""
-    i: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     t: cython.Py_ssize_t = first
     f: cython.double[8]
     while t + 8 <= count:
@@ -325,8 +313,6 @@ def _subtract_two(
     count: cython.Py_ssize_t,
 ) -> cython.void:
     """As `_subtract`, from c for `factor_row` and from d for the row after it: the columns are read once for both."""
-    i: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     t: cython.Py_ssize_t = 0
     f: cython.double[8]
     g: cython.double[8]

@@ -50,7 +50,6 @@ class Substitution:
         ``sums[piece]`` takes the amount that a piece subtracts from the rows above all pieces.
         """
         room: cython.double[::1] = np.empty(self.most_rows)
-        piece: cython.Py_ssize_t
         with cython.nogil:
             for piece in range(first, until):
                 _forward_one(self, x, self.piece_end[piece], self.piece_end[piece + 1], sums[piece], room)
@@ -70,7 +69,6 @@ class Substitution:
     ):
         """As `forward_one`, for x (n, WIDTH)."""
         room: cython.double[:, ::1] = np.empty((self.most_rows, WIDTH))
-        piece: cython.Py_ssize_t
         with cython.nogil:
             for piece in range(first, until):
                 _forward_block(self, x, self.piece_end[piece], self.piece_end[piece + 1], sums[piece], room)
@@ -92,9 +90,6 @@ def _forward_one(
     sums: cython.double[::1],
     room: cython.double[::1],
 ) -> cython.void:
-    p: cython.Py_ssize_t
-    i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     below: numbers = cython.address(room[0])
     for p in range(first, end):
         b: cython.Py_ssize_t = f.pieces[p]
@@ -132,9 +127,6 @@ def _forward_one(
 def _back_one(
     f: Substitution, x: cython.double[::1], first: cython.Py_ssize_t, end: cython.Py_ssize_t, room: cython.double[::1]
 ) -> cython.void:
-    p: cython.Py_ssize_t
-    i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     total: cython.double
     below: numbers = cython.address(room[0])
     for p in range(end - 1, first - 1, -1):
@@ -173,9 +165,6 @@ def _forward_block(
     sums: cython.double[:, ::1],
     room: cython.double[:, ::1],
 ) -> cython.void:
-    p: cython.Py_ssize_t
-    i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     c: cython.Py_ssize_t
     below: numbers = cython.address(room[0, 0])
     for p in range(first, end):
@@ -212,9 +201,6 @@ def _back_block(
     end: cython.Py_ssize_t,
     room: cython.double[:, ::1],
 ) -> cython.void:
-    p: cython.Py_ssize_t
-    i: cython.Py_ssize_t
-    j: cython.Py_ssize_t
     c: cython.Py_ssize_t
     below: numbers = cython.address(room[0, 0])
     for p in range(end - 1, first - 1, -1):
@@ -243,7 +229,6 @@ def _back_block(
 @cython.inline
 @cython.nogil
 def _all_zero(x: entries, n: cython.Py_ssize_t) -> cython.bint:
-    i: cython.Py_ssize_t
     for i in range(n):
         if x[i] != 0.0:
             return False
@@ -268,7 +253,6 @@ def _add_below(
 ) -> cython.void:
     """Add the rows below the columns of a front, times `own`, to `below`; four columns per turn."""
     size: cython.Py_ssize_t = columns + left
-    i: cython.Py_ssize_t
     c: cython.Py_ssize_t
     j: cython.Py_ssize_t = 0
     while j + 4 <= columns:

@@ -26,7 +26,6 @@ def front_rows(
     child: cython.longlong[::1] = np.full(k, -1, np.int64)
     sibling: cython.longlong[::1] = np.full(k, -1, np.int64)
     seen_by: cython.longlong[::1] = np.full(n, -1, np.int64)
-    b: cython.Py_ssize_t
     for b in range(k):
         if first_row[b] + n > room.shape[0]:
             found = np.concatenate([found, np.empty(len(found) + n, np.int32)])
@@ -59,8 +58,6 @@ def _rows_of_front(
     seen_by: cython.longlong[::1],
 ) -> cython.Py_ssize_t:
     """Append the rows of front b, in no order, after those of the fronts before it; return the end."""
-    i: cython.Py_ssize_t
-    p: cython.Py_ssize_t
     row: cython.int
     count: cython.Py_ssize_t = first_row[b]
     end: cython.Py_ssize_t = start[b + 1]
@@ -94,9 +91,7 @@ def _sort_rows(
     ordered: cython.int[::1],
 ) -> cython.void:
     """Sort the rows of each front: list the fronts of each row, then deal the rows out to them in ascending order."""
-    b: cython.Py_ssize_t
     p: cython.Py_ssize_t
-    row: cython.Py_ssize_t
     k: cython.Py_ssize_t = first_row.shape[0] - 1
     n: cython.Py_ssize_t = first_front.shape[0] - 1
     with cython.nogil:
@@ -130,7 +125,6 @@ def tree_pieces(
     number = np.full(k, -1, np.int64)
     piece: cython.longlong[::1] = number
     below: cython.longlong[::1] = np.array(entries)
-    b: cython.Py_ssize_t
     count: cython.Py_ssize_t = 0
     held: cython.longlong = 0
     for b in range(k):

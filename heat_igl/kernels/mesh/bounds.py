@@ -12,7 +12,6 @@ def is_longer(
     share: cython.double = 0.0,
 ) -> bool:
     """Whether `shorten` would lower any of the distances `d` (n,) along the edges: mostly it would not."""
-    e: cython.Py_ssize_t
     found: cython.bint = False
     with cython.nogil:
         for e in range(length.shape[0]):
@@ -30,9 +29,6 @@ def incident_edges(ends: cython.const[cython.int][:, ::1], n: cython.int):
     by_vertex = np.empty(2 * ends.shape[0], np.int32)
     first: cython.longlong[::1] = firsts
     incident: cython.int[::1] = by_vertex
-    e: cython.Py_ssize_t
-    v: cython.Py_ssize_t
-    c: cython.int
     with cython.nogil:
         for e in range(ends.shape[0]):
             for c in range(2):
@@ -56,8 +52,6 @@ def glued_edges(
 
     As an `IntrinsicTriangulation` has them, with the lengths (3 m,) in one row.
     """
-    f: cython.Py_ssize_t
-    c: cython.int
     e: cython.Py_ssize_t = 0
     with cython.nogil:
         for f in range(twin.shape[0]):
@@ -99,8 +93,6 @@ def shorten(
     is_waiting: cython.uchar[::1] = np.zeros(n, np.uint8)
     begin: cython.Py_ssize_t = 0
     count: cython.Py_ssize_t = 0
-    e: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     lowered: cython.int
     with cython.nogil:
         for e in range(length.shape[0]):
@@ -166,7 +158,6 @@ def _far_end(
 
 def lengthen(V: cython.const[cython.double][:, ::1], place: cython.const[cython.double][::1], d: cython.double[::1]):
     """Raise `d` (n,) to the straight lines from a place (3,) to the vertices V (n, 3), in place."""
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(d.shape[0]):
             x: cython.double = V[i, 0] - place[0]

@@ -26,7 +26,6 @@ def index_moves(kind: cython.longlong[:, ::1], n_faces):
     first_array, following_array = np.full(n_faces, -1), np.full((k, 3), -1)
     first: cython.longlong[::1] = first_array
     following: cython.longlong[:, ::1] = following_array
-    i: cython.Py_ssize_t
     f: cython.longlong
     g: cython.longlong
     for i in range(kind.shape[0] - 1, -1, -1):
@@ -50,7 +49,6 @@ def carry(
     barycentric: cython.double[:, ::1],
 ):
     """Carry points, given by a face (p,) and barycentric coordinates (p, 3), through all moves, in place."""
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(face.shape[0]):
             move: cython.longlong = first[face[i]]
@@ -73,7 +71,6 @@ def _split(at: cython.double[::1], b: cython.double[::1]) -> cython.longlong:
     has the least share of the point in proportion to the share of the new vertex.
     """
     c: cython.int = 0
-    k: cython.int
     for k in range(1, 3):
         if b[k] * at[c] < b[c] * at[k]:
             c = k

@@ -27,7 +27,6 @@ def edge_excess(
     worst : int
         Edge with the largest excess; -1 if there is none.
     """
-    k: cython.Py_ssize_t
     worst: cython.Py_ssize_t = -1
     total: cython.double = 0.0
     excess: cython.double = 0.0
@@ -48,7 +47,6 @@ def edge_excess(
 
 def largest_finite(distance: cython.const[cython.double][::1]) -> float:
     """The largest distance (n,) that is finite; 0 if there is none."""
-    i: cython.Py_ssize_t
     largest: cython.double = 0.0
     with cython.nogil:
         for i in range(distance.shape[0]):
@@ -69,8 +67,6 @@ def below_line(
 
     Lines begin at `offsets` (k,) in the `places` (k, 3); distances below them by `slack` count as rounding.
     """
-    k: cython.Py_ssize_t
-    s: cython.Py_ssize_t
     found: cython.Py_ssize_t = -1
     with cython.nogil:
         for k in range((distance.shape[0] + step - 1) // step):
@@ -120,9 +116,6 @@ def steepest_edge(
     """
     n_corners: cython.int = F.shape[1]
     has_lengths: cython.bint = l.shape[0] > 0
-    f: cython.Py_ssize_t
-    a: cython.int
-    b: cython.int
     d: cython.double[4]
     x: cython.double[12]
     far: cython.longlong = -1
@@ -170,8 +163,6 @@ def straight_lines(
     """Length (p,) of the shortest straight line from each position to a source, the source's offset added."""
     found = np.empty(positions.shape[0])
     shortest: cython.double[::1] = found
-    k: cython.Py_ssize_t
-    s: cython.Py_ssize_t
     with cython.nogil:
         for k in range(positions.shape[0]):
             least: cython.double = 1e308
@@ -216,7 +207,6 @@ def line_shortfall(
     worst : int
         Position in `vertex` of the largest; -1 if no distance falls short.
     """
-    k: cython.Py_ssize_t
     worst: cython.Py_ssize_t = -1
     count: cython.longlong = 0
     total: cython.double = 0.0
@@ -279,8 +269,6 @@ def wrong_rows(
     length: cython.const[cython.double][::1] = tables.edges.length
     corner_of_vertex: cython.const[cython.int][::1] = tables.corner_of_vertex
     next_corner: cython.const[cython.int][::1] = tables.next_corner
-    i: cython.Py_ssize_t
-    r: cython.Py_ssize_t
     begin: cython.Py_ssize_t = 0
     with cython.nogil:
         for i in range(source.shape[0]):

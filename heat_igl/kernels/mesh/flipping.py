@@ -29,8 +29,6 @@ def flip(edges, tolerance: cython.double, most: cython.longlong, records: cython
     flips = Flips(edges.vertex, edges.twin, edges.ring, edges.length, tolerance, records)
     twin: cython.int[::1] = edges.twin
     n_flips: cython.longlong = 0
-    f: cython.int
-    first: cython.int
     with cython.nogil:
         for f in range(twin.shape[0] // 3):
             flips.measure(f)
@@ -54,7 +52,6 @@ def rounds(kind: cython.const[cython.longlong][:, ::1], m: cython.Py_ssize_t):
     found = np.empty(kind.shape[0], np.int64)
     of_flip: cython.longlong[::1] = found
     of_face: cython.longlong[::1] = np.zeros(m, np.int64)
-    i: cython.Py_ssize_t
     for i in range(kind.shape[0]):
         f: cython.longlong = kind[i, 1] // 3
         g: cython.longlong = kind[i, 2] // 3

@@ -57,8 +57,6 @@ def _by_lower_end(
 
     `begin` (n + 1,), which must come full of 0, takes where the half-edges with lower end v end, at ``begin[v]``.
     """
-    f: cython.int
-    i: cython.int
     a: cython.int
     b: cython.int
     c: cython.int
@@ -98,7 +96,6 @@ def _glue_sides(
     length: cython.double[::1],
 ) -> cython.void:
     """Glue half-edges that have both ends in common, and measure them. `seen` (n,) is working space, full of 0."""
-    lower: cython.int
     upper: cython.int
     i: cython.int = 0
     h: cython.int
@@ -140,7 +137,6 @@ def _glue_sides(
 
 def has_needles(length: cython.const[cython.double][::1], margin: cython.double) -> bool:
     """Whether in some face two sides (3 m,) exceed the third by less than `margin` times the longest side of all."""
-    h: cython.Py_ssize_t
     least: cython.double = INFINITY
     longest_of_all: cython.double = 0.0
     with cython.nogil:

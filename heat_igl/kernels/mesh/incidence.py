@@ -29,7 +29,6 @@ def edges_of_triangles(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ss
     sorted_sides: cython.longlong[::1] = by_both
     edge: cython.longlong[::1] = number
     place: cython.longlong[::1] = np.empty(n + 1, np.int64)
-    i: cython.Py_ssize_t
     k: cython.longlong = -1
     lower: cython.longlong = -1
     upper: cython.longlong = -1
@@ -78,7 +77,6 @@ def _by_end(
     is_lower: cython.bint,
 ) -> cython.void:
     """Sort sides by one of their ends; those with the same end stay in order. `place` (n + 1,) is working space."""
-    i: cython.Py_ssize_t
     place[:] = 0
     for i in range(sides.shape[0]):
         place[_end(F, sides[i], is_lower) + 1] += 1
@@ -97,9 +95,6 @@ def components(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
     """
     labels = np.arange(n)
     above: cython.longlong[::1] = labels  # a vertex of the same component, not above this one; then the label
-    f: cython.Py_ssize_t
-    c: cython.Py_ssize_t
-    v: cython.Py_ssize_t
     count: cython.longlong = 0
     with cython.nogil:
         for f in range(F.shape[0]):

@@ -6,7 +6,6 @@ import numpy as np
 
 def n_near(twin: cython.int[::1], reach: cython.int) -> int:
     """How many half-edges (3 m,) are glued to one whose number differs from theirs by less than `reach`."""
-    h: cython.int
     n: cython.int = 0
     with cython.nogil:
         for h in range(twin.shape[0]):
@@ -48,9 +47,6 @@ def breadth_first(edges, n: cython.int, start: cython.int):
     search.number, search.face, search.place = numbers, faces, np.full(m, -1, np.int32)
     old_ring: cython.const[cython.int][::1] = edges.ring
     new_ring: cython.int[::1] = rings
-    first: cython.int
-    h: cython.int
-    v: cython.int
     with cython.nogil:
         search.go_on_from(start)
         for first in range(m):
@@ -92,7 +88,6 @@ class _Numbering:
     @cython.nogil
     def go_on_from(self, first: cython.int) -> cython.void:
         """Number the faces of the component of this one, unless it has a number."""
-        c: cython.int
         self.meet(first)
         while self.n_done < self.n_met:
             h: cython.int = 3 * self.face[self.n_done]

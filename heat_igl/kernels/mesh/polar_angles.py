@@ -20,7 +20,6 @@ def polar_angles(
     total: cython.double[::1] = sums
     count: cython.longlong[::1] = counts
     closed: cython.uchar[::1] = closes
-    v: cython.Py_ssize_t
     with cython.nogil:
         for v in range(n):
             if first[v] >= 0:
@@ -42,7 +41,6 @@ def _around(
     most: cython.longlong = twin.shape[0]
     start: cython.longlong = first
     t: cython.longlong
-    _k: cython.longlong
     # Clockwise to the boundary, if there is one: across the half-edge that leaves from the corner.
     for _k in range(most):
         t = twin[start + 2 if start % 3 == 0 else start - 1]

@@ -157,7 +157,6 @@ class _Refinement:
 
 def _find_sharp(t: Flips, n_faces: cython.int, seen: cython.uchar[::1], is_sharp: cython.uchar[::1]) -> cython.void:
     """Mark vertices with a fan of faces whose angles sum to less than `SHARPEST`: no split or flip changes that."""
-    first: cython.int
     for first in range(3 * n_faces):
         at: cython.int = first
         total: cython.double = 0.0
@@ -198,7 +197,6 @@ def _circumcenter(t: Flips, f: cython.int) -> Location:
     side: cython.int = 2
     i: cython.int
     j: cython.int
-    corner: cython.int
     for corner in range(3):
         i, j = (corner + 1) % 3, (corner + 2) % 3
         if (

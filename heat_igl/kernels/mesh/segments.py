@@ -23,7 +23,6 @@ class Segments:
         end: cython.pointer[cython.const[cython.double]],
     ) -> cython.int:
         """Add a segment in face f."""
-        k: cython.int
         if self.n == self.face.shape[0]:
             with cython.gil:  # twice the room
                 self.face = np.concatenate([self.face, self.face])

@@ -67,8 +67,6 @@ class EdgeRoutes:
         goal_cost: cython.const[cython.double][::1],
     ) -> cython.int:
         """The goal of the shortest way, -1 if there is none."""
-        i: cython.int
-        k: cython.int
         best: cython.double = INFINITY
         found: cython.int = -1
         for i in range(start.shape[0]):
@@ -112,7 +110,6 @@ class EdgeRoutes:
     @cython.nogil
     def forget(self) -> cython.void:
         """Make ready for the next search."""
-        i: cython.int
         for i in range(self.n_touched):
             self.length[self.touched[i]] = INFINITY
             self.queue.set_key(self.touched[i], 0.0)

@@ -125,7 +125,6 @@ class Loop:
         share: cython.double,
     ) -> cython.void:
         """Put the base `share` of the way from a to b: corners of the first face f, and of the last face."""
-        c: cython.int
         for c in range(3):
             self.course.start.c[c] = self.course.end.c[c] = 0.0
         if share < SNAP:
@@ -229,8 +228,6 @@ class Shortener:
         """Make the strip of a course; -1, or the join at which a loop is stuck."""
         start: Place
         end: Place
-        c: cython.int
-        i: cython.int
         self.course.segments.n = 0
         self.length = 0.0
         for c in range(3):

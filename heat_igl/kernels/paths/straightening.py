@@ -94,7 +94,6 @@ class Course:
         self.straighter.count = 0
         copied: cython.int = 0
         has_changed: cython.bint = False
-        i: cython.int
         for i in range(1, self.funnel.n_bends - 1):
             bend = cython.address(self.funnel.bend[i])
             # Two bends repaired at once must not share a face.
@@ -146,7 +145,6 @@ class Course:
 
         Then the angle on the side of the strip, pi at least, is the only one there.
         """
-        j: cython.int
         for j in range(first, last + 1):
             if self.s.twin[self.strip.crossing[j].leave] < 0:
                 return False
@@ -189,7 +187,6 @@ class Course:
         """Append the segments of the path through the strip, without those of no length."""
         k: cython.int = self.strip.count
         i: cython.int = 1
-        j: cython.int
         share: cython.double = 0.0
         f: cython.int = self.face
         x: Place = self.start
@@ -255,7 +252,6 @@ class Passing:
 
     def improve(self, length: cython.double) -> cython.double:
         """Lead a settled path past vertices on the other side while that makes it shorter; returns the length."""
-        i: cython.int
         self.n_tried = 0
         is_better: cython.bint = True
         while is_better and self.propose() > 0:
@@ -280,9 +276,6 @@ class Passing:
         """
         self.kept.save(self.course)
         self.count = 0
-        i: cython.int
-        j: cython.int
-        side: cython.int
         for i in range(1, self.course.funnel.n_bends):
             p = cython.address(self.course.funnel.bend[i - 1])
             q = cython.address(self.course.funnel.bend[i])
@@ -333,7 +326,6 @@ class Passing:
 
     def is_tried(self, v: cython.int) -> cython.bint:
         """Whether the other side of v has been tried."""
-        i: cython.int
         for i in range(self.n_tried):
             if self.tried[i] == v:
                 return True

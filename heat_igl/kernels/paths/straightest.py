@@ -27,7 +27,6 @@ class _Tracer:
         It begins at barycentric coordinates `at` in `face`, at the angle `turn` from the direction of corner 0 to
         corner 1.
         """
-        c: cython.int
         has_segments: cython.bint = False
         idle: cython.longlong = 0
         left: cython.double = length
@@ -66,7 +65,6 @@ class _Tracer:
 
     def start(self, f: cython.longlong, turn: cython.double) -> cython.bint:
         """Set the ray off in face f from `entry`; false if it leads out of the surface at once."""
-        c: cython.int
         for c in range(3):
             if self.entry[c] == 1.0:
                 # In a vertex: the angle from the side that leaves from this corner.
@@ -270,7 +268,6 @@ def trace(
     tracer = _Tracer()
     tracer.l, tracer.area, tracer.angle, tracer.twin, tracer.half = triangles
     tracer.segments = Segments() if stores else None
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(face.shape[0]):
             tracer.trace_one(

@@ -66,7 +66,6 @@ class Strip:
 
     def extend(self, crossing: Crossing[::1], begin: cython.int, end: cython.int) -> cython.int:
         """Add crossings `begin` to `end`, exclusive."""
-        j: cython.int
         for j in range(begin, end):
             self.push(crossing[j].leave, crossing[j].enter)
         return 0
@@ -78,7 +77,6 @@ class Strip:
 
     def drop(self, k: cython.int) -> cython.void:
         """Take away the first k."""
-        i: cython.int
         self.count -= k
         for i in range(self.count):
             self.crossing[i] = self.crossing[i + k]
@@ -117,7 +115,6 @@ class Detour:
         start: cython.int = h // 3
         n_steps: cython.int = 2
         n_tips: cython.int = 2
-        i: cython.int
         self.step[0].enter, self.step[0].leave, self.step[0].before = -1, h, -1
         self.step[1].enter, self.step[1].leave, self.step[1].before = -1, other_side(s, h, v), -1
         self.tip[0].length, self.tip[0].step = before.this, 0
@@ -194,7 +191,6 @@ class Detour:
         return -1
 
     def _is_entered(self, g: cython.int, n_steps: cython.int) -> cython.bint:
-        i: cython.int
         for i in range(n_steps):
             if self.step[i].enter == g:
                 return True
@@ -207,7 +203,6 @@ class Detour:
         while self.step[at].before >= 0:
             count += 1
             at = self.step[at].before
-        i: cython.int
         at = last
         for i in range(count - 1, -1, -1):
             self.way[i].enter = self.step[at].enter
@@ -250,7 +245,6 @@ class Funnel:
         entered: cython.int = -1
         left: cython.int = -1
         right: cython.int = -1
-        j: cython.int
         for j in range(strip.count):
             corner: cython.int = strip.crossing[j].leave % 3
             if entered < 0:
@@ -293,7 +287,6 @@ class Funnel:
         self.bend[0].x, self.bend[0].y = ax, ay
         self.bend[0].side = self.bend[0].first = self.bend[0].last = -1
         j: cython.int = 0
-        side: cython.int
         while j <= k:
             is_turned: cython.bint = False
             for side in range(1, -1, -1):
@@ -337,7 +330,6 @@ class Funnel:
     def length(self) -> cython.double:
         """Length of the shortest path."""
         total: cython.double = 0.0
-        i: cython.int
         for i in range(1, self.n_bends):
             total += hypot(self.bend[i].x - self.bend[i - 1].x, self.bend[i].y - self.bend[i - 1].y)
         return total

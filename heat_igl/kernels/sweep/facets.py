@@ -43,7 +43,6 @@ class Facet:
 
     def along_edges(self) -> cython.double:
         """The least value along an edge to v; sets `share`."""
-        i: cython.int
         at: cython.int = 0
         best: cython.double = INFINITY
         for i in range(3):
@@ -63,9 +62,6 @@ class Facet:
         The logarithm of the squared length in one direction is linear between the corners: lengths are those of the
         inverse metric as well, and the integral along the line is Simpson's rule of an exponential function.
         """
-        i: cython.int
-        j: cython.int
-        k: cython.int
         p: cython.int = self.p
         of: cython.double
         to: cython.double = 0.0
@@ -130,8 +126,6 @@ class Facet:
 
     def value(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """T(x) + |v - x| for shares x of the corners, inf if there is none; sets its derivatives `g` and `H`."""
-        i: cython.int
-        j: cython.int
         p: cython.int = self.p
         mean: cython.double = 0.0
         square: cython.double = 0.0
@@ -167,9 +161,6 @@ class Facet:
         """
         x: cython.double[3]
         y: cython.double[3]
-        i: cython.int
-        _step: cython.int
-        _half: cython.int
         for i in range(3):
             x[i] = self.share[i] if i < self.p else 0.0
             self.share[i] = x[i]

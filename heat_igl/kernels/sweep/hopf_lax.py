@@ -127,7 +127,6 @@ class HopfLax(Facet):
     def spread(self) -> cython.void:
         """First order: Dijkstra's algorithm, in which a vertex comes again if its distance falls again."""
         v: cython.int
-        k: cython.int
         c: cython.int
         size: cython.int = self.p + 1
         gain: cython.double = FIRST_GAIN
@@ -161,7 +160,6 @@ class HopfLax(Facet):
     def nearest_corner(self) -> cython.int:
         """The corner of the simplex that has the largest share of the best place."""
         most: cython.int = 0
-        k: cython.int
         for k in range(1, self.p):
             if self.share[k] > self.share[most]:
                 most = k
@@ -264,7 +262,6 @@ class HopfLax(Facet):
     def sharpen(self, least: cython.double) -> cython.void:
         """Second order: the nearest vertex next, until no distance around any has changed by more than is settled."""
         v: cython.int
-        k: cython.int
         c: cython.int
         size: cython.int = self.p + 1
         settled: cython.double = FIRST_SETTLED
@@ -301,7 +298,6 @@ class HopfLax(Facet):
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it."""
-        k: cython.int
         i: cython.int
         size: cython.int = self.p + 1
         best: cython.double = INFINITY
@@ -365,7 +361,6 @@ class HopfLax(Facet):
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """Fill `product`: of v's metric first, then of those of the corners of the facet."""
-        k: cython.int
         i: cython.int
         j: cython.int
         size: cython.int = self.p + 1
@@ -445,7 +440,6 @@ class HopfLax(Facet):
         Dj: cython.double = self.D[j]
         at_i: cython.double = 0.0
         at_j: cython.double = 0.0
-        k: cython.int
         for k in range(3):
             e: cython.double = self.V[u, k] - self.V[v, k]
             at_i += self.slope[v, k] * e
@@ -488,7 +482,6 @@ class HopfLax(Facet):
             return 0.0
         e: cython.double[3]
         j: cython.int
-        k: cython.int
         for j in range(self.p):
             e[j] = 0.0
             for k in range(3):
@@ -501,7 +494,6 @@ class HopfLax(Facet):
         """The derivative of the length of v - x by the position of v, at the best place x."""
         v: cython.int = self.corners[s, c]
         i: cython.int
-        k: cython.int
         self.is_sloped[v] = self.length(self.share) > 0.0
         for k in range(3):
             self.slope[v, k] = 0.0

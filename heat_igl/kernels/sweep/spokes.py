@@ -26,8 +26,6 @@ def first_spokes(edges, n: cython.int):
     """First spoke (n + 1,) int32 of each vertex: one per corner, and one more at the end of an open fan."""
     vertex: cython.const[cython.int][::1] = edges.vertex
     twin: cython.const[cython.int][::1] = edges.twin
-    h: cython.int
-    v: cython.int
     array = np.zeros(n + 1, np.int32)
     first: cython.int[::1] = array
     with cython.nogil:
@@ -73,7 +71,6 @@ def fill(edges, first: cython.const[cython.int][::1], spoke: Spoke[::1]):
 @cython.nogil
 def _shapes(length: cython.const[cython.double][::1], corner: Corner[::1]) -> cython.void:
     """Place and angle of each corner."""
-    h: cython.int
     for h in range(length.shape[0]):
         base: cython.double = length[h]
         right: cython.double = length[previous_half_edge(h)]
@@ -130,7 +127,6 @@ def _fans(
     is_done: cython.uchar[::1],
 ) -> cython.int:
     """Glue corners to fans, in rows of spokes from ``end[v]`` on; returns how many fans there are."""
-    h: cython.int
     k: cython.int = -1
     n_fans: cython.int = 0
     for h in range(twin.shape[0]):
@@ -185,7 +181,6 @@ def _fill_spokes(
     left: cython.int[::1],
 ) -> cython.void:
     """What a spoke knows of the triangle to its left, and of the one beyond."""
-    row: cython.int
     k: cython.int = -1
     for row in range(spoke.shape[0]):
         s = cython.address(spoke[row])

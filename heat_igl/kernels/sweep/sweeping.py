@@ -133,7 +133,6 @@ class _Sweep:
     @cython.nogil
     def read_ahead(self, i: cython.Py_ssize_t) -> cython.void:
         """Prefetch the data of the next visits: on large meshes that takes longer than the visits."""
-        k: cython.int
         v: cython.int
         if i + 3 < self.n_ordered:
             prefetch(cython.address(self.t.first[self.order[i + 3]]))
@@ -167,7 +166,6 @@ class _Sweep:
 
         All triangles are computed and the best is chosen without branches, which at random cost more than arithmetic.
         """
-        k: cython.int
         spoke: cython.int = self.t.first[v]
         best: cython.double = self.d[v]
         across: cython.double = INFINITY  # squared
@@ -199,7 +197,6 @@ class _Sweep:
     @cython.nogil
     def lower_labelled(self, v: cython.int) -> cython.bint:
         """Lower v to the best value from the triangles at it, with the source of that; whether there is one."""
-        k: cython.int
         best: cython.double = self.d[v]
         across: cython.double = INFINITY  # squared
         squared: cython.double
@@ -319,7 +316,6 @@ class _Sweep:
     def mark_farther(self, v: cython.int) -> cython.Py_ssize_t:
         """Mark the farther neighbours, which a smaller d[v] can improve. Those still to come are stale anyway."""
         lowest: cython.Py_ssize_t = self.order.shape[0]
-        k: cython.int
         dv: cython.double = self.d[v]
         for k in range(self.t.first[v], self.t.first[v + 1]):
             a: cython.int = self.t.spoke[k].neighbour
@@ -338,7 +334,6 @@ class _Sweep:
         whose cosine is below L / (2 d), L the length of the spoke and d counted from `begin`, the offset of the source.
         """
         lowest: cython.Py_ssize_t = self.order.shape[0]
-        k: cython.int
         a: cython.int
         b: cython.int
         dv: cython.double = self.d[v] - begin
@@ -373,7 +368,6 @@ class _Sweep:
 @cython.nogil
 def _keep_smallest(values: cython.pointer[cython.double], at: cython.pointer[cython.int]) -> cython.int:
     """Keep the smallest of `SIDES` values, and the place of it; returns how many are left, one."""
-    i: cython.int
     for i in range(1, SIDES):
         if values[i] < values[0]:
             values[0], at[0] = values[i], at[i]

@@ -38,7 +38,6 @@ class VisitOrder:
 
     def put_known(self, width: cython.double) -> cython.void:
         """Begin with the vertices whose distance is known."""
-        v: cython.int
         clear(cython.address(self.ahead), cython.address(self.waiting[0]), width)
         for v in range(self.d.shape[0]):
             if self.d[v] < INFINITY:
@@ -66,7 +65,6 @@ class VisitOrder:
     @cython.nogil
     def reach_neighbours(self) -> cython.void:
         """Put the neighbours of the next vertex that was passed into the queue."""
-        k: cython.int
         v: cython.int = self.order[self.n_passed]
         self.n_passed += 1
         for k in range(self.t.first[v], self.t.first[v + 1]):

@@ -120,7 +120,6 @@ def _meeting(
     slope: cython.double = 0.0
     step: cython.double
     bend: cython.double
-    _: cython.int
     shift += u.offset - w.offset
     for _ in range(8):
         a = reach(u, x)
@@ -493,7 +492,6 @@ def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double)
 @cython.nogil
 def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
     """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
-    i: cython.int
     k: cython.int = 0
     is_behind: cython.bint
     u: cython.pointer(Window)
@@ -544,9 +542,7 @@ def is_covered(
     at: cython.double
     reached: cython.double
     nearest: cython.double
-    i: cython.int
     j: cython.int
-    k: cython.int
     w: cython.pointer(cython.const[Window])
     for i in range(n_before):
         for j in range(5):
@@ -653,7 +649,6 @@ def _reach_apex(
     apex: cython.pointer(Apex),
 ) -> cython.void:
     """Distance of the apex, and the side on which the lines of each window pass it."""
-    i: cython.int
     x: cython.double
     m: cython.double
     a: cython.double
@@ -962,7 +957,6 @@ def _measure(
 ) -> cython.void:
     """Distances of the targets in the face of h, over its windows."""
     j: cython.int = s.first_target[h // 3]
-    i: cython.int
     length: cython.double = s.length[h]
     x: cython.double
     y: cython.double

@@ -35,7 +35,6 @@ def _piece(
     they are given.
     """
     d: cython.double[3]
-    c: cython.int
     i: cython.int
     k: cython.int
     total: cython.double = 0.0
@@ -85,7 +84,6 @@ def _along(
     total: cython.double = 0.0
     of_face: cython.p_double = cython.NULL
     tangent_of_face: cython.pointer[cython.const[cython.double]] = cython.NULL
-    j: cython.longlong
     for j in range(tracer.segments.n):
         f: cython.int = 3 * tracer.segments.face[j]
         is_last: cython.bint = j == tracer.segments.n - 1
@@ -132,7 +130,6 @@ def pull_back(
     """
     tracer: PathTracer = PathTracer(tables, found, starts)
     n: cython.int = order.shape[0]
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(n - 1, -1, -1):
             v: cython.int = cython.cast(cython.int, order[i])
@@ -162,7 +159,6 @@ def push_forward(
     """
     tracer: PathTracer = PathTracer(tables, found, starts)
     n: cython.int = order.shape[0]
-    i: cython.Py_ssize_t
     with cython.nogil:
         for i in range(n):
             v: cython.int = cython.cast(cython.int, order[i])

@@ -62,7 +62,6 @@ def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
 
 def empty_front(s: cython.pointer(Search)) -> cython.void:
     """Drop all that waits; lists and queue keep their room."""
-    i: cython.int
     for i in range(s.n_lists):
         if s.lists[i].half_edge >= 0:
             s.slot[s.lists[i].half_edge] = -1
@@ -73,7 +72,6 @@ def empty_front(s: cython.pointer(Search)) -> cython.void:
 
 def free_front(s: cython.pointer(Search)) -> cython.void:
     """Return the memory of a front."""
-    i: cython.int
     for i in range(s.n_made_lists):
         free(s.lists[i].windows)
     free(s.lists)
@@ -139,7 +137,6 @@ def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython
     From each vertex, the path takes the edge that makes the way to the goal shortest, were it straight from there on.
     Where that comes no nearer to the goal, there is no bound.
     """
-    i: cython.int
     length: cython.double = 0.0
     s.aim = goal
     s.within = INFINITY
@@ -170,7 +167,6 @@ def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(W
     No path from a point of e to the goal is shorter than the straight line from an end of e, less the way to that end.
     With the distance of the point added, this falls from one end to the other, so it is least at an end of the window.
     """
-    i: cython.int
     k: cython.int = 0
     # As seen by the windows, whose frame begins at the head of e.
     from_tail: cython.double = straight(s, s.vertex[previous_half_edge(e)])
@@ -293,7 +289,6 @@ def _lowest_key(
     lowest: cython.double = INFINITY
     square: cython.double
     x: cython.double
-    i: cython.int
     for i in range(n):
         w: cython.pointer(Window) = run + i
         if w.is_plane:
@@ -355,7 +350,6 @@ def append(
     mirrored: cython.bint,
 ) -> cython.void:
     """Add windows to those that wait at half-edge t."""
-    i: cython.int
     place: cython.int = s.slot[t]
     to: cython.pointer(Window)
     length: cython.double = s.length[t]

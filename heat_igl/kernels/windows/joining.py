@@ -81,7 +81,6 @@ def _join_neighbours(
     s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int
 ) -> cython.int:
     """Join windows that lie side by side on half-edge h; how many are left."""
-    i: cython.int
     k: cython.int = 1
     length: cython.double = s.length[h]
     u: cython.pointer(Window)
@@ -229,7 +228,6 @@ def _is_covered(
     windows: cython.pointer(Window), n: cython.int, start: cython.double, stop: cython.double
 ) -> cython.bint:
     """Whether a window reaches into an interval: lists are nearly in order."""
-    j: cython.int
     for j in range(n):
         if windows[j].start < stop and windows[j].stop > start:
             return True
@@ -295,7 +293,6 @@ def _as_long(
     w: cython.pointer(cython.const[Window]), more: cython.double, sign: cython.double, at: cython.double
 ) -> cython.double:
     """Where the way over an end is as long, starting from `at`: with a fixed offset it is a point of a hyperbola."""
-    _: cython.int
     constant: cython.double
     for _ in range(_STEPS):
         constant = more - w.turn_x * at

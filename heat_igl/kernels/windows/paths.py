@@ -40,7 +40,6 @@ class InnerSources:
         found: cython.p_double,
     ) -> cython.double:
         """Find the point of a source that is nearest to a point of its face with these sides; the source's offset."""
-        k: cython.int
         i: cython.int = root - self.n
         if i < self.n_points:
             for k in range(3):
@@ -91,7 +90,6 @@ def trace_back(
     root: cython.const[cython.int][::1] = targets.found.root
     entered: cython.const[cython.int][::1] = targets.found.entered
     crossing: cython.const[cython.double][::1] = targets.found.crossing
-    i: cython.Py_ssize_t
     line_end: LineEnd
     here: cython.double[3]
     with cython.nogil:
@@ -141,7 +139,6 @@ class PathTracer:
         """The vertex at which the straight last part of the path to vertex v starts, AT_SOURCE in a face, or LOST."""
         begin: LineEnd
         h: cython.int = self.entered[v]
-        c: cython.int
         corner: cython.double[3]
         there: cython.double[3]
         least: cython.double = INFINITY
@@ -170,7 +167,6 @@ class PathTracer:
         corner: cython.double[3]
         line: Line
         v: cython.int
-        c: cython.int
         here[0], here[1], here[2] = begin.x, begin.y, begin.z
         for c in range(3):
             v = self.vertex[3 * f + c]

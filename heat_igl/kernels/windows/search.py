@@ -109,7 +109,6 @@ def _first(s: cython.pointer(Search)) -> Entry:
 def run(s: cython.pointer(Search)) -> cython.void:
     """Carry lists, and let windows leave vertices, points and segments, in ascending order of their keys."""
     entry: Entry
-    j: cython.int
     s.last_key = s.cutoff * (1.0 + MARGIN) + s.slack
     while s.n_heap > 0 and not s.failed:
         if s.n_nearest > 0 and s.n_touched >= s.n_next:
@@ -172,7 +171,6 @@ def narrow(s: cython.pointer(Search)) -> cython.void:
 
 def forget(s: cython.pointer(Search)) -> cython.void:
     """Clear the entries that a search wrote, for the next search on the same front."""
-    i: cython.int
     v: cython.int
     empty_front(s)
     for i in range(s.n_touched):
@@ -211,7 +209,6 @@ def _load(s: cython.pointer(Search)) -> cython.longlong:
 @cython.nogil
 def _meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
     """Wait for the other thread: first without sleep, since rounds are short."""
-    _: cython.int
     PyThread_release_lock(s.arrived[which])
     for _ in range(TRIES):
         if PyThread_acquire_lock(s.other.arrived[which], NOWAIT_LOCK):
@@ -223,7 +220,6 @@ def _meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
 @cython.nogil
 def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int) -> cython.void:
     """Take distances that the other search has found as upper bounds."""
-    i: cython.int
     for i in range(n):
         if news[i].key < s.upper[news[i].what]:
             s.upper[news[i].what] = news[i].key
@@ -282,7 +278,6 @@ def _balance(s: cython.pointer(Search)) -> cython.bint:
 @cython.nogil
 def _next_seed(s: cython.pointer(Search)) -> cython.int:
     """A half-edge with windows that wait, if possible next to the part of the other thread; -1 if there is none."""
-    i: cython.int
     h: cython.int
     u: cython.int
     v: cython.int
@@ -305,7 +300,6 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
     place: cython.int = s.slot[h]
     one: cython.pointer(List) = cython.address(s.lists[place])
     n: cython.int = one.count
-    i: cython.int
     for i in range(n):
         o.label[one.windows[i].root] = s.label[one.windows[i].root]
     append(o, h, one.windows, n, False, False)
@@ -355,7 +349,6 @@ def _hand_over(s: cython.pointer(Search), o: cython.pointer(Search), amount: cyt
     queue: cython.p_int = cython.cast(cython.p_int, malloc((s.n_lists + 1) * cython.sizeof(cython.int)))
     n: cython.int = 0
     i: cython.int = 0
-    c: cython.int
     k: cython.int
     v: cython.int
     h: cython.int

@@ -57,7 +57,6 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     offset: cython.double = s.point_offset[p]
     at: cython.p_double = s.point + 3 * p
     one: Window
-    c: cython.int
     corner: cython.double[3]
     place_x: cython.double[3]
     place_y: cython.double[3]
@@ -102,7 +101,6 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
     root: cython.int = s.n + s.n_points + i
     ends: cython.p_double = s.segment + 6 * i
     corner: cython.double[3]
-    c: cython.int
     for c in range(3):
         at_corner(c, corner)
         relax(s, s.vertex[3 * f + c], _segment_distance(s, i, corner), root, -1, 0.0, 3 * f, 0.0, 0.0)

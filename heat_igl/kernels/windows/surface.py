@@ -47,9 +47,7 @@ def shapes(tables) -> bool:
     corner_of_vertex: cython.int[::1] = tables.corner_of_vertex
     next_corner: cython.int[::1] = tables.next_corner
     m: cython.int = double_area.shape[0]
-    f: cython.int
     h: cython.int
-    c: cython.int
     a: cython.double
     b: cython.double
     d: cython.double

@@ -134,7 +134,6 @@ def search(
     s: cython.pointer(Search) = cython.address(front.state)
     source: cython.int[::1] = starts.vertices
     offset: cython.double[::1] = starts.offset
-    i: cython.int
     _take_sources(s, starts)
     _take_targets(s, targets)
     s.n_goals = goal.shape[0]
@@ -204,7 +203,6 @@ def _write_within(
     Of each path the root, the corner out of which it leaves that and the half-edge by which it enters its last face;
     and the direction out of the corner and the crossing of the half-edge.
     """
-    i: cython.int
     n: cython.int = 0
     for i in range(s.n_touched):
         v: cython.int = s.touched[i]
@@ -228,7 +226,6 @@ def _write_nearest(
     s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
 ) -> cython.int:
     """Store the nearest vertices in order, equally near ones by ascending name; returns their number."""
-    i: cython.int
     n: cython.int = 0
     for i in range(s.n_touched):
         v: cython.int = s.touched[i]
@@ -291,8 +288,6 @@ def search_each(
         cutoff runs, see `_write_within`, by the numbers of the tables.
     """
     s: cython.pointer(Search) = cython.address(front.state)
-    i: cython.int
-    j: cython.longlong
     n_done: cython.int = 0
     at: cython.longlong = 0
     room: cython.longlong = value.shape[0]
@@ -376,7 +371,6 @@ def pair(
 @cython.cfunc
 def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
     s: cython.pointer(Search) = cython.address(one.state)
-    i: cython.int
     one.arrays += (upper.base,)
     s.other = cython.address(other.state)
     s.upper = cython.address(upper[0])
@@ -394,7 +388,6 @@ def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
 def part(first: Front, second: Front) -> bool:
     """Free what `pair` allocated; false if one thread must search again to get the bits of a search on one thread."""
     one: Front
-    i: cython.int
     for one in (first, second):
         s: cython.pointer(Search) = cython.address(one.state)
         s.other = cython.NULL
