@@ -62,14 +62,6 @@ def test_all_makers_of_curves_say_on_which_mesh():
         assert curve.length == pytest.approx(curve.lengths(mesh).sum())
 
 
-def test_signed_distance_turns_with_the_curve():
-    mesh = shapes.grid(12)
-    curve = curve_through(mesh, [[0.0, 0.5, 0.0], [1.0, 0.5, 0.0]])
-    phi = heat_igl.signed_distance(mesh, curve)
-    np.testing.assert_allclose(phi, 0.5 - mesh.V[:, 1], atol=1e-6)
-    np.testing.assert_allclose(heat_igl.signed_distance(mesh, curve.reversed()), -phi, atol=1e-6)
-
-
 def test_a_number_of_isolines():
     mesh = shapes.grid(20)
     lines = heat_igl.isolines(mesh, 3 * mesh.V[:, 0], 10)

@@ -9,7 +9,6 @@ from conftest import (
     perturbed,
     pygeodesic_distance,
     relative_error,
-    wheel_path,
     zoo,
 )
 from scipy.spatial import Delaunay
@@ -27,7 +26,7 @@ from surfaces import (
     with_point,
 )
 
-from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, read_mesh, shapes
+from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, shapes
 from heat_igl.intrinsic import HalfEdges, intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.windows.exact import ExactSurface, exact_distance
 from heat_igl.windows.tables import from_mesh
@@ -65,13 +64,6 @@ def test_windows_that_passed_a_flat_vertex_are_joined():
     """A plane needs hardly more windows than edges, however many vertices it has."""
     mesh = flat_perturbed(shapes.grid(60))
     assert delaunay(mesh).solve(np.array([0])).n_windows < 3 * len(mesh.edges)
-
-
-def test_rolled_out_prism():
-    mesh = shapes.cylinder(24, 20)
-    ring, k = np.divmod(np.arange(mesh.n_vertices), 24)
-    truth = np.hypot(np.minimum(k, 24 - k) * 2 * np.sin(np.pi / 24), ring * (2 * np.pi / 20))
-    assert relative_error(exact_distance(mesh.V, mesh.F, 0), truth).max() < 1e-12
 
 
 def test_rolled_out_pyramid():
@@ -169,14 +161,10 @@ def test_windows_do_not_multiply_at_edges_of_many_faces(source):
 
 @pytest.mark.parametrize(
     "name",
-    ["pill", "trefoil", "dunes", "elbow", "gear", "sponge", "plate", "hull of 35", "spiky sphere", "fractal terrain"],
+    ["pill", "dunes", "gear", "sponge", "plate", "hull of 35", "spiky sphere", "fractal terrain"],
 )
 def test_surfaces_against_pygeodesic(name):
     assert_agrees(zoo(name), 3)
-
-
-def test_a_model_against_pygeodesic():
-    assert_agrees(read_mesh(wheel_path("cow.obj")), 2)
 
 
 def assert_agrees(mesh: Mesh, n_sources: int) -> None:
@@ -361,29 +349,6 @@ def test_compiled_flips_are_those_of_the_triangulation():
     assert flipped.n_flips > 100
     np.testing.assert_allclose(np.sort(edges.length), np.sort(flipped.l.ravel()), rtol=1e-12)
     np.testing.assert_array_equal(edges.length[edges.twin[edges.twin >= 0]], edges.length[edges.twin >= 0])
-
-
-@pytest.mark.parametrize(
-    "mesh", [shapes.icosphere(3), shapes.grid(8), shapes.torus(9, 14)], ids=["sphere", "grid", "torus"]
-)
-def test_triangulations_in_which_faces_are_there_twice(mesh):
-    """Windows would go on in both copies and multiply: this would not end."""
-    F = np.concatenate([mesh.F, mesh.F[:, [1, 2, 0]], mesh.F[::2]])
-    once, often = (delaunay(each) for each in (mesh, Mesh(mesh.V, F)))
-    expected, found = (surface.solve(np.array([7])) for surface in (once, often))
-    np.testing.assert_allclose(found.distance, expected.distance, rtol=1e-13)
-    assert found.n_windows <= 2 * expected.n_windows
-    # The same places, in first and second copies.
-    rng = np.random.default_rng(0)
-    faces, barycentric = rng.integers(mesh.n_faces, size=9), rng.dirichlet(np.ones(3), 9)
-    first = SurfacePoints(faces, barycentric)
-    expected = once.solve(points=first, targets=first)
-    for places in (first, SurfacePoints(faces + mesh.n_faces, barycentric[:, [1, 2, 0]])):
-        found = often.solve(points=places, targets=first)
-        np.testing.assert_allclose(found.distance, expected.distance, rtol=1e-13)
-        np.testing.assert_allclose(found.target_distance, expected.target_distance, rtol=0, atol=1e-13)
-        found = often.solve(np.array([7]), targets=places)
-        np.testing.assert_allclose(found.target_distance, once.solve(np.array([7]), targets=first).target_distance)
 
 
 def test_straight_past_a_flat_vertex_next_to_the_source():

@@ -139,6 +139,9 @@ def test_faces_that_are_there_twice_count_once() -> None:
     here = SurfacePoints([103], [[0.5, 0.2, 0.3]])
     np.testing.assert_allclose(there.positions(twice), here.positions(TORUS))
     np.testing.assert_allclose(geodesic_distance(twice, there), geodesic_distance(TORUS, here), atol=1e-9)
+    back = [geodesic_distance(twice, 5, method="exact", targets=place) for place in (there, here)]
+    np.testing.assert_allclose(back[0], back[1], rtol=1e-12)
+    np.testing.assert_allclose(back[1], geodesic_distance(TORUS, 5, method="exact", targets=here), rtol=1e-12)
 
 
 def test_a_mesh_that_everybody_has(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -302,13 +302,6 @@ def test_facets_of_tetrahedra_are_opposite_their_corner() -> None:
     assert len(found.vertices) == 7
 
 
-def test_two_cones_that_touch_in_a_point() -> None:
-    F = np.concatenate([TETRAHEDRON_F, np.array([0, 4, 5, 6])[TETRAHEDRON_F]])
-    assert nonmanifold_vertices(F, 7) == [0]
-    assert nonmanifold_vertices(TETRAHEDRON_F, 4) == []
-    assert connectivity.boundary_loops(connectivity.facets(F, 7), 7) == 0
-
-
 def test_distance_along_edges_of_length_zero() -> None:
     """Two vertices in one place are at distance 0 from each other, however the edge between them is stored."""
     mesh = Mesh([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 2, 0], [5, 5, 5]], [[0, 1, 2], [1, 0, 3]])

@@ -92,17 +92,6 @@ def test_several_starting_points_come_first(square):
         heat_igl.farthest_points(solver, 1, start=[20, 0])
 
 
-def test_cells_are_those_of_the_nearest_site(square):
-    mesh, solver = square
-    sites = np.array([400, 3, 225, 77])
-    cells = heat_igl.voronoi_cells(solver, sites)
-    euclidean = np.linalg.norm(mesh.V[:, None] - mesh.V[sites], axis=2)
-    ordered = np.sort(euclidean, axis=1)
-    clear = ordered[:, 1] - ordered[:, 0] > 1e-9
-    assert np.array_equal(cells.labels[clear], euclidean.argmin(axis=1)[clear])
-    np.testing.assert_allclose(cells.distance, ordered[:, 0], atol=1e-9)
-
-
 def test_cells_come_with_the_sampling():
     mesh = two_spheres()
     solver = heat_igl.HeatMethodSolver(mesh)
@@ -220,13 +209,6 @@ def test_diameter_stays_in_the_component_of_the_start():
         _, first, second = heat_igl.diameter(solver, start=start)
         assert mesh.components[first] == mesh.components[second] == mesh.components[start]
     assert heat_igl.diameter(solver, start=mesh.n_vertices - 1)[0] == 0.0
-
-
-def test_distance_matrix_in_the_plane(square):
-    mesh, solver = square
-    chosen = np.random.default_rng(0).permutation(mesh.n_vertices)[:50]
-    matrix = heat_igl.distance_matrix(solver, chosen)
-    np.testing.assert_allclose(matrix, np.linalg.norm(mesh.V[chosen, None] - mesh.V[chosen], axis=2), atol=1e-9)
 
 
 def test_distance_matrix_is_symmetric_and_the_mean_of_both_ways():

@@ -29,7 +29,6 @@ from heat_igl import (
 )
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat.source_terms import SourceTerm
-from heat_igl.reference import edge_paths
 from heat_igl.sources import Sources, source_set, vertex_sources
 from heat_igl.steps import fitted_laplacian
 
@@ -255,14 +254,6 @@ def test_near_field_joins_the_far_field(bunny):
     assert (change <= np.linalg.norm(bunny.V[edges[:, 0]] - bunny.V[edges[:, 1]], axis=1) * (1 + 1e-9)).all()
 
 
-def test_a_ring_of_edges_around_a_vertex_is_straight(cow):
-    solver = HeatMethodSolver(cow)
-    edges = cow.edges[(cow.edges == 50).any(axis=1)]
-    others = edges.sum(axis=1) - 50
-    lengths = np.linalg.norm(cow.V[others] - cow.V[50], axis=1)
-    np.testing.assert_allclose(solver.distance(50)[others], lengths, rtol=1e-12)
-
-
 @pytest.mark.parametrize("amount", [0.0, 0.2])
 def test_a_line_across_the_square(method, amount):
     """Distance is the coordinate across, on both sides; the error falls with the size of the faces."""
@@ -438,19 +429,6 @@ def test_the_dirac_of_a_curve_is_its_length():
     centre = lengths @ (corners[1:] + corners[:-1]) / 2 / lengths.sum()
     assert initial.sum() == pytest.approx(lengths.sum() / (4 * solver.diagnostics.mean_edge_length), rel=1e-9)
     np.testing.assert_allclose(initial @ mesh.V / initial.sum(), centre, atol=1e-9)
-
-
-def test_points_on_pages_of_a_book(method):
-    """Five faces at an edge: the corners of the point's face are straight, other pages are reached over the spine."""
-    mesh = shapes.book(5, 8)
-    solver = SolverChoice(method).on(mesh)
-    face = 20
-    point = SurfacePoints([face], [[0.2, 0.5, 0.3]])
-    distance = solver.distance(point)
-    straight = np.linalg.norm(mesh.V[mesh.F[face]] - point.positions(mesh), axis=1)
-    np.testing.assert_allclose(distance[mesh.F[face]], straight, rtol=1e-9)
-    near = edge_paths(mesh, mesh.F[face]) + straight.max()
-    assert (distance < 1.02 * near).all()
 
 
 def from_edge_lengths(F, lengths, method):
