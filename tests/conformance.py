@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
-from surfaces import dual_of_sphere, moebius_strip
+from surfaces import arcs, dual_of_sphere, moebius_strip
 
 from heat_igl import Mesh, PointCloud, PolygonMesh, image_domain, metric_operators, shapes, speed_operators
 from heat_igl.geodesic import SolverChoice
@@ -137,10 +137,6 @@ def lines(V: np.ndarray) -> Callable[[int], np.ndarray]:
     return lambda source: np.linalg.norm(V - V[source], axis=1)
 
 
-def arcs(V: np.ndarray) -> Callable[[int], np.ndarray]:
-    return lambda source: 2 * np.arcsin(np.clip(lines(V)(source) / 2, 0, 1))
-
-
 def _of_mesh(mesh: Mesh, **others: Any) -> Domain:
     return Domain("simplices", np.array(mesh.V), np.array(mesh.F), **others)
 
@@ -214,9 +210,9 @@ _MAKE: dict[str, Callable[[], Domain]] = {
     "boundary": lambda: _convex(flat_perturbed(shapes.disk(19))),
     "one side": lambda: _of_mesh(moebius_strip(150, 8)),
     "non-manifold": _pages,
-    "polygons": lambda: Domain("polygons", (mesh := dual_of_sphere(3)).V, mesh.polygons, truth=arcs(mesh.V)),
-    "points": lambda: Domain("points", P := _scattered(1500), None, truth=arcs(P)),
-    "points with normals": lambda: Domain("points", P := _scattered(1500), None, P, arcs(P)),
+    "polygons": lambda: Domain("polygons", (mesh := dual_of_sphere(3)).V, mesh.polygons, truth=partial(arcs, mesh.V)),
+    "points": lambda: Domain("points", P := _scattered(1500), None, truth=partial(arcs, P)),
+    "points with normals": lambda: Domain("points", P := _scattered(1500), None, P, partial(arcs, P)),
     "pixels": lambda: _convex(image_domain(np.ones((30, 40), bool), (0.5, 0.7)).mesh),
     "voxels": lambda: _convex(image_domain(np.ones((5, 6, 7), bool), (1.0, 0.8, 0.7)).mesh),
     "tetrahedra": lambda: _convex(_ball_of_tetrahedra()),

@@ -10,6 +10,22 @@ import scipy.spatial
 from conftest import perturbed
 
 from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
+from heat_igl.typing import ArrayLike
+from heat_igl.validation.zoo.registry import joined
+
+
+def twice(mesh: Mesh, apart: float | np.ndarray = 5.0) -> Mesh:
+    """A mesh and its copy so far away, as components of one."""
+    return joined(mesh, Mesh(mesh.V + apart, mesh.F))
+
+
+def nearest_vertex(mesh: Mesh, place: ArrayLike) -> int:
+    return int(np.linalg.norm(mesh.V - place, axis=1).argmin())
+
+
+def arcs(V: np.ndarray, source: int) -> np.ndarray:
+    """Distance on the unit sphere (n,) between points of it."""
+    return 2 * np.arcsin(np.clip(np.linalg.norm(V - V[source], axis=1) / 2, 0, 1))
 
 
 def bumpy() -> Mesh:

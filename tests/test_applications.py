@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from surfaces import twice
 
 import heat_igl
 from heat_igl import shapes
 from heat_igl.applications import EdgePath, EdgeSearch, particle_length, reconstruct, skeleton, zones_of_influence
-from heat_igl.mesh import Mesh
 from heat_igl.reference.baselines import graph_distance
 
 # A* along edges.
@@ -72,7 +72,7 @@ def test_any_landmark_rows_give_shortest_paths():
 
 def test_search_between_components():
     sphere = shapes.icosphere(1)
-    mesh = Mesh(np.concatenate([sphere.V, sphere.V + 5]), np.concatenate([sphere.F, sphere.F + 42]))
+    mesh = twice(sphere)
     rows = np.stack([graph_distance(mesh, 0), graph_distance(mesh, 50)])
     for search in (EdgeSearch(mesh, rows), EdgeSearch(mesh)):
         nowhere = search.path(3, 60)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import typer
 from conftest import ENVIRONMENT, run_python
+from surfaces import twice
 
 import heat_igl
 from heat_igl import MeshError, cli, drawing, io, shapes
@@ -50,9 +51,7 @@ def ball(tmp_path: Path) -> Path:
 def two_spheres(tmp_path: Path) -> Path:
     one = shapes.icosphere(1)
     path = tmp_path / "two.off"
-    io.write_mesh(
-        path, heat_igl.Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
-    )
+    io.write_mesh(path, twice(one))
     return path
 
 

@@ -12,6 +12,7 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from surfaces import arcs, twice
 
 import heat_igl
 from heat_igl import Mesh, MeshError, SourceError, shapes
@@ -395,7 +396,7 @@ def test_the_polygon_solver_measures_a_plane_and_carries_vectors_unturned() -> N
 
 def test_the_cloud_solver_measures_a_sphere(ball: Mesh) -> None:
     solver = pp3d.PointCloudHeatSolver(ball.V)
-    exact = np.arccos(np.clip(ball.V @ ball.V[7], -1, 1))
+    exact = arcs(ball.V, 7)
     assert np.abs(solver.compute_distance(7) - exact).mean() < 0.05
     assert np.array_equal(solver.compute_distance(7), solver.compute_distance_multisource([7]))
     x, y, normal = solver.get_tangent_frames()
@@ -462,7 +463,7 @@ def bumpy() -> Mesh:
 
 def two_parts() -> Mesh:
     square = shapes.grid(4)
-    return Mesh(np.concatenate([square.V, square.V + 3]), np.concatenate([square.F, square.F + square.n_vertices]))
+    return twice(square, 3)
 
 
 @pytest.fixture(params=[bumpy, two_parts, lambda: shapes.torus(14, 9)], ids=["bumpy", "two parts", "torus"])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import perturbed
-from surfaces import moebius_strip
+from surfaces import moebius_strip, nearest_vertex, twice
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, OffsetSources, SurfacePoints, shapes
@@ -120,9 +120,7 @@ def test_a_bend_moves_with_its_vertex() -> None:
     square = shapes.grid(12)
     centre = square.V[square.F].mean(axis=1)
     mesh = Mesh(square.V, square.F[~((centre[:, 0] > 0.5) & (centre[:, 1] > 0.5))])
-    start, end, bend = (
-        int(np.argmin(np.linalg.norm(mesh.V - place, axis=1))) for place in ([1, 0.25, 0], [0.25, 1, 0], [0.5, 0.5, 0])
-    )
+    start, end, bend = (nearest_vertex(mesh, place) for place in ([1, 0.25, 0], [0.25, 1, 0], [0.5, 0.5, 0]))
     solver = GeodesicSolver(mesh, method="exact")
     _, pull_back = solver.distance_vjp(start)
     dV = pull_back(np.eye(mesh.n_vertices)[end])
@@ -202,7 +200,7 @@ def test_sources_that_start_later() -> None:
 def test_unreachable_vertices_have_no_derivative() -> None:
     one = MESHES["grid"]()
     n = one.n_vertices
-    mesh = Mesh(np.concatenate([one.V, one.V + 3.0]), np.concatenate([one.F, one.F + n]))
+    mesh = twice(one, 3.0)
     distance, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(5)
     np.testing.assert_array_equal(pull_back.unreachable, np.arange(n, 2 * n))
     g = np.where(np.isinf(distance), np.nan, 1.0)

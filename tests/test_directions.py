@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed
 from scipy.spatial import ConvexHull
+from surfaces import nearest_vertex, twice
 
 import heat_igl
 from heat_igl import (
@@ -79,8 +80,8 @@ def test_a_path_around_a_corner_departs_towards_the_corner_and_turns_there():
     kept = mesh.F[~(corner > 0.5).all(axis=1)]
     used, F = np.unique(kept, return_inverse=True)
     mesh = Mesh(mesh.V[used], F.reshape(-1, 3))
-    tip = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)))
-    source = int(np.argmin(np.linalg.norm(mesh.V - [1, 0.25, 0], axis=1)))
+    tip = nearest_vertex(mesh, [0.5, 0.5, 0])
+    source = nearest_vertex(mesh, [1, 0.25, 0])
     behind = (mesh.V[:, 1] > 0.5) & (mesh.V[:, 0] > 0.125)
     solver = GeodesicSolver(mesh)
     found = solver.directions(source)
@@ -351,7 +352,7 @@ def followed(mesh: Mesh, found: heat_igl.heat.Directions, v: int) -> np.ndarray:
 
 def test_unreachable_vertices_have_no_direction():
     one = shapes.icosphere(1)
-    mesh = Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
+    mesh = twice(one)
     found = GeodesicSolver(mesh, method="exact").directions(2)
     far = slice(one.n_vertices, None)
     assert np.isinf(found.distance[far]).all()

@@ -18,6 +18,7 @@ from surfaces import (
     bumpy,
     cube,
     moebius_strip,
+    nearest_vertex,
     random_disk,
     rough_field,
     rough_star,
@@ -94,7 +95,7 @@ def test_paths_bend_at_the_boundary(surface):
     mesh = two_arms(8)
     x, y, _ = mesh.V.T
     is_used = np.bincount(mesh.F.ravel(), minlength=mesh.n_vertices) > 0
-    source = int(np.argmin(np.linalg.norm(mesh.V - [-0.1, 0.4, 0], axis=1)))
+    source = nearest_vertex(mesh, [-0.1, 0.4, 0])
     with np.errstate(divide="ignore", invalid="ignore"):
         over_the_corner = y[source] - (y - y[source]) / (x - x[source]) * x[source]
     beyond = is_used & (x > 0) & (over_the_corner > 1e-12)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed
-from surfaces import assert_connected
+from surfaces import assert_connected, twice
 
 import heat_igl
 from heat_igl import (
@@ -251,7 +251,7 @@ def test_handle_loops_without_handles_and_with_boundary():
     torus = shapes.torus(12, 24)
     one_hole = Mesh(torus.V, torus.F[(torus.F != 40).all(axis=1)])
     assert len(handle_loops(one_hole)) == 2
-    both = Mesh(np.concatenate([torus.V, torus.V + 5]), np.concatenate([torus.F, torus.F + torus.n_vertices]))
+    both = twice(torus)
     assert len(handle_loops(both)) == 4
 
 
@@ -391,7 +391,7 @@ def test_bad_waypoints_are_told_apart(sphere):
         geodesic_path(sphere, [SurfacePoints([9999999], [[1, 0, 0]]), 5])
     with pytest.raises(SourceError, match="contracts to a point"):
         geodesic_path(sphere, [7, 7, 7], closed=True)
-    two = Mesh(np.concatenate([sphere.V, sphere.V + 9]), np.concatenate([sphere.F, sphere.F + sphere.n_vertices]))
+    two = twice(sphere, 9)
     with pytest.raises(SourceError, match=r"waypoints\[1\] to waypoints\[2\]: they lie on different components"):
         geodesic_path(two, [0, 5, sphere.n_vertices])
     assert length(sphere, geodesic_path(sphere, [7, 7])) == 0

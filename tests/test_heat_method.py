@@ -8,6 +8,7 @@ import igl
 import numpy as np
 import pytest
 from conftest import perturbed, wheel_path, zoo
+from surfaces import arcs, nearest_vertex
 
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, read_mesh, shapes
 from heat_igl.geodesic import SolverChoice
@@ -258,7 +259,7 @@ def test_grid_450_from_a_corner():
 def test_icosphere_of_655362_vertices():
     mesh = shapes.icosphere(8)
     assert mesh.n_vertices == 655_362
-    exact = np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
+    exact = arcs(mesh.V, 0)
     distance = HeatMethodSolver(mesh).distance(0)
     assert (np.abs(distance - exact)[1:] / exact[1:]).mean() < 0.004
     assert np.abs(distance - exact).max() < 0.01 * np.pi
@@ -296,13 +297,13 @@ def periodic(x, period):
 
 def disk(n: int) -> tuple[Operators, int, np.ndarray]:
     mesh = shapes.disk(n)
-    source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0, 0], axis=1)))
+    source = nearest_vertex(mesh, [0.5, 0, 0])
     return operators(mesh), source, np.linalg.norm(mesh.V - mesh.V[source], axis=1)
 
 
 def sphere(n: int) -> tuple[Operators, int, np.ndarray]:
     mesh = shapes.icosphere(int(np.log2(n)))
-    return operators(mesh), 0, np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
+    return operators(mesh), 0, arcs(mesh.V, 0)
 
 
 def cylinder(n: int) -> tuple[Operators, int, np.ndarray]:
@@ -330,7 +331,7 @@ def flat_torus(n: int) -> tuple[Operators, int, np.ndarray]:
 
 def box(n: int) -> tuple[Operators, int, np.ndarray]:
     mesh = shapes.box(n)
-    source = int(np.argmin(np.linalg.norm(mesh.V - 0.5, axis=1)))
+    source = nearest_vertex(mesh, 0.5)
     return operators(mesh), source, np.linalg.norm(mesh.V - mesh.V[source], axis=1)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import zoo
+from surfaces import arcs, nearest_vertex, twice
 
 import heat_igl
 from heat_igl import shapes
@@ -34,7 +35,7 @@ def sphere() -> tuple[heat_igl.Mesh, int, int, np.ndarray]:
     """The unit sphere, its vertices nearest and farthest to the viewer, and the distance from the nearest."""
     mesh = shapes.icosphere(4)
     front, back = int(np.argmax(mesh.V[:, 2])), int(np.argmin(mesh.V[:, 2]))
-    return mesh, front, back, np.arccos(np.clip(mesh.V @ mesh.V[front], -1, 1))
+    return mesh, front, back, arcs(mesh.V, front)
 
 
 # ---- the file
@@ -221,9 +222,7 @@ def test_isolines_and_stripes_lie_at_the_levels(browser: Browser) -> None:
 
 def test_what_is_not_reached_is_grey(browser: Browser) -> None:
     mesh, x = square()
-    both = heat_igl.Mesh(
-        np.concatenate([mesh.V, mesh.V + np.array([1.5, 0, 0])]), np.concatenate([mesh.F, mesh.F + mesh.n_vertices])
-    )
+    both = twice(mesh, np.array([1.5, 0, 0]))
     browser.open(page(both, np.concatenate([x, np.full_like(x, np.inf)])))
     middle = 10 * 21 + 10
     other = middle + mesh.n_vertices
@@ -427,7 +426,7 @@ def test_a_field_that_does_not_follow_a_click_keeps_its_source(browser: Browser)
     mesh, front, _, distance = sphere()
     browser.open(page(mesh, distance, sources=front, fields={"exact": distance}, beside="exact", view=(0, 0)))
     width = halves(browser.image())[0].shape[1]
-    chosen = int(np.argmin(np.linalg.norm(mesh.V - [0.6, 0.0, 0.8], axis=1)))
+    chosen = nearest_vertex(mesh, [0.6, 0.0, 0.8])
     browser.click(browser.on_canvas(chosen))
     for column, (least, field) in enumerate([(chosen, "distance"), (front, "exact")]):
         image = halves(browser.image())[column]

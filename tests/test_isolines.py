@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from conftest import flat_perturbed, zoo
-from surfaces import assert_connected
+from surfaces import assert_connected, nearest_vertex, twice
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, isolines, shapes, write_curves
@@ -30,7 +30,7 @@ def signed_area(mesh, curve):
 @pytest.mark.parametrize("method", ["heat", "exact"])
 def test_isolines_of_distance_on_a_plane_are_circles(method):
     mesh = flat_perturbed(shapes.grid(160))  # 51 200 triangles
-    source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.5, 0], axis=1)))
+    source = nearest_vertex(mesh, [0.5, 0.5, 0])
     radii = np.array([0.1, 0.25, 0.4])
     phi = SolverChoice(method).on(mesh).distance(source)
     for r, curves, area in zip(radii, isolines(mesh, phi, radii), sublevel_areas(mesh, phi, radii), strict=True):
@@ -128,7 +128,7 @@ def test_separate_regions_have_areas_of_their_own():
 
 def test_an_unreachable_component_is_left_out():
     one = shapes.icosphere(3)
-    both = Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
+    both = twice(one)
     phi = HeatMethodSolver(both).distance(0)
     assert np.isinf(phi[one.n_vertices :]).all()
     curves = isolines(both, phi, [1.0])[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import flat_perturbed
+from surfaces import twice
 
 from heat_igl import (
     Mesh,
@@ -147,7 +148,7 @@ def test_bad_arguments_of_means_are_told_apart(sphere):
     for p in (0.5, np.inf, np.nan, "2", True):
         with pytest.raises(ValueError, match="p must be a number from 1 to 64"):
             karcher_mean(sphere, [1, 2], p=p)
-    two = Mesh(np.concatenate([sphere.V, sphere.V + 9]), np.concatenate([sphere.F, sphere.F + sphere.n_vertices]))
+    two = twice(sphere, 9)
     for p in (1, 2):
         with pytest.raises(SourceError, match="different components"):
             karcher_mean(two, [0, sphere.n_vertices], p=p)

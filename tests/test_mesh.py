@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from surfaces import assert_connected
+from surfaces import assert_connected, twice
 
 import heat_igl
 from heat_igl import (
@@ -544,7 +544,7 @@ def test_positions_in_the_plane():
 def test_a_jump_between_two_sheets_is_refused():
     """Between two parallel sheets the closest point jumps from one to the other."""
     sheet = shapes.grid(4)
-    sheets = Mesh(np.concatenate([sheet.V, sheet.V + np.array([0, 0, 0.2])]), np.concatenate([sheet.F, sheet.F + 25]))
+    sheets = twice(sheet, np.array([0, 0, 0.2]))
     with pytest.raises(SourceError, match=r"line from positions\[0\] jumps from face .* draw it closer"):
         curve_on(sheets, [[0.2, 0.2, 0.05], [0.7, 0.2, 0.15]])
     # The same on one sheet that is folded: the way around the fold leaves the polyline.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from surfaces import nearest_vertex
 
 from heat_igl import (
     AccuracyWarning,
@@ -71,7 +72,7 @@ def test_layers_and_smooth_speeds_of_tetrahedra():
     np.testing.assert_allclose(layers.tensors[:, 0], np.eye(3) / jump[:, None, None] ** 2)
     # On a speed that is linear, distance is that of hyperbolic space.
     at_vertices, speed = 1 + 19 * mesh.V[:, 2], 1 + 19 * mesh.V[mesh.F].mean(axis=1)[:, 2]
-    source = int(np.argmin(np.linalg.norm(mesh.V - 0.5, axis=1)))
+    source = nearest_vertex(mesh, 0.5)
     apart = ((mesh.V - mesh.V[source]) ** 2).sum(axis=1)
     exact = np.arccosh(1 + 19**2 * apart / (2 * at_vertices * at_vertices[source])) / 19
     found = GeodesicSolver(speed_operators(mesh, speed)).distance(source)

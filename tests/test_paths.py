@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed, zoo
-from surfaces import assert_connected, moebius_strip, rough_field, rough_star, two_arms
+from surfaces import assert_connected, moebius_strip, rough_field, rough_star, twice, two_arms
 
 import heat_igl
 from heat_igl import (
@@ -105,7 +105,7 @@ def test_vertices_in_one_place_are_passed():
 
 def two_spheres():
     one = shapes.icosphere(1)
-    return Mesh(np.concatenate([one.V, one.V + 5]), np.concatenate([one.F, one.F + one.n_vertices]))
+    return twice(one)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from surfaces import arcs, twice
 
 import heat_igl
 from heat_igl import shapes
@@ -204,9 +205,7 @@ def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told() -> None:
 
 def test_unreachable_is_grey_and_the_legend_says_so() -> None:
     mesh, x = flat_grid()
-    both = heat_igl.Mesh(
-        np.concatenate([mesh.V, mesh.V + np.array([1.5, 0, 0])]), np.concatenate([mesh.F, mesh.F + mesh.n_vertices])
-    )
+    both = twice(mesh, np.array([1.5, 0, 0]))
     drawn = plot(both, np.concatenate([x, np.full_like(x, np.inf)]), sources=[0])
     image = surface_image(drawn)
     right = image[image.shape[0] // 2, image.shape[1] * 3 // 4]
@@ -220,7 +219,7 @@ def test_unreachable_is_grey_and_the_legend_says_so() -> None:
 def test_sources_in_front_are_dots_and_those_behind_are_rings() -> None:
     sphere = shapes.icosphere(3)
     front, back = int(np.argmax(sphere.V[:, 2])), int(np.argmin(sphere.V[:, 2]))
-    distance = np.minimum(*(np.arccos(np.clip(sphere.V @ sphere.V[s], -1, 1)) for s in (front, back)))
+    distance = np.minimum(*(arcs(sphere.V, s) for s in (front, back)))
     drawn = plot(sphere, distance, sources=[front, back], view=(0, 0))
     assert legend_texts(drawn)[:2] == ["source", "source behind"]
     seen, hidden = drawn.figure.axes[0].collections
@@ -249,7 +248,7 @@ def test_the_default_view_shows_the_source() -> None:
     sphere = shapes.icosphere(3)
     for axis in (0, 2):
         for source in (int(np.argmax(sphere.V[:, axis])), int(np.argmin(sphere.V[:, axis]))):
-            distance = np.arccos(np.clip(sphere.V @ sphere.V[source], -1, 1))
+            distance = arcs(sphere.V, source)
             assert legend_texts(plot(sphere, distance, sources=source))[0] == "source"
 
 
@@ -264,7 +263,7 @@ def test_a_flat_mesh_is_seen_face_on(axes: list[int]) -> None:
 @pytest.mark.parametrize(("scale", "offset"), [(1e-8, 0.0), (1e8, 0.0), (1.0, 1e6)])
 def test_scale_and_place_do_not_change_the_picture(scale: float, offset: float) -> None:
     mesh = shapes.icosphere(2)
-    distance = np.arccos(np.clip(mesh.V @ mesh.V[0], -1, 1))
+    distance = arcs(mesh.V, 0)
     moved = heat_igl.Mesh(mesh.V * scale + offset, mesh.F)
     spacing = 0.25
     a = surface_image(plot(mesh, distance, spacing=spacing))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import surfaces
 from conftest import mean_error
+from surfaces import arcs
 
 import heat_igl
 from heat_igl import (
@@ -41,10 +42,6 @@ HEAT = {"magnitude": "damped"}
 def sphere(n: int, seed: int = 0) -> np.ndarray:
     P = np.random.default_rng(seed).standard_normal((n, 3))
     return P / np.linalg.norm(P, axis=1, keepdims=True)
-
-
-def on_sphere(P: np.ndarray, i: int) -> np.ndarray:
-    return 2 * np.arcsin(np.clip(np.linalg.norm(P - P[i], axis=1) / 2, 0, 1))
 
 
 def plane(n: int, seed: int = 0) -> np.ndarray:
@@ -104,7 +101,7 @@ def test_nothing_depends_on_where_how_large_or_in_which_order() -> None:
 def test_distance_on_a_sphere(options: dict[str, str], most: float) -> None:
     P = sphere(4000)
     distances = SolverChoice.of(**options).on(PointCloud(P)).distances([0, 1, 2])
-    assert mean_error(distances, np.stack([on_sphere(P, i) for i in range(3)])) < most
+    assert mean_error(distances, np.stack([arcs(P, i) for i in range(3)])) < most
 
 
 def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
@@ -133,7 +130,7 @@ def test_noise_is_taken_away_and_clean_points_stay() -> None:
     noisy = P + 0.01 * np.random.default_rng(1).standard_normal(P.shape)
     radius = np.linalg.norm(without_noise(point_tree(noisy)).P, axis=1)
     assert radius.std() < 0.3 * np.linalg.norm(noisy, axis=1).std()
-    assert mean_error(GeodesicSolver(PointCloud(noisy)).distance(0), on_sphere(P, 0)) < 0.03
+    assert mean_error(GeodesicSolver(PointCloud(noisy)).distance(0), arcs(P, 0)) < 0.03
     clean = point_tree(P)
     assert without_noise(clean) is clean
     # Ridges and bumps of a few spacings are detail.
@@ -178,7 +175,7 @@ def test_noise_that_makes_distance_wrong_by_more_than_a_twentieth_is_said(n: int
     said = float(re.search(r"distances are (\d+) % off", str(caught[0].message))[1]) / 100
     sources = range(0, n, n // 10)
     assert said == pytest.approx(
-        mean_error(solver.distances(list(sources)), np.stack([on_sphere(P, i) for i in sources])), rel=0.3
+        mean_error(solver.distances(list(sources)), np.stack([arcs(P, i) for i in sources])), rel=0.3
     )
 
 
@@ -191,7 +188,7 @@ def test_one_point_in_a_hundred_is_an_outlier() -> None:
     assert np.isinf(found[left_out]).all()
     assert len(left_out) > 15
     assert (np.isinf(found[3000:]) | (np.abs(np.linalg.norm(strays, axis=1) - 1) < 0.2)).all()
-    assert mean_error(found[:3000], on_sphere(P, 0)) < 0.003
+    assert mean_error(found[:3000], arcs(P, 0)) < 0.003
 
 
 def test_density_that_grows_a_hundredfold() -> None:

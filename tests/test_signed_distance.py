@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from conftest import flat_perturbed
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay
-from surfaces import moebius_strip
+from surfaces import moebius_strip, nearest_vertex
 
 from heat_igl import (
     AccuracyWarning,
@@ -206,7 +206,7 @@ def test_points_with_normals():
 
 def test_unsigned_sources_among_the_curves():
     mesh, circle, truth = plane(34)
-    points = [int(np.argmin(np.linalg.norm(mesh.V - p, axis=1))) for p in ([0.5, 0.5, 0], [0.05, 0.05, 0])]
+    points = [nearest_vertex(mesh, p) for p in ([0.5, 0.5, 0], [0.05, 0.05, 0])]
     solver = SignedHeatSolver(mesh)
     distance = solver.distance(circle, unsigned=points)
     nearest = np.minimum(np.abs(solver.distance(circle)), geodesic_distance(mesh, points))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import igl
 import numpy as np
 import pytest
+from surfaces import twice
 
 from heat_igl import Mesh, MeshError, PointCloud, SourceError, VoxelBox, shapes, volume_signed_distance
 
@@ -93,7 +94,7 @@ def test_large_grids_keep_directions_far_away():
 
 def test_components_of_the_tetrahedra():
     one = shapes.box(8)
-    both = Mesh(np.vstack([one.V, one.V + np.array([3, 0, 0])]), np.vstack([one.F, one.F + one.n_vertices]))
+    both = twice(one, np.array([3, 0, 0]))
     distance = volume_signed_distance(both, ball())
     assert np.isfinite(distance[: one.n_vertices]).all()
     np.testing.assert_array_equal(distance[one.n_vertices :], np.inf)

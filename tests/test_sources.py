@@ -9,7 +9,7 @@ import igl
 import numpy as np
 import pytest
 from conftest import flat_perturbed, mean_error, perturbed
-from surfaces import to_polyline
+from surfaces import nearest_vertex, to_polyline
 
 from heat_igl import (
     GeodesicSolver,
@@ -213,10 +213,6 @@ def method(request):
 def plane(n: int, amount: float = 0.2) -> Mesh:
     """The unit square, its vertices moved within it."""
     return flat_perturbed(shapes.grid(n), amount)
-
-
-def nearest_vertex(mesh: Mesh, position) -> int:
-    return int(np.linalg.norm(mesh.V - position, axis=1).argmin())
 
 
 @pytest.mark.parametrize("name", ["cow", pytest.param("bunny", marks=pytest.mark.slow)])

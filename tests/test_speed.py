@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from conftest import flat_perturbed, mean_error, perturbed
 from steiner import graph_distance
+from surfaces import nearest_vertex
 
 import heat_igl
 from heat_igl import metric_operators, shapes, speed_operators
@@ -73,7 +74,7 @@ def test_stereographic_projection_of_a_hemisphere():
         mesh = flat_perturbed(shapes.disk(n), 0.25)
         r2 = (mesh.V**2).sum(axis=1, keepdims=True)
         on_sphere = np.concatenate([2 * mesh.V, 1 - r2], axis=1) / (1 + r2)
-        source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0, 0], axis=1)))
+        source = nearest_vertex(mesh, [0.5, 0, 0])
         exact = np.arccos(np.clip(on_sphere @ on_sphere[source], -1, 1))
         speed = (1 + (mesh.V[mesh.F].mean(axis=1) ** 2).sum(axis=1)) / 2
         by_heat, unfolded = (solver(mesh, speed, method=method).distance(source) for method in ("heat", "exact"))
@@ -90,7 +91,7 @@ def test_refraction_at_a_straight_border(speeds):
     for n in (32, 64):
         square = shapes.grid(n)
         mesh = moved_inside(square, np.random.default_rng(0), 0.25 / n, square.V[:, 0] == 0.5)
-        source = int(np.argmin(np.linalg.norm(mesh.V - [0.2, 0.25, 0], axis=1)))
+        source = nearest_vertex(mesh, [0.2, 0.25, 0])
         speed = np.where(mesh.V[mesh.F][:, :, 0].mean(axis=1) < 0.5, *speeds)
         exact = by_fermat(mesh.V, source, *speeds)
         errors.append(mean_error(solver(mesh, speed).distance(source), exact))
@@ -98,7 +99,7 @@ def test_refraction_at_a_straight_border(speeds):
     assert errors[1] < (1e-4 if speeds != (1.0, 2.0) else 5e-4)
     # From the border itself, straight lines in the slow half and the waves that the fast half sends there: they part at
     # the source, and what is wrong on the first ring of vertices stays, a hundredth of an edge.
-    source = int(np.argmin(np.linalg.norm(mesh.V - [0.5, 0.25, 0], axis=1)))
+    source = nearest_vertex(mesh, [0.5, 0.25, 0])
     off = np.abs(solver(mesh, speed).distance(source) - by_fermat(mesh.V, source, *speeds))
     assert off.mean() * min(speeds) < 0.01 / 64
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from surfaces import arcs, twice
 
 import heat_igl
 from heat_igl import Mesh, SourceError, geodesic_errors, parcel_distances, shapes, smooth
@@ -70,7 +71,7 @@ def test_parcel_distances_by_another_method():
 
 def test_parcels_on_other_components_are_infinitely_far():
     square = shapes.grid(2)
-    mesh = Mesh(np.concatenate([square.V, square.V + 2]), np.concatenate([square.F, square.F + 9]))
+    mesh = twice(square, 2)
     labels = np.repeat([0, 1], 9)
     for statistic in ("mean", "min", "centre"):
         found = parcel_distances(mesh, labels, statistic=statistic)
@@ -102,7 +103,7 @@ def test_width_of_a_smoothed_delta_on_a_sphere(fwhm):
     mesh = shapes.icosphere(5)
     delta = np.zeros(mesh.n_vertices)
     delta[77] = 1.0
-    angle = np.arccos(np.clip(mesh.V @ mesh.V[77], -1, 1))
+    angle = arcs(mesh.V, 77)
     assert width(angle, smooth(mesh, delta, fwhm)) == pytest.approx(fwhm, rel=0.015)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay, cKDTree
+from surfaces import nearest_vertex
 
 import heat_igl
 from heat_igl import GeodesicSolver, shapes
@@ -57,7 +58,7 @@ def around_the_edge(V: FloatArray, source: int) -> FloatArray:
 def test_ways_around_an_edge(n, jitter):
     mesh = l_shape(n, jitter)
     for corner in ([1, 0, 0], [2 / 3, 1 / 2, 5 / 6]):
-        source = int(np.argmin(np.linalg.norm(mesh.V - corner, axis=1)))
+        source = nearest_vertex(mesh, corner)
         exact = around_the_edge(mesh.V, source)
         found = GeodesicSolver(mesh).distance(source)
         assert (found >= exact * (1 - 1e-9)).all()
@@ -68,7 +69,7 @@ def test_ways_around_an_edge(n, jitter):
 def test_ways_around_two_edges():
     """Between the legs of a U, around the slot 1/3 < x < 2/3, y > 1/3."""
     mesh = without(12, lambda centre: (np.abs(centre[:, 0] - 0.5) < 1 / 6) & (centre[:, 1] > 1 / 3))
-    source = int(np.argmin(np.linalg.norm(mesh.V - [0, 1, 0], axis=1)))
+    source = nearest_vertex(mesh, [0, 1, 0])
     beyond = (mesh.V[:, 0] >= 2 / 3) & (mesh.V[:, 1] > 1 / 3)
     x, y, z = mesh.V[beyond].T
     flat = np.hypot(1 / 3, 2 / 3) + 1 / 3 + np.hypot(x - 2 / 3, y - 1 / 3)
@@ -107,7 +108,7 @@ def around_the_corner(V: FloatArray, source: int) -> FloatArray:
 @pytest.mark.parametrize("n", [4, 8])
 def test_ways_around_edges_that_are_not_parallel(n):
     mesh = without(n, lambda centre: (centre > 0.5).all(axis=1))
-    source = int(np.argmin(np.linalg.norm(mesh.V - [1, 1, 0], axis=1)))
+    source = nearest_vertex(mesh, [1, 1, 0])
     exact = around_the_corner(mesh.V, source)
     found = GeodesicSolver(mesh).distance(source)
     assert (exact > np.linalg.norm(mesh.V - mesh.V[source], axis=1) * (1 + 1e-6)).sum() > 4
@@ -148,7 +149,7 @@ def test_beyond_an_edge_at_which_two_bodies_touch():
 
 def test_where_two_bodies_share_a_vertex():
     mesh = without(2, lambda centre: np.isin((centre > 0.5).sum(axis=1), [1, 2]), 0.0)
-    middle = int(np.argmin(np.linalg.norm(mesh.V - 0.5, axis=1)))
+    middle = nearest_vertex(mesh, 0.5)
     found = GeodesicSolver(mesh).distance(int(np.argmin(np.linalg.norm(mesh.V, axis=1))))
     beyond = mesh.V.max(axis=1) > 0.5
     through = np.sqrt(0.75) + np.linalg.norm(mesh.V - mesh.V[middle], axis=1)
@@ -295,7 +296,7 @@ def test_a_line_is_not_followed_across_a_gap():
     copies[on_slit] = box.n_vertices + np.arange(len(on_slit))
     F = np.where((centre[:, 0] > 0.5)[:, None], copies[box.F], box.F)
     mesh = Mesh(np.concatenate([box.V, box.V[on_slit]]), F)
-    left, right = (int(np.argmin(np.linalg.norm(mesh.V - [x, 1, 0.5], axis=1))) for x in (0.25, 0.75))
+    left, right = (nearest_vertex(mesh, [x, 1, 0.5]) for x in (0.25, 0.75))
     found = GeodesicSolver(mesh).distance([left, 0])
     assert found[right] == pytest.approx(2 * np.hypot(0.25, 0.5), rel=0.02)
 

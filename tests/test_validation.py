@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import zoo
+from surfaces import twice
 
 import heat_igl
 from heat_igl import (
@@ -421,7 +422,7 @@ def test_near_field_is_the_one_ring() -> None:
 
 def test_wrong_reach_is_counted() -> None:
     one = shapes.grid(2)
-    mesh = Mesh(np.vstack([one.V, one.V + 5]), np.vstack([one.F, one.F + one.n_vertices]))
+    mesh = twice(one)
     truth = closed_forms.plane(one, 0)
     truth = np.concatenate([truth, np.full(9, np.inf)])
     plausible = np.where(np.isinf(truth), 1.0, truth)
