@@ -262,6 +262,16 @@ def _subtract_from_update(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+def _sum_of_eight(a: cython.pointer(entries), f: entries, i: cython.Py_ssize_t) -> cython.double:
+    """Row i of eight columns times their factors, in an order that suits vectors."""
+    return ((a[0][i] * f[0] + a[1][i] * f[1]) + (a[2][i] * f[2] + a[3][i] * f[3])) + (
+        (a[4][i] * f[4] + a[5][i] * f[5]) + (a[6][i] * f[6] + a[7][i] * f[7])
+    )
+
+
+@cython.cfunc
 @cython.nogil
 def _subtract(
     c: numbers,
@@ -275,22 +285,14 @@ def _subtract(
 ) -> cython.void:
     """Subtract from c the columns `first` to `count` of a front, from `row` on, as much as eliminates `factor_row`."""
     t: cython.Py_ssize_t = first
+    a: entries[8]
     f: cython.double[8]
     while t + 8 <= count:
         for k in range(8):
             f[k] = panel[in_panel(t + k, factor_row, size)] * panel[in_panel(t + k, t + k, size)]
-        a0: entries = panel + in_panel(t, row, size)
-        a1: entries = panel + in_panel(t + 1, row, size)
-        a2: entries = panel + in_panel(t + 2, row, size)
-        a3: entries = panel + in_panel(t + 3, row, size)
-        a4: entries = panel + in_panel(t + 4, row, size)
-        a5: entries = panel + in_panel(t + 5, row, size)
-        a6: entries = panel + in_panel(t + 6, row, size)
-        a7: entries = panel + in_panel(t + 7, row, size)
+            a[k] = panel + in_panel(t + k, row, size)
         for i in range(length):
-            c[i] -= ((a0[i] * f[0] + a1[i] * f[1]) + (a2[i] * f[2] + a3[i] * f[3])) + (
-                (a4[i] * f[4] + a5[i] * f[5]) + (a6[i] * f[6] + a7[i] * f[7])
-            )
+            c[i] -= _sum_of_eight(a, f, i)
         t += 8
     while t < count:
         column: entries = panel + in_panel(t, row, size)
@@ -314,6 +316,7 @@ def _subtract_two(
 ) -> cython.void:
     """As `_subtract`, from c for `factor_row` and from d for the row after it: the columns are read once for both."""
     t: cython.Py_ssize_t = 0
+    a: entries[8]
     f: cython.double[8]
     g: cython.double[8]
     while t + 8 <= count:
@@ -321,21 +324,10 @@ def _subtract_two(
             pivot: cython.double = panel[in_panel(t + k, t + k, size)]
             f[k] = panel[in_panel(t + k, factor_row, size)] * pivot
             g[k] = panel[in_panel(t + k, factor_row + 1, size)] * pivot
-        a0: entries = panel + in_panel(t, row, size)
-        a1: entries = panel + in_panel(t + 1, row, size)
-        a2: entries = panel + in_panel(t + 2, row, size)
-        a3: entries = panel + in_panel(t + 3, row, size)
-        a4: entries = panel + in_panel(t + 4, row, size)
-        a5: entries = panel + in_panel(t + 5, row, size)
-        a6: entries = panel + in_panel(t + 6, row, size)
-        a7: entries = panel + in_panel(t + 7, row, size)
+            a[k] = panel + in_panel(t + k, row, size)
         for i in range(length):
-            c[i] -= ((a0[i] * f[0] + a1[i] * f[1]) + (a2[i] * f[2] + a3[i] * f[3])) + (
-                (a4[i] * f[4] + a5[i] * f[5]) + (a6[i] * f[6] + a7[i] * f[7])
-            )
-            d[i] -= ((a0[i] * g[0] + a1[i] * g[1]) + (a2[i] * g[2] + a3[i] * g[3])) + (
-                (a4[i] * g[4] + a5[i] * g[5]) + (a6[i] * g[6] + a7[i] * g[7])
-            )
+            c[i] -= _sum_of_eight(a, f, i)
+            d[i] -= _sum_of_eight(a, g, i)
         t += 8
     _subtract(c, length, panel, size, row, factor_row, t, count)
     _subtract(d, length, panel, size, row, factor_row + 1, t, count)

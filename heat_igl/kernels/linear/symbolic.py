@@ -58,26 +58,36 @@ def _rows_of_front(
     seen_by: cython.longlong[::1],
 ) -> cython.Py_ssize_t:
     """Append the rows of front b, in no order, after those of the fronts before it; return the end."""
-    row: cython.int
     count: cython.Py_ssize_t = first_row[b]
     end: cython.Py_ssize_t = start[b + 1]
     for i in range(start[b], end):
         v: cython.Py_ssize_t = order[i]
         for p in range(ends[v], ends[v + 1]):
-            row = place[neighbours[p]]
-            if row >= end and seen_by[row] != b:
-                seen_by[row] = b
-                rows[count] = row
-                count += 1
+            count = _append(rows, count, place[neighbours[p]], end, seen_by, b)
     c: cython.Py_ssize_t = child[b]
     while c >= 0:
         for p in range(first_row[c], first_row[c + 1]):
-            row = rows[p]
-            if row >= end and seen_by[row] != b:
-                seen_by[row] = b
-                rows[count] = row
-                count += 1
+            count = _append(rows, count, rows[p], end, seen_by, b)
         c = sibling[c]
+    return count
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _append(
+    rows: cython.int[::1],
+    count: cython.Py_ssize_t,
+    row: cython.int,
+    end: cython.Py_ssize_t,
+    seen_by: cython.longlong[::1],
+    b: cython.Py_ssize_t,
+) -> cython.Py_ssize_t:
+    """Append a row of front b, unless it is there already or one of the columns, which `end` follows."""
+    if row >= end and seen_by[row] != b:
+        seen_by[row] = b
+        rows[count] = row
+        count += 1
     return count
 
 
