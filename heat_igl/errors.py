@@ -7,11 +7,11 @@ words.
 from __future__ import annotations
 
 import importlib.util
+import inspect
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import wraps
-from inspect import signature
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -139,7 +139,7 @@ class MissingExtraError(ImportError):
 
 
 def names_guessed(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, whose TypeError for an unknown argument names the nearest one, as Python does from 3.13 on.
+    """The function, whose TypeErrors say how it is called: the nearest name, or what goes by name.
 
     Examples
     --------
@@ -151,12 +151,22 @@ def names_guessed(function: Callable[P, R]) -> Callable[P, R]:
     ...
     geodesic_distance() got an unexpected keyword argument 'cut_off'. Did you mean 'cutoff'?
     """
-    known = [name for name in signature(function).parameters if name != "self"]
+    parameters = list(inspect.signature(function).parameters.values())
+    takes_any = parameters[-1].kind is inspect.Parameter.VAR_KEYWORD
+    known = [each.name for each in parameters if each.name != "self" and each.kind is not each.VAR_KEYWORD]
+    by_name = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
+    most = len(parameters) - len(by_name) - takes_any
 
     @wraps(function)
     def checked(*args: P.args, **named: P.kwargs) -> R:
+        if len(args) > most:
+            order = ", ".join(name for name in known if name not in by_name)
+            others = ", ".join(f"{name}=" for name in (["distance"] if takes_any else by_name))
+            remedy = f"the others go by name ({others})" if others else "there are no others"
+            pair = "; positions V and faces F are one mesh, (V, F)" if "mesh" in known else ""
+            raise TypeError(f"{function.__qualname__}() takes {order} in this order; {remedy}{pair}")
         for name in named:
-            if name not in known:
+            if name not in known and not takes_any:
                 close = "".join(f" Did you mean {guess!r}?" for guess in get_close_matches(name, known, n=1))
                 remedy = close or f" It takes {', '.join(known)}"
                 raise TypeError(f"{function.__qualname__}() got an unexpected keyword argument {name!r}.{remedy}")

@@ -36,7 +36,10 @@ def attached(package: str, file: str) -> tuple[list[str], Callable[[str], object
         if not name.startswith("_"):
             from difflib import get_close_matches
 
-            message += "".join(f"; did you mean {close!r}?" for close in get_close_matches(name, names, n=1))
+            stubs = sorted(Path(file).parent.glob("*/__init__.pyi"))
+            rooms = [stub.parent.name for stub in stubs if f" as {name}\n" in stub.read_text(encoding="utf8")]
+            close = [f"; did you mean {guess!r}?" for guess in get_close_matches(name, names, n=1)]
+            message += "".join([f": it is in {package}.{room}" for room in rooms[:1]] or close)
         # With a name but no object, the interpreter adds no second suggestion.
         raise AttributeError(message, name=name)
 

@@ -18,7 +18,7 @@ layers and faces: Delaunay triangles of random points in the unit square, rotate
 reference is the shortest way through points on the borders, ``--border`` for each edge, or on all edges. Mean and
 largest of |d - reference| / reference, and those of the reference with half as many points.
 grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels as rows, at their centres, from one of
-them. Beside the default: scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal if it is
+them. Beside the default: scikit-fmm (by pip), whose front begins as a circle of 2.5 pixels, and pykonal if it is
 installed. Mean and largest error in percent, and seconds of one query with its preparation. docs/metrics.md has the
 tables.
 """

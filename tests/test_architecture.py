@@ -113,6 +113,8 @@ def test_names_loaded_on_first_use_are_those_of_their_modules():
     assert heat_igl.validate is validation.validate
     assert heat_igl.validation.metrics.__name__ == "heat_igl.validation.metrics"
     assert set(heat_igl.__all__) <= set(dir(heat_igl))
+    with pytest.raises(AttributeError, match=r"no attribute 'handle_loops': it is in heat_igl\.curves$"):
+        heat_igl.handle_loops  # noqa: B018
     with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'; did you mean 'validate'"):
         _ = heat_igl.valdate
     assert not {"Any", "TYPE_CHECKING", "import_module", "re", "Path"} & set(dir(heat_igl))

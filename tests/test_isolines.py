@@ -209,6 +209,8 @@ def circle_and_arc():
 def test_obj_lines_come_back(tmp_path):
     mesh, groups = circle_and_arc()
     write_curves(tmp_path / "lines.obj", mesh, groups)
+    write_curves(tmp_path / "alone.obj", groups)  # the curves know their mesh
+    assert (tmp_path / "alone.obj").read_text() == (tmp_path / "lines.obj").read_text()
     text = (tmp_path / "lines.obj").read_text()
     V = np.array([line.split()[1:] for line in text.splitlines() if line.startswith("v ")], float)
     lines = [np.array(line.split()[1:], int) - 1 for line in text.splitlines() if line.startswith("l ")]

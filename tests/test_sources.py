@@ -26,6 +26,7 @@ from heat_igl import (
     isolines,
     reference,
     shapes,
+    shortest_path,
 )
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat.source_terms import SourceTerm
@@ -469,3 +470,22 @@ def test_depth_in_a_ball():
     assert of_the_paper[2] < 0.005
     assert np.log2(of_the_paper[0] / of_the_paper[2]) > 1
     assert (held < 0.6 * of_the_paper).all()
+
+
+def test_positions_beside_the_surface_are_its_closest_points(sphere: Mesh) -> None:
+    rng = np.random.default_rng(3)
+    points = SurfacePoints(rng.integers(sphere.n_faces, size=4), rng.dirichlet(np.ones(3), 4))
+    beside = points.positions(sphere) * 1.0001  # along the normals of the sphere, nearly those of the faces
+    expected = geodesic_distance(sphere, points)
+    assert abs(geodesic_distance(sphere, beside) - expected).max() < 1e-4
+    for solver in (GeodesicSolver(sphere, tolerance=0), HeatMethodSolver(sphere)):
+        found = solver.distance([OffsetSources(points.positions(sphere)[:2], [0.1, 0.2]), 7])
+        places = SurfacePoints(points.faces[:2], points.barycentric[:2])
+        np.testing.assert_allclose(found, solver.distance([OffsetSources(places, [0.1, 0.2]), 7]), rtol=1e-9, atol=1e-9)
+    one, other = (SurfacePoints(points.faces[[k]], points.barycentric[[k]]) for k in (0, 1))
+    path = shortest_path(sphere, *points.positions(sphere)[:2])
+    assert path.length == pytest.approx(shortest_path(sphere, one, other).length, rel=1e-9)
+    with pytest.raises(SourceError, match=r"sources\[1\] is \S+ away from the surface \(1 of 2 are .*closest_points"):
+        geodesic_distance(sphere, np.array([1.0, 2.0])[:, None] * sphere.V[5])
+    with pytest.raises(SourceError, match="for positions in space, pass the nearest places of the surface"):
+        geodesic_distance(shapes.box(2), [0.0, 0.0, 0.0])

@@ -108,6 +108,8 @@ class SourcePlan:
             if kind != "farthest" or not count.isdecimal() or int(count) < 1:
                 raise SourceError(f"sources must be 'all', 'farthest:K' with K at least 1, or a list, not {sources!r}")
             return cls(farthest=int(count))
+        if isinstance(sources, int | np.integer):
+            sources = [sources]
         if not hasattr(sources, "__len__") or not len(sources):
             raise SourceError(f"sources must be 'all', 'farthest:K' or a list of source sets, not {sources!r}")
         sets = []

@@ -113,7 +113,8 @@ def exact_geodesic(
     VS, VT : (k,) array_like of int
         Vertices that are sources, and targets.
     FS, FT : (k,) array_like of int
-        Triangles whose centroids are sources, and targets.
+        Triangles whose centroids are sources, and targets. Without any targets, as in the older form
+        ``exact_geodesic(v, f, vs, vt)`` of libigl, `FS` are vertices and the targets.
 
     Returns
     -------
@@ -127,18 +128,19 @@ def exact_geodesic(
     SourceError
         If there are targets and no source, or a source is no vertex.
     ValueError
-        If another index is out of range, or there are face sources and no targets, as in the order of older libigl.
+        If another index is out of range.
 
     Notes
     -----
     A centroid becomes a vertex: its triangle is divided into three, which lie in its plane, so no distance changes.
     """
     mesh = Mesh(V, F)
+    if not np.size(VT) + np.size(FT):
+        # The older form; the present igl makes face sources of it, and returns no distances.
+        FS, VT = (), FS
     vertex_sources, vertex_targets = _indices("VS", VS, mesh.n_vertices), _indices("VT", VT, mesh.n_vertices)
     face_sources, face_targets = _indices("FS", FS, mesh.n_faces), _indices("FT", FT, mesh.n_faces)
     if not len(vertex_targets) + len(face_targets):
-        if len(face_sources):
-            raise ValueError("no targets: libigl's older exact_geodesic(v, f, vs, vt) is called with VT=vt now")
         return np.empty(0)
     divided, place = np.unique(np.concatenate([face_sources, face_targets]), return_inverse=True)
     centroids = mesh.n_vertices + place

@@ -9,7 +9,7 @@ from heat_igl.curves.places import Waypoints, mixed_places, snapped
 from heat_igl.curves.shortening import as_curve
 from heat_igl.errors import SourceError, names_guessed, positive, truth
 from heat_igl.heat import SignedHeatSolver
-from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, closest_points
+from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.mesh.grouping import enumerate_runs
 from heat_igl.mesh.projection import ClosestPoints, Projector, checked_points
 from heat_igl.mesh.surface_points import unchecked_curve
@@ -24,7 +24,7 @@ _NEAR_A_JUMP = 0.003
 
 
 @names_guessed
-def curve_through(mesh: MeshLike, points: Waypoints | ArrayLike, *, closed: bool = False) -> SurfaceCurve:
+def curve_through(mesh: MeshLike, points: Waypoints, *, closed: bool = False) -> SurfaceCurve:
     """The curve that passes some places in their order, locally shortest from each to the next.
 
     Parameters
@@ -58,28 +58,13 @@ def curve_through(mesh: MeshLike, points: Waypoints | ArrayLike, *, closed: bool
     1.2
     """
     triangles, closed = as_simplices(mesh), truth("closed", closed)
-    faces, barycentric = mixed_places("points", triangles, _placed(triangles, points))
+    faces, barycentric = mixed_places("points", triangles, points)
     needed = 3 if closed else 2
     if len(faces) < needed:
         raise SourceError(f"points must be {needed} places or more for {'a closed' if closed else 'a'} curve")
     order = np.arange(len(faces) + closed) % len(faces)
     curve = GeodesicPathSolver(triangles).path(SurfacePoints(faces[order], barycentric[order]))
     return unchecked_curve(curve.faces, curve.start, curve.end, closed, triangles)
-
-
-def _placed(mesh: Mesh, points: Waypoints | ArrayLike) -> Waypoints:
-    """Positions in space as the nearest points of a mesh; other places as they are."""
-    first = points[0] if isinstance(points, np.ndarray | list | tuple) and len(points) else None
-    if not isinstance(first, np.ndarray | list | tuple):
-        return points  # type: ignore[return-value]
-    found, nearness = closest_points(mesh, points), float(mesh.edge_lengths.mean())  # type: ignore[arg-type]
-    far = np.flatnonzero(found.gap > nearness)
-    if len(far):
-        raise SourceError(
-            f"points[{far[0]}] is {found.gap[far[0]]:.3g} away from the surface ({len(far)} of {len(found.gap)} are "
-            f"farther than {nearness:.3g}, the mean length of an edge): pass closest_points(mesh, points).points"
-        )
-    return found.points
 
 
 def curve_on(

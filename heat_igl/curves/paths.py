@@ -64,7 +64,7 @@ def shortest_paths(
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
-    chosen = source_set(sources, mesh.n_vertices, mesh.F).with_vertices_moved(mesh.originals)
+    chosen = source_set(sources, mesh.n_vertices, mesh.F, mesh).with_vertices_moved(mesh.originals)
     if region is None:
         face, barycentric = places("targets", mesh, targets)
         return [path.on(mesh) for path in _exact(mesh, chosen, face, barycentric)]

@@ -10,7 +10,8 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
 from heat_igl.mesh.grouping import group_by_label
-from heat_igl.sources import Sources, named_vertices
+from heat_igl.mesh.projection import points_beside
+from heat_igl.sources import Sources, are_positions, named_vertices
 from heat_igl.typing import FloatArray, IntArray
 
 # Vertices, points, or a sequence of both.
@@ -28,6 +29,9 @@ def places(name: str, mesh: Mesh, points: Sources, corner_at: IntArray | None = 
         except SourceError as error:
             raise SourceError(f"{name}: {error}") from None
         return points.faces, snapped(points.barycentric)
+    rows = isinstance(points, np.ndarray | list | tuple) and len(points) > 0 and np.ndim(points[0]) == 1
+    if rows or are_positions(points):
+        return places(name, mesh, points_beside(mesh, points, name))  # type: ignore[arg-type]
     vertex = mesh.originals[named_vertices(points, mesh.n_vertices, name)]
     corner = (corners(mesh) if corner_at is None else corner_at)[vertex]
     if (corner < 0).any():

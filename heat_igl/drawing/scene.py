@@ -143,7 +143,7 @@ def _places(mesh: Mesh, sources: Sources | None) -> tuple[IntArray, FloatArray, 
     """Source vertices (s,), positions of vertices and points (k, 3), and segments of curves (l, 2, 3)."""
     if sources is None:
         return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 2, 3))
-    found = source_set(sources, mesh.n_vertices, None if mesh.is_tetrahedral else mesh.F)
+    found = source_set(sources, mesh.n_vertices, *((None,) if mesh.is_tetrahedral else (mesh.F, mesh)))
     points, segments = found.points, found.segments
 
     def positions(faces: IntArray, barycentric: FloatArray) -> FloatArray:

@@ -36,8 +36,8 @@ def geodesic_distance(
         of trimesh, pyvista, open3d, meshio and others.
     sources : sources
         A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources` if
-        distance begins at other values than 0, or a list of such. Faces of points on polygons are counted as those of
-        ``PolygonMesh.triangles``.
+        distance begins at other values than 0, positions beside the triangles, floats (3,) or (k, 3), or a list of
+        such. Faces of points on polygons are counted as those of ``PolygonMesh.triangles``.
     method : {"auto", "windows", "exact", "sweep", "heat"}
         As for `GeodesicSolver`; "heat" is the heat method as `HeatMethodSolver` has it by default.
     tolerance : float
@@ -103,7 +103,7 @@ def geodesic_distance(
 
 def _on_part(mesh: Mesh, faces: BoolArray, sources: Sources, tolerance: float, cutoff: float) -> FloatArray:
     """Distance (n,) up to the cutoff from vertices, on the faces (m,) that lie within it."""
-    chosen = source_set(sources, mesh.n_vertices, mesh.F)
+    chosen = source_set(sources, mesh.n_vertices, mesh.F, mesh)
     distance = np.full(mesh.n_vertices, np.inf)
     distance[chosen.vertices] = chosen.vertex_offset
     used, numbers = np.unique(mesh.F[faces], return_inverse=True)
@@ -123,7 +123,7 @@ def _within_reach(mesh: Mesh, sources: Sources, cutoff: float) -> BoolArray | No
     """
     if mesh.is_tetrahedral:
         return None
-    chosen = source_set(sources, mesh.n_vertices, mesh.F)
+    chosen = source_set(sources, mesh.n_vertices, mesh.F, mesh)
     if not chosen.on_vertices_alone:
         return None
     starts = mesh.V[chosen.vertices]

@@ -389,7 +389,8 @@ class GeodesicSolver(BatchedSolver):
         part, domain, faces = self._part, self._domain, self._given_faces
         if part is not None:
             faces = None if self._triangles is None else part.whole
-        chosen = source_set(sources, self.n_vertices, faces)
+        surface = domain if part is None and isinstance(domain, Mesh) and not domain.is_tetrahedral else None
+        chosen = source_set(sources, self.n_vertices, faces, surface)
         if self._originals is not None:
             chosen = chosen.with_vertices_moved(self._originals)
         if part is not None:

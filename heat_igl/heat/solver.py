@@ -283,7 +283,8 @@ class HeatMethodSolver(BatchedSolver):
         faces = None if surface is None else surface.given_faces
         if self._part is not None and faces is not None:
             faces = self._part.whole
-        chosen = source_set(sources, self.n_vertices, faces)
+        mesh = self._mesh if isinstance(self._mesh, Mesh) and self._part is None and faces is not None else None
+        chosen = source_set(sources, self.n_vertices, faces, mesh)
         if self._originals is not None:
             chosen = chosen.with_vertices_moved(self._originals)
         if self._part is not None:

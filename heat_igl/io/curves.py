@@ -25,7 +25,7 @@ _Lines = dict[str, list[tuple[FloatArray, bool]]]
 
 
 def write_curves(
-    path: str | os.PathLike[str], mesh: MeshLike, curves: Curves, *, projection: ArrayLike | None = None
+    path: str | os.PathLike[str], mesh: MeshLike, curves: Curves | None = None, *, projection: ArrayLike | None = None
 ) -> None:
     """Write curves on a mesh to a file.
 
@@ -36,8 +36,9 @@ def write_curves(
         row for each point, a closed curve ends with its first), .svg (a drawing in the plane) or .dxf (polylines in
         space). An existing file is replaced only when the new one is complete.
     mesh : mesh
-        Triangles on which the curves lie.
-    curves : SurfaceCurve, sequence of such of any depth, or mapping of str to such
+        Triangles on which the curves lie. It may be left out if the curves know it, as those of this package do:
+        ``write_curves(path, curves)``.
+    curves : SurfaceCurve, sequence of such of any depth, or mapping of str to such, optional
         For instance paths, or isolines as `isolines` returns them, a list for each level. The keys of a mapping become
         groups (OBJ, SVG), a column (CSV) or layers (DXF).
     projection : (2, 3) array_like, optional
@@ -47,7 +48,8 @@ def write_curves(
     Raises
     ------
     ValueError
-        If the extension is unknown, the projection is invalid, or an .svg file needs one because the mesh is not flat.
+        If the extension is unknown, the projection is invalid, an .svg file needs one because the mesh is not flat, or
+        there is no mesh.
     MeshError
         If the file cannot be written.
     TypeError
@@ -72,6 +74,8 @@ def write_curves(
     >>> Path("lines.svg").read_text().count("<polygon")  # closed, one for each level
     3
     """
+    if curves is None:
+        curves, mesh = mesh, _own_mesh(mesh)
     mesh = as_simplices(mesh)
     if not isinstance(path, (str, os.PathLike)):
         raise ValueError(f"path must be a string or a path, not {shown(path)}")
@@ -96,6 +100,15 @@ def write_curves(
         write(temporary, lines)
 
 
+def _own_mesh(curves: Curves) -> Mesh:
+    """The mesh that the first of some curves lies on."""
+    named = flat_curves(list(curves.values()) if isinstance(curves, Mapping) else curves)
+    mesh = named[0].mesh if named else None
+    if mesh is None:
+        raise ValueError("there is no mesh, which these curves do not know: write_curves(path, mesh, curves)")
+    return mesh
+
+
 def _checked_projection(projection: ArrayLike) -> FloatArray:
     matrix = real_numbers("projection", projection)
     if matrix.shape != (2, 3) or not np.isfinite(matrix).all():
@@ -108,8 +121,8 @@ def _plane(mesh: Mesh, path: Path) -> FloatArray:
     axes, off, extent = _flatness(mesh)
     if off > _FLAT * extent:
         raise ValueError(
-            f"{path}: a drawing needs a flat mesh, and this one reaches {off:.3g} off its plane: pass a projection, or "
-            "write .obj or .dxf"
+            f"{path}: a drawing needs a flat mesh, and this one reaches {off:.3g} off its plane: pass a projection, "
+            "as projection=[[1, 0, 0], [0, 1, 0]] along z, or write .obj or .dxf"
         )
     return np.eye(2, 3) if np.ptp(mesh.V[mesh.referenced, 2]) <= _FLAT * extent else axes[:2]
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError
+from heat_igl.errors import MeshError, names_guessed
 from heat_igl.io import by_meshio, by_nibabel, obj, off, ply
 from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
@@ -183,6 +183,7 @@ def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
     return contents.attributes
 
 
+@names_guessed
 def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: ArrayLike) -> None:
     """Write a mesh, with attributes per vertex, to a file.
 

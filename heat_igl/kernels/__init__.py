@@ -6,6 +6,7 @@ A kernel checks nothing that it is given: the modules that call it pass contiguo
 from __future__ import annotations
 
 import json
+import os
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec, source_hash
 from pathlib import Path
@@ -21,10 +22,10 @@ def _require_extensions() -> None:
     source that it compiled; an installed package has no such list and needs none.
     """
     here = Path(__file__).parent
-    suffixes = tuple(EXTENSION_SUFFIXES)
-    compiled = {path.with_name(path.name.partition(".")[0]) for path in here.rglob("*") if path.name.endswith(suffixes)}
-    sources = {path.with_suffix("") for path in here.rglob("*.py") if path.stem != "__init__"}
-    missing = sorted(path.name for path in sources - compiled)
+    files = {(folder, name) for folder, _, names in os.walk(here) for name in names}
+    compiled = {(folder, name.partition(".")[0]) for folder, name in files if name.endswith(tuple(EXTENSION_SUFFIXES))}
+    sources = {(folder, name[:-3]) for folder, name in files if name.endswith(".py") and name != "__init__.py"}
+    missing = sorted(name for _, name in sources - compiled)
     if missing:
         raise ImportError(
             f"heat_igl is imported from {here.parent}, where {len(missing)} of its kernels are not compiled "

@@ -182,6 +182,11 @@ def _converted(mesh: MeshLike, F: ArrayLike | None) -> Mesh | PolygonMesh | Poin
         return read(mesh)
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
         return Mesh(*mesh)
+    if isinstance(mesh, np.ndarray) and mesh.dtype == bool:
+        raise MeshError(
+            "a mask is no mesh: domain = image_domain(mask) is one, domain.index[row, column] a source on it, and "
+            "domain.image(distance) an image again"
+        )
     if isinstance(mesh, np.ndarray):
         raise MeshError(
             "faces F are missing: pass a mesh, positions V and faces F, or a pair (V, F); PointCloud(P) takes points, "

@@ -77,6 +77,25 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
     return Projector(mesh).project(checked_points(positions))
 
 
+def points_beside(mesh: Mesh, positions: ArrayLike, name: str = "positions") -> SurfacePoints:
+    """The closest points of a triangle mesh to positions (k, 3) or (3,) that lie beside it, such as clicked ones.
+
+    Raises
+    ------
+    SourceError
+        As for `closest_points`, or if one of the positions, called `name`, is farther from the surface than the mean
+        length of an edge.
+    """
+    found, nearness = closest_points(mesh, positions), float(mesh.edge_lengths.mean())
+    far = np.flatnonzero(found.gap > nearness)
+    if len(far):
+        raise SourceError(
+            f"{name}[{far[0]}] is {found.gap[far[0]]:.3g} away from the surface ({len(far)} of {len(found.gap)} are "
+            f"farther than {nearness:.3g}, the mean length of an edge): pass closest_points(mesh, {name}).points"
+        )
+    return found.points
+
+
 def checked_points(positions: ArrayLike) -> FloatArray:
     """`positions` as a new (k, 3) float64 array, k at least 1; the errors are those of `closest_points`."""
     array = rows_in_space("positions", positions)

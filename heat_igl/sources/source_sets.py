@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeGuard
+from typing import Any, TypeGuard, cast
 
 import numpy as np
 
 from heat_igl.errors import SourceError, real_numbers, refuse_masked
-from heat_igl.mesh import ON_SIDE, MeshPart, SurfaceCurve, SurfacePoints
+from heat_igl.mesh import ON_SIDE, Mesh, MeshPart, SurfaceCurve, SurfacePoints
+from heat_igl.mesh.projection import points_beside
 from heat_igl.mesh.surface_points import require_faces
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
@@ -158,14 +159,15 @@ _PLACES = (SurfacePoints, SurfaceCurve, OffsetSources)
 Sources = int | np.integer[Any] | Sequence[Any] | AnyArray | SurfacePoints | SurfaceCurve | OffsetSources
 
 
-def source_set(sources: Sources, n: int, F: IntArray | None) -> SourceSet:
+def source_set(sources: Sources, n: int, F: IntArray | None, mesh: Mesh | None = None) -> SourceSet:
     """All that a user may pass as sources, as one checked object; a `SourceError` names the first that is none.
 
     Sources are counted as they are given: the i-th vertex of a sequence, the i-th set entry of a mask, the i-th of
     `SurfacePoints`, a curve as one; over the entries of a list, which may be nested, one after another. The domain has
-    n vertices, and points and curves lie on the triangles F, None if there are none.
+    n vertices, and points and curves lie on the triangles F, None if there are none. Positions in space stand for the
+    closest points of `mesh`, which has these triangles; without it they are an error.
     """
-    builder = _Builder(n, F)
+    builder = _Builder(n, F, mesh)
     builder.add(sources)
     return builder.finish()
 
@@ -198,7 +200,7 @@ def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
         array = np.atleast_1d(np.asarray(sources))
     except ValueError:
         raise SourceError(f"{name} must be {_ACCEPTED}, not a ragged sequence") from None
-    if array.dtype.kind == "f" and array.ndim <= 2 and array.shape[-1] == 3:
+    if are_positions(array):
         raise SourceError(
             f"{name} holds floats of shape {array.shape}: for vertices, convert with astype(int); for positions in "
             f"space, pass the nearest places of the surface, closest_points(mesh, {name}).points"
@@ -224,6 +226,15 @@ def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
             f"to {n - 1}"
         )
     return np.asarray(array, dtype=np.int64)
+
+
+def are_positions(places: object) -> bool:
+    """Whether `places` are positions in space, floats (3,) or (k, 3): no vertices, which are whole numbers."""
+    try:
+        array = np.asarray(places)
+    except ValueError:
+        return False
+    return array.dtype.kind == "f" and array.ndim in (1, 2) and array.shape[-1] == 3
 
 
 def _first_of_wrong_type(array: AnyArray) -> str:
@@ -254,8 +265,8 @@ def _holds_places(sources: object) -> TypeGuard[Sequence[Any]]:
 class _Builder:
     """Collects the parts of a set and counts the sources."""
 
-    def __init__(self, n: int, F: IntArray | None) -> None:
-        self._n, self._F = n, F
+    def __init__(self, n: int, F: IntArray | None, mesh: Mesh | None) -> None:
+        self._n, self._F, self._mesh = n, F, mesh
         self._offset = np.empty(0)  # of each source so far
         self._vertices: list[tuple[IntArray, IntArray]] = []
         self._points: list[tuple[SurfacePoints, IntArray]] = []
@@ -288,6 +299,8 @@ class _Builder:
                     self.add(part)
                 except SourceError as error:
                     raise SourceError(f"sources[{i}]: {error}") from None
+        elif self._mesh is not None and are_positions(sources):
+            self.add(points_beside(self._mesh, cast(ArrayLike, sources), "sources"))
         else:
             vertices = named_vertices(sources, self._n)
             self._vertices.append((vertices, self._counted(len(vertices))))
