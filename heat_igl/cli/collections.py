@@ -84,7 +84,7 @@ def dataset(
     options: dict[str, Any] = {"method": "exact", "tolerance": 0, "dtype": dtype, "normalize": normalize}
     store = output / "distances.zarr"
     with cluster.connected(None, workers) as client, _logged(None):
-        say(_estimate(list(meshes.values()), np.dtype(dtype).itemsize, len(client.nthreads())))
+        say(_estimate(list(meshes.values()), np.dtype(dtype).itemsize, form, len(client.nthreads())))
         report = cluster.distances(
             meshes, "all", store, client=client, progress=Console(stderr=True).is_terminal, **options
         )
@@ -99,18 +99,21 @@ def dataset(
     _finish(report, json_file)
 
 
-def _estimate(paths: list[Path], itemsize: int, n_workers: int) -> str:
+def _estimate(paths: list[Path], itemsize: int, form: str, n_workers: int) -> str:
     """What all pairs take, from some of the meshes; a mesh that cannot be read fails later, with its reason."""
-    seconds, size = [], []
+    seconds = size = timed = 0.0
     for path in paths[:: -(-len(paths) // _SAMPLE)]:
         with suppress(ValueError, OSError, BatchError):
             mesh = heat_igl.read_mesh(path)
-            seconds.append(estimated_seconds(heat_igl.GeodesicSolver(mesh, tolerance=0), np.arange(mesh.n_vertices)))
-            size.append(mesh.n_vertices**2 * itemsize / 1e6)
-    share = len(paths) / max(len(size), 1)
+            solver, vertices = heat_igl.GeodesicSolver(mesh, tolerance=0), np.arange(mesh.n_vertices)
+            seconds += estimated_seconds(solver, vertices, ".mat" if form == "mat" else ".npy")
+            size += mesh.n_vertices**2 * itemsize / 1e6
+            timed += path.stat().st_size ** 2
+    # Both grow with the square of a file's length.
+    share = sum(path.stat().st_size ** 2 for path in paths) / max(timed, 1)
     return (
-        f"all pairs on {len(paths)} meshes: about {sum(seconds) * share * n_threads() / n_workers:.0f} s "
-        f"with {n_workers} workers, and {sum(size) * share:.0f} MB"
+        f"all pairs on {len(paths)} meshes: about {seconds * share * n_threads() / n_workers:.0f} s "
+        f"with {n_workers} workers, and {size * share:.0f} MB"
     )
 
 
