@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import load_script, pygeodesic_distance
 
 from heat_igl import Mesh, geodesic_distance, pair_distances, shapes
+from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.validation.zoo import FAMILIES
-from heat_igl.windows import exact, exact_distance
+from heat_igl.windows import ExactSurface, exact, exact_distance
 
 
 def single_precision_cylinder() -> Mesh:
@@ -71,3 +74,13 @@ def test_every_window_is_a_path(name, seed, source, monkeypatch):
     np.testing.assert_allclose(exact_distance(mesh.V, mesh.F, source), truth, rtol=1e-12)
     monkeypatch.setattr(exact, "TOLERANCE", 0.1)
     np.testing.assert_allclose(exact_distance(mesh.V, mesh.F, source), truth, rtol=1e-12)
+
+
+@pytest.mark.parametrize("wrong", ["aligned", "twin"])
+def test_half_edges_that_are_not_glued_alike_are_refused(wrong):
+    """Windows would go around between them without an end."""
+    given = intrinsic_triangulation(shapes.torus(6, 5), 0)
+    broken = {"aligned": np.arange(given.F.size) != 7, "twin": np.roll(given.twin, 1)}[wrong]
+    assert ExactSurface(given).n == 30
+    with pytest.raises(ValueError, match="not glued alike"):
+        ExactSurface(replace(given, **{wrong: broken}))

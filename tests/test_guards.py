@@ -18,11 +18,11 @@ from heat_igl.kernels.sweep import sweeping
 from heat_igl.kernels.windows import windows
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
-from heat_igl.sweep import SweepEngine
+from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo import FAMILIES
 from heat_igl.validation.zoo.registry import joined
-from heat_igl.windows import Engine, ExactSurface, GuardedEngine, Invariants, WindowEngine
+from heat_igl.windows import Engine, ExactSurface, GuardedEngine, Invariants, WindowEngine, from_vertex
 
 SOURCE, FAR = 40, 399
 
@@ -234,7 +234,122 @@ def test_a_sweep_that_is_wrong_is_named(monkeypatch: pytest.MonkeyPatch, wrong: 
     assert distance[0] == 0 == right[0]
 
 
+def signed(mesh: Mesh) -> FloatArray:
+    return np.abs(heat_igl.SignedHeatSolver(mesh).distance(heat_igl.isolines(mesh, mesh.V[:, 0], [0.43])))
+
+
+# A search whose distances are broken, and an answer by it; bodies and metrics have no straight lines of this mesh.
+PATHS: dict[str, tuple[type, str, Callable[[Mesh], FloatArray]]] = {
+    "cells": (WindowEngine, "labelled", lambda mesh: GeodesicSolver(mesh, method="exact").voronoi(SOURCE).distance),
+    "log map": (WindowEngine, "directed", lambda mesh: heat_igl.log_map(GeodesicSolver(mesh), SOURCE)),
+    "directions": (WindowEngine, "directed", lambda mesh: GeodesicSolver(mesh).directions(SOURCE).distance),
+    "signed": (WindowEngine, "distance", signed),
+}
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.6, np.inf, np.nan])
+@pytest.mark.parametrize("what", PATHS)
+def test_paths_that_are_wrong_are_found_again_or_an_error(
+    monkeypatch: pytest.MonkeyPatch, what: str, factor: float
+) -> None:
+    mesh = shapes.grid(19)
+    engine, name, ask = PATHS[what]
+    right, search = ask(mesh), getattr(engine, name)
+
+    def wrong(*arguments: Any) -> Any:
+        found = search(*arguments)
+        (found[0] if isinstance(found, tuple) else found)[FAR] *= factor
+        return found
+
+    monkeypatch.setattr(engine, name, wrong)
+    if name == "directed":
+        with pytest.raises(RuntimeError, match=f"{FAR}.*report"):
+            ask(mesh)
+    else:
+        with pytest.warns(AccuracyWarning, match=f"{FAR}.*report"):
+            found = ask(mesh)
+        np.testing.assert_allclose(found, right, rtol=0.01)
+
+
+def test_the_log_map_of_a_vertex_that_is_wrong_is_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = shapes.grid(19)
+    right, searched = heat_igl.log_map(mesh, SOURCE), from_vertex.search
+
+    def wrong(*arguments: Any, **options: Any) -> Any:
+        found = searched(*arguments, **options)
+        found.found.distance[7] *= 0.5
+        return found
+
+    monkeypatch.setattr(from_vertex, "search", wrong)
+    np.testing.assert_allclose(heat_igl.log_map(mesh, SOURCE), right, atol=1e-9)
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_local_log_maps_that_are_wrong_are_an_error(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
+    mesh, search = shapes.grid(19), windows.search_each
+
+    def step(*arguments: Any) -> int:
+        done = search(*arguments)
+        WRONG[wrong](arguments[8][: arguments[9][0]])
+        return done
+
+    monkeypatch.setattr(windows, "search_each", step)
+    with pytest.raises(RuntimeError, match=r"from vertex .* report"):
+        heat_igl.log_maps_within(mesh, 0.3, [SOURCE, 60])
+
+
+@pytest.mark.parametrize("wrong", [0.1, 1.5, np.inf, np.nan])
+def test_bodies_and_metrics_stay_between_lines_and_edges(monkeypatch: pytest.MonkeyPatch, wrong: float) -> None:
+    box, grid = shapes.box(5), shapes.grid(9)
+    metric = heat_igl.metric_operators(grid, np.eye(3) * np.exp(grid.V[:, 0])[:, None, None] * np.array([4.0, 1, 1]))
+    for engine, domain, mesh in ((LineEngine, box, box), (HopfLaxEngine, metric, grid)):
+        lower = engine._lower
+
+        def step(
+            self: Any, vertices: IntArray, offset: FloatArray, distance: FloatArray, label: IntArray, lower: Any = lower
+        ) -> None:
+            lower(self, vertices, offset, distance, label)
+            distance[distance > 0] *= wrong
+
+        right = GeodesicSolver(domain).distance(0)
+        monkeypatch.setattr(engine, "_lower", step)
+        found = GeodesicSolver(domain).distance(0)
+        line = np.linalg.norm(mesh.V - mesh.V[0], axis=1)
+        assert (found >= (1 - 1e-8) * line).all()
+        assert np.isfinite(found).all()
+        if engine is LineEngine:
+            assert (
+                Invariants(mesh.F, mesh.components, mesh.V).contradiction(found, source_set(0, len(line), None)) is None
+            )
+        else:
+            assert (found <= 1.4 * right + 1e-12).all()
+
+
 # Heat.
+
+
+HEATED: dict[str, Callable[[], Any]] = {
+    "surface": lambda: shapes.icosphere(3),
+    "tetrahedra": lambda: shapes.box(5),
+    "points": lambda: heat_igl.PointCloud(shapes.icosphere(3).V),
+    "metric": lambda: heat_igl.speed_operators(shapes.grid(19), np.linspace(1, 2, 722)),
+}
+
+
+@pytest.mark.parametrize("domain", HEATED)
+@pytest.mark.parametrize("factor", [0.3, 1.6, np.nan])
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_heat_that_is_wrong_is_told_on_every_domain(
+    monkeypatch: pytest.MonkeyPatch, domain: str, factor: float
+) -> None:
+    solver, solve = HeatMethodSolver(HEATED[domain]()), PoissonProblem.solve
+    monkeypatch.setattr(PoissonProblem, "solve", lambda self, b: factor * solve(self, b))
+    if np.isnan(factor):
+        with pytest.raises(RuntimeError, match="nan at vertex"):
+            solver.distance(SOURCE)
+    else:
+        with pytest.warns(AccuracyWarning, match=r"\d+\.\d % "):
+            solver.distance(SOURCE)
 
 
 def test_heat_is_held_to_the_bounds(monkeypatch: pytest.MonkeyPatch) -> None:

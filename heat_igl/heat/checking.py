@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.kernels.mesh import checking
-from heat_igl.operators import Operators, Surface
+from heat_igl.operators import Operators
 from heat_igl.plan import Plan, sweep_plan
 from heat_igl.sources import SourceSet
 from heat_igl.sweep import SweepEngine
-from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.windows import Engine, OperatorTriangles, WindowEngine
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.windows import Engine, OperatorTriangles, WindowEngine, contradicted
 from heat_igl.windows.bounds import Bounds
 
 # Mean shortfall from which on all distances are raised to straight lines.
@@ -236,10 +236,14 @@ def _kind(sources: SourceSet) -> Kind:
 class Checker:
     """Checks answers on one domain.
 
-    Of the vertices, `referenced` are used by a face. Straight lines need positions V (n, 3).
+    Straight lines need positions V (n, 3) of the given vertices, or `Operators.simplices`.
     """
 
-    def __init__(self, surface: Surface | None, referenced: BoolArray, V: FloatArray | None) -> None:
+    def __init__(self, domain: Operators, V: FloatArray | None) -> None:
+        surface, simplices, referenced = domain.source_surface, domain.simplices, domain.referenced[: domain.n_given]
+        if V is None and simplices is not None and simplices.place is not None:
+            # As far apart as no path is shorter.
+            V = simplices.least * simplices.place
         self._V = None if V is None else np.ascontiguousarray(V, np.float64)
         self._F = None if surface is None else surface.given_faces
         self._bounds = None if surface is None else Bounds(surface)
@@ -253,10 +257,16 @@ class Checker:
         if faces is not None:
             edges = _sample(faces.edges, _MOST_EDGES)
             self._i, self._j, self._length = faces.tail(edges), faces.head(edges), faces.l.ravel()[edges]
+        elif simplices is not None:
+            pairs, lengths = simplices.edges
+            edges = _sample(np.arange(len(lengths)), _MOST_EDGES)
+            (self._i, self._j), self._length = np.ascontiguousarray(pairs[edges].T), lengths[edges]
 
     def check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck:
-        """Check one answer (n,)."""
+        """Check one answer (n,). A RuntimeError where it is no number."""
         distance = np.ascontiguousarray(distance)
+        if np.isnan(distance).any():
+            raise contradicted(f"nan at vertex {np.isnan(distance).argmax()}")
         total, excess, steepest = checking.edge_excess(distance, self._i, self._j, self._length)
         steepness = excess / total if total > 0 else 0.0
         shortfall, largest, shortest = np.nan, np.nan, -1

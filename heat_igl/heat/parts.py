@@ -269,7 +269,7 @@ def prepare(
         time_steps=np.broadcast_to(step, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
-        checker=Checker(domain.source_surface, domain.referenced[: domain.n_given], V),
+        checker=Checker(domain, V),
         comparisons=Comparisons(domain) if is_triangles and options.holds_to_bounds else None,
         is_default=options.holds_to_bounds,
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),

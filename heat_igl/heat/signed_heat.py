@@ -20,12 +20,12 @@ from heat_igl.heat.parts import SolverOptions, prepare
 from heat_igl.heat.solver import HeatMethodSolver
 from heat_igl.intrinsic import IntrinsicTriangulation, oriented
 from heat_igl.linear import Backend
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, one_sided
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, one_sided
 from heat_igl.operators import Operators, operators
 from heat_igl.runtime import both, n_threads, warn_caller
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, require_resolved, source_set
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.windows import ExactSurface, MeshTriangles
+from heat_igl.windows import MeshTriangles, guarded_windows
 
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed_theory.md).
@@ -97,8 +97,7 @@ class SignedHeatSolver:
         self._domain = parts.operators
         self._integration = NormalIntegration(self._mesh, self._faces, triangulation, parts)
         self._unsigned = HeatMethodSolver._of(parts)
-        # On the faces before any flip, in which curves lie.
-        self._exact = ExactSurface(MeshTriangles(self._mesh).faces)
+        self._exact = guarded_windows(MeshTriangles(self._mesh), self._mesh.V)
         self._integrates = not is_default
 
     def __repr__(self) -> str:
@@ -232,15 +231,7 @@ class SignedHeatSolver:
         """Exact distance (n,) from sources without a side."""
         places = source_set(sources, self.n_vertices, self._mesh.F).with_vertices_moved(self._mesh.originals)
         require_resolved(places, self._domain.mean_edge_length)
-        points, segments = places.points, places.segments
-        return self._exact.solve(
-            places.vertices,
-            places.vertex_offset,
-            SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
-            points.offset if len(points.faces) else None,
-            segments if len(segments.faces) else None,
-            threads=n_threads(),
-        ).distance
+        return self._exact.distance(places, threads=n_threads())
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:

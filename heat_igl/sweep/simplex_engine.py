@@ -79,6 +79,8 @@ class SimplexEngine(Engine):
                 for vertex, start in zip(vertices, offset, strict=True):
                     np.minimum(line, start + least * np.linalg.norm(place - place[vertex], axis=1), out=line)
             line[vertices] = offset.min()
+            # In place of a value that is no number, a path along edges is found.
+            distance[np.isnan(distance)] = np.inf
             np.maximum(distance, line * (1 - ROUNDING), out=distance)
         if bounds.is_longer(*self._edges, distance):
             labels = label.astype(np.int64)

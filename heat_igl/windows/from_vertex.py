@@ -11,8 +11,10 @@ from heat_igl.intrinsic import corner_angles, intrinsic_triangulation, polar_ang
 from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
 from heat_igl.kernels.windows.surface import SEVERAL_FANS
 from heat_igl.mesh import Mesh
+from heat_igl.sources import source_set
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.directions import first_parts
+from heat_igl.windows.engine import Invariants
 from heat_igl.windows.exact import Leaving, Searched, search, starts_at
 from heat_igl.windows.tables import Tables, from_mesh
 
@@ -47,7 +49,8 @@ def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
     -------
     (n, 2) float64 or None
         In the frame of the source; 0 at the source and where it does not reach. None if the faces are no oriented
-        manifold, or if fewer than two edges of the mesh at the source are left in the Delaunay triangulation.
+        manifold, if fewer than two edges of the mesh at the source are left in the Delaunay triangulation, or if the
+        distance contradicts itself.
     """
     given = _given_spokes(mesh, source)
     if given is None:
@@ -72,8 +75,11 @@ def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
         angle = np.clip(angle, 0.0, np.pi)
     unit = np.zeros((len(top), 2))
     unit[straight, 0], unit[straight, 1] = np.cos(angle), np.sin(angle)
-    length = tables.unscaled(np.where(done.found.root < 0, 0.0, done.found.distance))
-    return np.asarray((length[:, None] * unit[top])[tables.number])
+    distance = tables.unscaled(done.found.distance)[tables.number]
+    chosen = source_set(source, mesh.n_vertices, mesh.F)
+    if Invariants(mesh.F, mesh.components, mesh.V).contradiction(distance, chosen) is not None:
+        return None
+    return np.asarray(np.where(np.isfinite(distance), distance, 0.0)[:, None] * unit[top][tables.number])
 
 
 def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None:

@@ -27,6 +27,8 @@ FLAT_VERTEX = cython.cast(cython.int, FLAT)
 def shapes(tables) -> bool:
     """Fill what `heat_igl.windows.tables.Tables` holds beside its half-edges; returns whether it is intrinsic Delaunay.
 
+    Raises a ValueError where two half-edges are not glued alike: windows would go around between them without an end.
+
     Of n vertices and m faces:
 
     - `double_area` (m,): twice the area of each face;
@@ -40,6 +42,7 @@ def shapes(tables) -> bool:
     vertex: cython.int[::1] = tables.edges.vertex
     length: cython.double[::1] = tables.edges.length
     twin: cython.int[::1] = tables.edges.twin
+    aligned: cython.uchar[::1] = tables.edges.aligned
     kind: cython.uchar[::1] = tables.kind
     n_corners: cython.int[::1] = tables.n_corners
     double_area: cython.double[::1] = tables.double_area
@@ -52,6 +55,7 @@ def shapes(tables) -> bool:
     b: cython.double
     d: cython.double
     is_delaunay: cython.bint = True
+    broken: cython.int = -1
     with cython.nogil:
         for f in range(m):
             h = 3 * f
@@ -68,11 +72,18 @@ def shapes(tables) -> bool:
                 corner_of_vertex[v] = h + c
                 n_corners[v] += 1
         for h in range(3 * m):
-            if twin[h] > h and bulge[h] + bulge[twin[h]] < -1e-6 * length[h]:
-                is_delaunay = False
-            elif twin[h] == -2:
+            t: cython.int = twin[h]
+            if t == -2:
                 kind[vertex[next_half_edge(h)]] = kind[vertex[previous_half_edge(h)]] = JOINS
                 is_delaunay = False
+            elif t >= 0:
+                tail: cython.int = previous_half_edge(t) if aligned[h] else next_half_edge(t)
+                if twin[t] != h or aligned[t] != aligned[h] or vertex[tail] != vertex[next_half_edge(h)]:
+                    broken = h
+                elif bulge[h] + bulge[t] < -1e-6 * length[h]:
+                    is_delaunay = False
+    if broken >= 0:
+        raise ValueError(f"half-edges {broken} and {twin[broken]} are not glued alike: twin or aligned is wrong there")
     return is_delaunay
 
 
