@@ -629,18 +629,32 @@ def test_fans_stay_that_are_the_only_connection() -> None:
 
 
 def test_points_come_before_their_nearest() -> None:
-    """Even if squares of distances underflow, so that scipy's tree takes others for the point itself."""
+    """Even if squares of distances underflow, so that others are as near as the point itself."""
     P = np.random.default_rng(0).standard_normal((300, 3))
     P[1:40] = P[0] * (1 + 1e-15 * np.arange(1, 40)[:, None])
     P[40:80] = 1e-170 * np.random.default_rng(1).standard_normal((40, 3))
     tree = point_tree(P)
     np.testing.assert_array_equal(tree.P, P[tree.order])
-    index, reach = tree.nearest(np.arange(300), 20)
+    index, reach = tree.neighbours_of(slice(None), 19)
     np.testing.assert_array_equal(index[:, 0], np.arange(300))
     far = np.square(tree.P[:, None] - tree.P).sum(axis=2)
     near = np.take_along_axis(far, index, axis=1)
     np.testing.assert_allclose(near, np.sort(far, axis=1)[:, :20], rtol=1e-12)
     np.testing.assert_allclose(near[:, -1], reach**2, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("n", "k"), [(5, 5), (9, 3), (2000, 1), (2000, 31), (2000, 400)])
+def test_nearest_points_of_places_in_any_order(n: int, k: int) -> None:
+    """Places jump across the cloud, lie far away from it, and come twice."""
+    rng = np.random.default_rng(n + k)
+    tree = point_tree(rng.standard_normal((n, 3)) * 10.0 ** rng.integers(-3, 1, (n, 1)))
+    places = np.concatenate([1e3 * rng.standard_normal((5, 3)), rng.standard_normal((40, 3)), tree.P[::7], tree.P[:1]])
+    index, distance = tree.nearest(places[np.repeat(np.arange(len(places)), 2)], k)
+    far = np.linalg.norm(places[:, None] - tree.P, axis=2)
+    np.testing.assert_allclose(np.take_along_axis(far, index[::2], axis=1), np.sort(far, axis=1)[:, :k], rtol=1e-12)
+    assert (np.diff(np.sort(index, axis=1), axis=1) > 0).all()
+    np.testing.assert_array_equal(index[1::2], index[::2])
+    np.testing.assert_allclose(distance[::2], np.sort(far, axis=1)[:, k - 1], rtol=1e-12)
 
 
 def test_principal_axes() -> None:
@@ -721,7 +735,7 @@ def test_triangles_that_contradict_are_left_out_if_they_are_few_and_on_a_fold() 
 def test_neighbours_across_a_right_angle_stay() -> None:
     P = plane(2000)
     folded = np.where(P[:, :1] < 0.5, P, np.stack([0 * P[:, 0] + 0.5, P[:, 1], P[:, 0] - 0.5], axis=1))
-    index, _ = point_tree(folded).nearest(np.arange(2000), 31)
+    index, _ = point_tree(folded).neighbours
     kept, _, _ = one_sheet(point_tree(folded).P, index, tangent_planes(point_tree(folded).P, index)[0])
     assert (kept[:, :8] >= 0).mean() > 0.99
 

@@ -9,7 +9,7 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.cloud_orientation import turned_groups
-from heat_igl.runtime import over_rows, warn_caller
+from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
 if TYPE_CHECKING:
@@ -23,8 +23,6 @@ _MOST_CONTRADICTING = 0.015
 _NEARLY_ALL = 0.8
 # Heights that are taken for 0, in shares of the distance.
 _ROUNDING = 1e-10
-# Points at a time: bounds the memory for their neighbours.
-_BLOCK = 1 << 12
 
 
 def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[FloatArray | None, BoolArray]:
@@ -46,8 +44,7 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[Float
     n = len(tree.P)
     if normals is None or n <= _K:
         return normals, np.full(n, normals is not None)
-    blocks = over_rows(lambda rows: tree.nearest(np.arange(rows.start, rows.stop), _K + 1)[0][:, 1:], n, _BLOCK)
-    pairs = np.stack([np.repeat(np.arange(n), _K), np.concatenate(blocks).ravel()], axis=1)
+    pairs = np.stack([np.repeat(np.arange(n), _K), tree.neighbours[0][:, 1 : _K + 1].ravel()], axis=1)
     is_opposite = np.einsum("kx,kx->k", normals[pairs[:, 0]], normals[pairs[:, 1]]) < 0
     group, (a, b) = components(pairs[~is_opposite], n), pairs[is_opposite].T
     # Heights of the neighbour over the plane of the point, and of the point over that of the neighbour: the bend of a

@@ -21,7 +21,7 @@ from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, unique_rows
 from heat_igl.mesh.grouping import group_by_label
-from heat_igl.mesh.neighbourhoods import Neighbourhoods
+from heat_igl.mesh.neighbourhoods import Neighbourhoods, PointTree
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
@@ -108,10 +108,8 @@ def _with_isolated_points(P: FloatArray, F: IntArray, near: Neighbourhoods) -> I
     if not len(isolated) or not len(F):
         return F
     of_used = np.flatnonzero(used)
-    from scipy.spatial import KDTree  # takes as long to import as the rest of the package
-
-    distance, position = KDTree(P[of_used]).query(P[isolated])
-    vertex = of_used[position]
+    position, distance = PointTree(P[of_used], of_used).nearest(P[isolated], 1)
+    vertex = of_used[position[:, 0]]
     # Outliers are farther away than a neighbour would be.
     close = distance <= near.radius[vertex]
     return with_points(P, F, near.axes, isolated[close].astype(np.int32), vertex[close])

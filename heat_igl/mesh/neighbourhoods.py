@@ -5,25 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.cloud.empty_balls import on_one_side, roomiest_normals
 from heat_igl.kernels.cloud.local_fits import onto_quadrics, tangent_planes
+from heat_igl.kernels.cloud.nearest_points import nearest_points, tree_of_boxes
 from heat_igl.runtime import over_rows, warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from scipy.spatial import KDTree
 
 # Nearest points from which the plane of a point and its triangles are found.
 _K = 30
 # Points at a time: bounds the memory for their neighbours.
 _BLOCK = 1 << 12
-# Points in a leaf of the tree.
-_LEAF = 32
+# Points in a leaf of the tree that sorts them: as many as in the smallest boxes.
+_LEAF = 8
 # Ratio of the two smaller variances above which neighbours may be on several sheets.
 _SEVERAL_SHEETS = 0.04
 # Directions in which balls are tried, half and their opposites: every 22 degrees. With 60 a tenth of a neighbour
@@ -70,16 +67,29 @@ class PointTree:
     order: IntArray
 
     @cached_property
-    def tree(self) -> KDTree:
-        """The tree of `P`."""
-        return _tree(self.P)
+    def boxes(self) -> FloatArray:
+        """The boxes around them, see `tree_of_boxes`."""
+        boxes: FloatArray = tree_of_boxes(self.P)
+        return boxes
 
-    def nearest(self, chosen: IntArray, k: int) -> tuple[AnyArray, FloatArray]:
-        """The k nearest points (b, k) int32 of some of `P`, themselves first, and the distance (b,) of the last."""
-        distance, index = self.tree.query(self.P[chosen], k)
+    @cached_property
+    def neighbours(self) -> tuple[AnyArray, FloatArray]:
+        """The `_K` nearest other points (n, k + 1) int32 of each, after the point itself, and the distance (n,)."""
+        return self.neighbours_of(slice(None), min(_K, len(self.P) - 1))
+
+    def neighbours_of(self, chosen: slice | IntArray, k: int) -> tuple[AnyArray, FloatArray]:
+        """The k nearest other points (b, k + 1) int32 of some, after the point itself, and the distance (b,)."""
+        points = np.arange(len(self.P))[chosen]
+        blocks = over_rows(lambda rows: self.nearest(self.P[points[rows]], k + 1), len(points), _BLOCK)
+        index, distance = map(np.concatenate, zip(*blocks, strict=True))
         # Squares of distances may underflow, and then others are as near as the point itself.
-        index[:, 0] = chosen
-        return index.astype(np.int32), distance[:, -1]
+        index[:, 0] = points
+        return index, distance
+
+    def nearest(self, places: FloatArray, k: int) -> tuple[AnyArray, FloatArray]:
+        """The k points (b, k) int32 nearest to places (b, 3), and the distance (b,) of the last."""
+        index, distance = nearest_points(self.P, self.boxes, places, k)
+        return index, distance
 
     def moved(self, P: FloatArray) -> PointTree:
         """The same points, in the same order, at other positions (n, 3)."""
@@ -110,15 +120,11 @@ class Neighbourhoods:
 
 def point_tree(P: FloatArray) -> PointTree:
     """The points P (n, 3), sorted as in the leaves of a k-d tree: in the same order, however they were numbered."""
-    order = np.argsort(P @ np.sqrt([1.0, 2.0, 3.0]), kind="stable")
-    order = order[np.asarray(_tree(P[order]).indices, np.int64)]
-    return PointTree(P[order], order)
-
-
-def _tree(P: FloatArray) -> KDTree:
     from scipy.spatial import KDTree  # takes as long to import as the rest of the package
 
-    return KDTree(P, _LEAF)
+    order = np.argsort(P @ np.sqrt([1.0, 2.0, 3.0]), kind="stable")
+    order = order[np.asarray(KDTree(P[order], _LEAF).indices, np.int64)]
+    return PointTree(P[order], order)
 
 
 def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighbourhoods:
@@ -128,24 +134,16 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighb
     1 - (d / r)^2, for d the distance and r the radius of the neighbourhood. Where neighbourhoods are far from flat, at
     edges and thin parts, neighbours on other sheets are left out.
     """
-    P, n = tree.P, len(tree.P)
-    k = min(_K, n - 1)
-    found = Neighbourhoods(np.empty((n, k + 1), np.int32), np.empty(n), np.empty(n), np.empty((n, 3, 3)))
-    bend = np.zeros(n)
-
-    def fill(rows: slice) -> None:
-        index, found.reach[rows] = tree.nearest(np.arange(rows.start, rows.stop), k + 1)
-        if normals is not None:
-            found.radius[rows], found.axes[rows] = found.reach[rows], _axes_along(normals[rows])
-        else:
-            found.axes[rows], found.radius[rows], bend[rows] = tangent_planes(P, index)
-        found.index[rows] = index
-
-    over_rows(fill, n, _BLOCK)
+    P, (index, reach) = tree.P, tree.neighbours
+    if normals is not None:
+        return Neighbourhoods(index, reach, reach, _axes_along(normals))
+    blocks = over_rows(lambda rows: tangent_planes(P, index[rows]), len(P), _BLOCK)
+    axes, radius, bend = map(np.concatenate, zip(*blocks, strict=True))
     bent = np.flatnonzero(bend > _SEVERAL_SHEETS)
     if len(bent):
-        found.index[bent], found.radius[bent], found.axes[bent] = one_sheet(P, found.index[bent], found.axes[bent])
-    return found
+        index = index.copy()
+        index[bent], radius[bent], axes[bent] = one_sheet(P, index[bent], axes[bent])
+    return Neighbourhoods(index, radius, reach, axes)
 
 
 def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -174,7 +172,7 @@ def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[In
     axes : (b, 3, 3) float64
         Two tangents and the normal, in rows, orthonormal.
     """
-    directions = np.ascontiguousarray(_directions(_DIRECTIONS).T)
+    directions = np.ascontiguousarray(_directions(_DIRECTIONS).T, np.float32)
     number = np.full(len(P), -1, np.int32)
     number[index[:, 0]] = np.arange(len(index))
 
@@ -294,13 +292,11 @@ def _spreads(
 def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyArray:
     """The indices (b, k + 1) int32 of some points of the tree and of their k neighbours, among every `stride`-th."""
     if stride == 1:
-        return np.concatenate(over_rows(lambda rows: tree.nearest(chosen[rows], k + 1)[0], len(chosen), _BLOCK))
-    from scipy.spatial import KDTree  # takes as long to import as the rest of the package
-
-    fewer = KDTree(tree.P[::stride])
+        return tree.neighbours[0][chosen, : k + 1] if k <= _K else tree.neighbours_of(chosen, k)[0]
+    fewer = PointTree(np.ascontiguousarray(tree.P[::stride]), tree.order[::stride])
 
     def fill(rows: slice) -> AnyArray:
-        near: AnyArray = stride * fewer.query(tree.P[chosen[rows]], k + 1)[1].astype(np.int32)
+        near: AnyArray = stride * fewer.nearest(tree.P[chosen[rows]], k + 1)[0]
         # The point itself comes first: if it is not among them, in place of the farthest.
         is_other = near[:, 0] != chosen[rows]
         near[is_other, 1:] = near[is_other, :-1]

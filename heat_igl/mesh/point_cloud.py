@@ -208,8 +208,7 @@ class PointCloud:
         is_large = np.bincount(found.components)[found.components] > _MOST_DOUBTFUL * len(self.P)
         beside = np.flatnonzero((near.index[:, -1] < 0) & (found.boundary & is_large)[number])
         if len(beside):
-            nearest = number[tree.nearest(beside, min(_NEAREST + 1, len(number)))[0]]
-            doubtful = np.union1d(doubtful, torn_points(found, nearest))
+            doubtful = np.union1d(doubtful, torn_points(found, number[tree.neighbours[0][beside, : _NEAREST + 1]]))
         if len(doubtful) > _MOST_DOUBTFUL * len(self.P):
             warn_caller(
                 f"the points do not tell their surface: at {len(doubtful)} of {len(self.P)}, among "

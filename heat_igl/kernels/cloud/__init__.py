@@ -3,6 +3,8 @@
 Every point has its k nearest ones, row by row, the point first; points are sorted by the leaves of a tree, so that
 neighbours are near in memory. All kernels take rows, or a range of them, and share no state.
 
+`nearest_points`
+    The k nearest points of each place, by boxes around points that follow each other.
 `local_fits`
     The tangent plane of each neighbourhood by principal components, on fewer points where these are flatter; and the
     quadric through it, onto which noisy points are moved.

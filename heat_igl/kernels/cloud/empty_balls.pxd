@@ -1,3 +1,8 @@
+cdef enum:
+    # Balls along so many directions at a time, which a vector holds; and sums of the three coordinates of these.
+    LANES = 4
+    SUMS = 12
+
 cdef extern from *:
     """
     // Steps from the largest ball to the mean direction of its side.

@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.empty_balls import ROUNDS, TINY
+from cython.cimports.heat_igl.kernels.cloud.empty_balls import LANES, ROUNDS, SUMS, TINY
 from cython.cimports.libc.math import sqrt
 
 
@@ -10,7 +10,7 @@ def roomiest_normals(
     P: cython.const[cython.double][:, ::1],
     index: cython.const[cython.int][:, ::1],
     axes: cython.const[cython.double][:, :, ::1],
-    directions: cython.const[cython.double][:, ::1],
+    directions: cython.const[cython.float][:, ::1],
 ):
     """Normals of points, on the side with most room for balls, and the radii of balls on both sides.
 
@@ -26,8 +26,8 @@ def roomiest_normals(
         Neighbours of some points, by distance and each point first.
     axes : (b, 3, 3) float64
         Orthonormal axes of each of these points, in rows.
-    directions : (3, m) float64
-        Unit vectors in all directions of a half space, along these axes, in columns.
+    directions : (3, m) float32
+        Unit vectors in all directions of a half space, along these axes, in columns; m is a multiple of 4.
 
     Returns
     -------
@@ -40,8 +40,8 @@ def roomiest_normals(
     normals, radii = np.empty((index.shape[0], 3)), np.empty((index.shape[0], 2))
     normal: cython.double[:, ::1] = normals
     radius: cython.double[:, ::1] = radii
-    inverted: cython.double[:, ::1] = np.empty((index.shape[1], 3))
-    shares: cython.double[:, ::1] = np.empty((2, directions.shape[1]))
+    inverted: cython.float[:, ::1] = np.empty((index.shape[1], 3), np.float32)
+    shares: cython.float[:, ::1] = np.empty((2, directions.shape[1]), np.float32)
     local: cython.double[::1] = np.empty(3)
     with cython.nogil:
         for row in range(index.shape[0]):
@@ -61,7 +61,7 @@ def _invert(
     P: cython.const[cython.double][:, ::1],
     index: cython.const[cython.int][::1],
     axes: cython.const[cython.double][:, ::1],
-    inverted: cython.double[:, ::1],
+    inverted: cython.float[:, ::1],
 ) -> cython.double:
     """The neighbours d as 2 R d / |d|^2 (R is returned): the ball of radius R / max(that . u) along u is empty."""
     way: cython.double[3]
@@ -84,25 +84,35 @@ def _invert(
 @cython.cfunc
 @cython.nogil
 def _shares(
-    inverted: cython.double[:, ::1], directions: cython.const[cython.double][:, ::1], share: cython.double[:, ::1]
+    inverted: cython.float[:, ::1], directions: cython.const[cython.float][:, ::1], share: cython.float[:, ::1]
 ) -> cython.void:
     """Radii of the largest empty balls along all directions and opposite to them, in shares of the reach, at most 1."""
-    share[:, :] = 1.0
-    for j in range(inverted.shape[0]):
-        x: cython.double = inverted[j, 0]
-        y: cython.double = inverted[j, 1]
-        z: cython.double = inverted[j, 2]
-        for a in range(share.shape[1]):
-            along: cython.double = x * directions[0, a] + y * directions[1, a] + z * directions[2, a]
-            share[0, a] = along if along > share[0, a] else share[0, a]
-            share[1, a] = -along if -along > share[1, a] else share[1, a]
-    for a in range(share.shape[1]):
-        share[0, a], share[1, a] = 1.0 / share[0, a], 1.0 / share[1, a]
+    x: cython.float[LANES]
+    y: cython.float[LANES]
+    z: cython.float[LANES]
+    most: cython.float[LANES]
+    least: cython.float[LANES]
+    for block in range(share.shape[1] // LANES):
+        begin: cython.Py_ssize_t = LANES * block
+        for lane in range(LANES):
+            x[lane], y[lane] = directions[0, begin + lane], directions[1, begin + lane]
+            z[lane] = directions[2, begin + lane]
+            most[lane], least[lane] = 1.0, -1.0
+        for j in range(inverted.shape[0]):
+            to_x: cython.float = inverted[j, 0]
+            to_y: cython.float = inverted[j, 1]
+            to_z: cython.float = inverted[j, 2]
+            for lane in range(LANES):
+                along: cython.float = to_x * x[lane] + to_y * y[lane] + to_z * z[lane]
+                most[lane] = along if along > most[lane] else most[lane]
+                least[lane] = along if along < least[lane] else least[lane]
+        for lane in range(LANES):
+            share[0, begin + lane], share[1, begin + lane] = 1.0 / most[lane], -1.0 / least[lane]
 
 
 @cython.cfunc
 @cython.nogil
-def _share(inverted: cython.double[:, ::1], u: cython.double[::1], sign: cython.double) -> cython.double:
+def _share(inverted: cython.float[:, ::1], u: cython.double[::1], sign: cython.double) -> cython.double:
     most: cython.double = 1.0
     for j in range(inverted.shape[0]):
         most = max(most, sign * (inverted[j, 0] * u[0] + inverted[j, 1] * u[1] + inverted[j, 2] * u[2]))
@@ -112,41 +122,47 @@ def _share(inverted: cython.double[:, ::1], u: cython.double[::1], sign: cython.
 @cython.cfunc
 @cython.nogil
 def _average(
-    directions: cython.const[cython.double][:, ::1],
-    share: cython.double[:, ::1],
+    directions: cython.const[cython.float][:, ::1],
+    share: cython.float[:, ::1],
     normal: cython.double[::1],
 ) -> cython.void:
     """The mean direction on the side of the largest ball."""
-    side: cython.Py_ssize_t
     best: cython.Py_ssize_t = 0
     of_best: cython.Py_ssize_t = 0
-    mean: cython.double[3]
+    mean: cython.float[SUMS]
     for side in range(2):
         for a in range(share.shape[1]):
             if share[side, a] > share[of_best, best]:
                 of_best, best = side, a
     for x in range(3):
         normal[x] = directions[x, best] if of_best == 0 else -directions[x, best]
-    for _ in range(ROUNDS):
-        mean[0] = mean[1] = mean[2] = 0.0
+    for side in range(2):
         for a in range(share.shape[1]):
-            weight: cython.double = _along(directions, a, normal)
-            side = 0 if weight > 0.0 else 1
-            weight *= share[side, a] * share[side, a] * share[side, a] * share[side, a]
-            for x in range(3):
-                mean[x] += weight * directions[x, a]
-        size: cython.double = sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2])
+            share[side, a] = share[side, a] * share[side, a] * share[side, a] * share[side, a]
+    for _ in range(ROUNDS):
+        ux: cython.float = cython.cast(cython.float, normal[0])
+        uy: cython.float = cython.cast(cython.float, normal[1])
+        uz: cython.float = cython.cast(cython.float, normal[2])
+        for a in range(3 * LANES):
+            mean[a] = 0.0
+        for block in range(share.shape[1] // LANES):
+            for lane in range(LANES):
+                a = LANES * block + lane
+                x_of: cython.float = directions[0, a]
+                y_of: cython.float = directions[1, a]
+                z_of: cython.float = directions[2, a]
+                weight: cython.float = x_of * ux + y_of * uy + z_of * uz
+                weight *= share[0, a] if weight > 0.0 else share[1, a]
+                mean[lane] += weight * x_of
+                mean[LANES + lane] += weight * y_of
+                mean[2 * LANES + lane] += weight * z_of
         for x in range(3):
-            normal[x] = mean[x] / size
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _along(
-    directions: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, u: cython.double[::1]
-) -> cython.double:
-    return directions[0, a] * u[0] + directions[1, a] * u[1] + directions[2, a] * u[2]
+            normal[x] = 0.0
+            for lane in range(LANES):
+                normal[x] += mean[LANES * x + lane]
+        size: cython.double = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+        for x in range(3):
+            normal[x] /= size
 
 
 def on_one_side(
