@@ -24,7 +24,7 @@ import scipy.sparse.linalg as spl
 
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, shapes
 from heat_igl.operators import operators
-from heat_igl.reference import baselines
+from heat_igl.reference import baselines, edge_paths
 from heat_igl.steps import diffuse, integrate, normalize
 
 from harness import Row, Table, parsed, publish
@@ -176,7 +176,7 @@ def varadhan(i: int) -> Rows:
 def small_steps(i: int) -> Rows:
     """Section 4.1: "approximately the combinatorial weighted distance for smaller values of t"."""
     square = shapes.grid(i)
-    d, edges = np.linalg.norm(square.V, axis=1), baselines.graph_distance(square, 0)
+    d, edges = np.linalg.norm(square.V, axis=1), edge_paths(square, 0)
     rows = []
     for coefficient in (100.0, 10.0, 1.0, 0.1, 1e-2, 1e-4):
         solver = HeatMethodSolver(square, laplacian="cotan", t_coef=coefficient)
@@ -247,7 +247,7 @@ def accuracy(i: int) -> Row:
         "bound": float((edges / 2).mean()),
     }
     for name, found in (
-        ("edges", baselines.graph_distance(square, 0, count_edges=True) / i),
+        ("edges", edge_paths(square, 0, count_edges=True) / i),
         ("heat", integrate(domain, normalize(domain, u))),
         ("log_gradient", integrate(domain, normalize(domain, np.log(u)))),
         ("sweep", GeodesicSolver(square, method="sweep").distance(0)),

@@ -9,7 +9,7 @@ from surfaces import twice
 import heat_igl
 from heat_igl import shapes
 from heat_igl.applications import EdgePath, EdgeSearch, particle_length, reconstruct, skeleton, zones_of_influence
-from heat_igl.reference.baselines import graph_distance
+from heat_igl.reference import edge_paths
 
 # A* along edges.
 
@@ -36,7 +36,7 @@ def test_search_expands_few_and_finds_the_same_lengths(bunny, pairs, by_dijkstra
     """The target: at most 0.3 of the vertices that Dijkstra's algorithm expands, with 8 landmarks."""
     solver, vertices = landmarks
     if landmark_distance == "along edges":
-        rows = np.stack([graph_distance(bunny, v) for v in vertices])
+        rows = np.stack([edge_paths(bunny, v) for v in vertices])
     elif landmark_distance == "geodesic":
         rows = heat_igl.GeodesicSolver(bunny, method="exact").distances(vertices)
     else:
@@ -50,7 +50,7 @@ def test_search_expands_few_and_finds_the_same_lengths(bunny, pairs, by_dijkstra
 
 def test_dijkstra_against_scipy(bunny, pairs, by_dijkstra):
     for (a, b), found in list(zip(pairs, by_dijkstra, strict=True))[:3]:
-        assert found.length == pytest.approx(graph_distance(bunny, a)[b], rel=1e-12)
+        assert found.length == pytest.approx(edge_paths(bunny, a)[b], rel=1e-12)
         assert found.vertices[[0, -1]].tolist() == [a, b]
         steps = np.sort(np.stack([found.vertices[:-1], found.vertices[1:]], axis=1), axis=1)
         assert {tuple(step) for step in steps.tolist()} <= {tuple(edge) for edge in bunny.edges.tolist()}
@@ -62,7 +62,7 @@ def test_any_landmark_rows_give_shortest_paths():
     """Rows that are far from a distance still make a true bound, once they are divided by their steepness."""
     mesh = shapes.torus(12, 40)
     rng = np.random.default_rng(1)
-    rows = np.stack([graph_distance(mesh, 0) * 3, rng.uniform(0, 5, mesh.n_vertices)])
+    rows = np.stack([edge_paths(mesh, 0) * 3, rng.uniform(0, 5, mesh.n_vertices)])
     led, plain = EdgeSearch(mesh, rows), EdgeSearch(mesh)
     assert led.steepness[0] == pytest.approx(3, rel=1e-6)
     assert led.steepness[1] > 3
@@ -73,12 +73,12 @@ def test_any_landmark_rows_give_shortest_paths():
 def test_search_between_components():
     sphere = shapes.icosphere(1)
     mesh = twice(sphere)
-    rows = np.stack([graph_distance(mesh, 0), graph_distance(mesh, 50)])
+    rows = np.stack([edge_paths(mesh, 0), edge_paths(mesh, 50)])
     for search in (EdgeSearch(mesh, rows), EdgeSearch(mesh)):
         nowhere = search.path(3, 60)
         assert nowhere.length == np.inf
         assert len(nowhere.vertices) == 0
-        assert search.path(44, 60).length == pytest.approx(graph_distance(mesh, 44)[60])
+        assert search.path(44, 60).length == pytest.approx(edge_paths(mesh, 44)[60])
         here = search.path(7, 7)
         assert (here.length, here.vertices.tolist(), here.n_expanded) == (0.0, [7], 0)
 

@@ -12,7 +12,7 @@ import heat_igl
 from heat_igl import fibre_metric, metric_operators, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators
-from heat_igl.reference.baselines import graph_distance
+from heat_igl.reference import edge_paths
 from heat_igl.typing import FloatArray
 
 
@@ -79,7 +79,7 @@ def test_no_distance_is_negative_where_fibres_change_at_every_edge(ratio):
     for source in (0, 100):
         found, line = distance(domain, source, method="auto"), np.linalg.norm(mesh.V - mesh.V[source], axis=1)
         assert (found >= line * (1 - 1e-9)).all()
-        assert (found <= ratio * graph_distance(mesh, source) * (1 + 1e-9)).all()
+        assert (found <= ratio * edge_paths(mesh, source) * (1 + 1e-9)).all()
 
 
 def test_points_are_sources_in_a_metric():

@@ -1,9 +1,8 @@
 """Other methods for geodesic distance that the paper discusses, for comparison.
 
-Varadhan's formula (`varadhan`), the boundary problem BP (`boundary_problem`) and shortest paths along edges
-(`graph_distance`). By theorem 3.1 (`graph_limit`) the first two tend to distances along edges as t tends to 0. All take
-source vertices and return distances (n,), which are 0 at the sources, ``inf`` at unreachable vertices, and never
-negative.
+Varadhan's formula (`varadhan`) and the boundary problem BP (`boundary_problem`). By theorem 3.1 (`graph_limit`) both
+tend to distances along edges (`heat_igl.reference.edge_paths`) as t tends to 0. They take source vertices and return
+distances (n,), which are 0 at the sources, ``inf`` at unreachable vertices, and never negative.
 
 The heat method uses only the direction of the heat gradient. Varadhan's formula and BP use the magnitude of the heat,
 so all errors of the magnitude (from the time step, the mesh, the boundary and the curvature) become errors of the
@@ -12,7 +11,9 @@ distance.
 Examples
 --------
 >>> import heat_igl
->>> heat_igl.reference.baselines.graph_distance(heat_igl.shapes.strip(4, 3), 0)[[4, 15, 19]].tolist()
+>>> mesh = heat_igl.shapes.strip(4, 3)
+>>> limit = heat_igl.reference.baselines.graph_limit(heat_igl.operators.operators(mesh).L, 0, -1e6)
+>>> limit.round(3)[[4, 15, 19]].tolist()
 [4.0, 3.0, 7.0]
 """
 
@@ -31,7 +32,7 @@ from heat_igl.sources import Sources, vertex_sources
 from heat_igl.steps import HeatFlow, smallest_time_step
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-__all__ = ["boundary_problem", "graph_distance", "graph_limit", "varadhan"]
+__all__ = ["boundary_problem", "graph_limit", "varadhan"]
 
 # Entries of A below this fraction of the largest are rounding errors, not edges of the graph. For example, the two
 # right angles opposite the diagonal of a square have cotangents of 1e-17.
@@ -182,33 +183,6 @@ def _fallen_from_sources(log_heat: FloatArray, domain: Operators, sources: IntAr
     fallen[arrived] = np.maximum(warmest[domain.components[arrived]] - log_heat[arrived], 0.0)
     fallen[sources] = 0.0
     return fallen
-
-
-def graph_distance(mesh: MeshLike, sources: Sources, *, count_edges: bool = False) -> FloatArray:
-    """Length of the shortest path along edges by Dijkstra's algorithm, an upper bound of geodesic distance.
-
-    Parameters
-    ----------
-    mesh : mesh
-        Triangles or tetrahedra.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
-    count_edges : bool
-        Return the smallest number of edges instead of the length; this is the distance of theorem 3.1.
-
-    Returns
-    -------
-    (n,) float64
-        Length in the unit of the mesh, or number of edges; 0 at the sources, ``inf`` at unreachable vertices.
-
-    Raises
-    ------
-    SourceError
-        If the sources are not vertices of the mesh.
-    """
-    mesh = as_simplices(mesh)
-    chosen = vertex_sources(sources, mesh.n_vertices)
-    return connectivity.edge_distance(mesh.edge_graph, chosen, count_edges=count_edges)
 
 
 def graph_limit(A: sp.spmatrix, sources: Sources, log_t: float) -> FloatArray:

@@ -19,10 +19,12 @@ def straight_lines(mesh: MeshLike, sources: Sources) -> FloatArray:
     return np.asarray(distance, dtype=np.float64)
 
 
-def edge_paths(mesh: MeshLike, sources: Sources) -> FloatArray:
+def edge_paths(mesh: MeshLike, sources: Sources, *, count_edges: bool = False) -> FloatArray:
     """Length (n,) of the shortest path along edges from each vertex to the sources (Dijkstra 1959).
 
-    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source.
+    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source. With `count_edges` the
+    smallest number of edges instead, the distance of the paper's theorem 3.1.
     """
     mesh = as_simplices(mesh)
-    return connectivity.edge_distance(mesh.edge_graph, vertex_sources(sources, mesh.n_vertices))
+    chosen = vertex_sources(sources, mesh.n_vertices)
+    return connectivity.edge_distance(mesh.edge_graph, chosen, count_edges=count_edges)
