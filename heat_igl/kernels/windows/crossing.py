@@ -7,7 +7,7 @@ They lose the parts of their half-edge that another path reaches sooner: over an
 import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
-from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, take
+from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, release, take
 from cython.cimports.heat_igl.kernels.windows.joining import (
     carry_joined,
     cut_joined_by_ends,
@@ -45,6 +45,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     error_of,
     is_joined,
     is_within,
+    keep_root,
     lateral,
     reach,
     twice_product,
@@ -303,23 +304,31 @@ def _separate(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.bint:
+    """Whether two windows overlap by little of the half-edge or of both, or not at all: it seldom pays to compare.
+
+    Without a branch: what touches, what overlaps by rounding and what overlaps by more come in any order.
+    """
+    low: cython.double = u.start if u.start > w.start else w.start
+    high: cython.double = u.stop if u.stop < w.stop else w.stop
+    overlap: cython.double = high - low
+    return (overlap < sliver) | ((overlap < OVERLAP * (u.stop - u.start)) & (overlap < OVERLAP * (w.stop - w.start)))
+
+
+@cython.cfunc
 @cython.nogil
 def _settle(
     s: cython.pointer(Search), u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double
 ) -> cython.int:
-    """Cut two windows of one half-edge where the other is nearer. 1: u is gone, 2: w is gone, 4: w comes before u.
-
-    What overlaps by little, of both or of the half-edge, is left: it seldom pays to compare.
-    """
+    """Cut two windows of one half-edge where the other is nearer. 1: u is gone, 2: w is gone, 4: w comes before u."""
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
     until: cython.double[2]
     order: cython.int
     first: cython.int = 4 * ((w.start < u.start) & (w.stop < u.stop))
-    # One test for what touches and what overlaps by rounding: neighbours do either.
-    if high - low < sliver:
-        return first
-    if high - low < OVERLAP * (u.stop - u.start) and high - low < OVERLAP * (w.stop - w.start):
+    if _overlap_little(u, w, sliver):
         return first
     order = _compare(u, w, low, high, until)
     has_errors: cython.bint = s.is_joining
@@ -409,18 +418,27 @@ def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cytho
     Halves that passed a vertex beside the root, one on either side, may have the same root to rounding while they left
     it in directions that differ by the curvature of the vertex: then their half-edge is turned against the corner.
     """
-    if is_joined(u) or is_joined(w):
+    if fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth) or is_joined(u) or is_joined(w):
         return False
     if u.corner == w.corner and fabs(u.turn_x - w.turn_x) + fabs(u.turn_y - w.turn_y) > TURNED:
         return False
     return (
-        fabs(u.x - w.x) <= SAME * (fabs(w.x) + w.depth)
-        and u.root == w.root
+        u.root == w.root
         and fabs(u.offset - w.offset) <= (SAME * (fabs(w.offset) + length) if w.is_plane else 0.0)
         and fabs(u.depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
         and u.start <= w.stop + NARROW * length
         and w.start <= u.stop + NARROW * length
     )
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _is_next(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.bint:
+    """Whether w lies behind u, from another root, and overlaps it by little: `_insert` would add it at the end."""
+    is_before: cython.bint = (w.start < u.start) & (w.stop < u.stop)
+    is_other: cython.bint = fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth)
+    return is_other & (not is_before) & _overlap_little(u, w, sliver)
 
 
 @cython.cfunc
@@ -493,8 +511,6 @@ def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double)
 def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
     """Cut from windows what a path over an end of the half-edge or another window makes useless; how many are left."""
     k: cython.int = 0
-    is_behind: cython.bint
-    u: cython.pointer(Window)
     w: cython.pointer(Window)
     length: cython.double = s.length[h]
     # Over an edge of more than two faces windows come in any order, some of them with the same root on several ways.
@@ -515,10 +531,8 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
             continue
         if w.stop - w.start <= NARROW * length:
             continue
-        u = windows + (k - 1)
         # The usual case: behind the last, and not a half of it.
-        is_behind = k > 0 and (w.start >= u.start) & (w.start > u.stop - SLIVER * length)
-        if is_behind and not is_many and fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
+        if k == 0 or (not is_many and _is_next(windows + (k - 1), w, SLIVER * length)):
             if k < i:
                 windows[k] = w[0]
             k += 1
@@ -712,10 +726,11 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
     scale: cython.double
     if is_joined(w):
         return carry_joined(w, apex, True, out)
-    out[0] = w[0]
+    keep_root(w, out)
     if w.is_plane:
         out.x = w.x * apex.cos_left + w.depth * apex.sin_left
         out.depth = w.depth * apex.cos_left - w.x * apex.sin_left
+        out.turn_x, out.turn_y = w.turn_x, w.turn_y
     else:
         out.x = w.x * apex.cos_left - w.depth * apex.sin_left
         out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
@@ -743,12 +758,13 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
     x: cython.double = apex.length - w.x
     if is_joined(w):
         return carry_joined(w, apex, False, out)
-    out[0] = w[0]
+    keep_root(w, out)
     if w.is_plane:
         out.offset = w.offset + w.x * apex.x + w.depth * apex.y
         out.x = w.x * apex.cos_right - w.depth * apex.sin_right
         out.depth = w.x * apex.sin_right + w.depth * apex.cos_right
         out.turn_x = w.turn_x + w.turn_y * (w.depth * apex.x - w.x * apex.y)
+        out.turn_y = w.turn_y
     else:
         out.x = apex.right_length - (x * apex.cos_right - w.depth * apex.sin_right)
         out.depth = x * apex.sin_right + w.depth * apex.cos_right
@@ -904,7 +920,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
         w = windows + i
         # Windows whose lines would cross a shorter path to the apex go no further.
         # Those that meet ahead may cross that path twice.
-        is_best = apex.best < 0 or i == apex.best or w.depth < 0.0
+        is_best = (apex.best < 0) | (i == apex.best) | (w.depth < 0.0)
         if s.is_joining:
             margin = s.error[s.vertex[h]] + error_of(s, w)
         if w.side != RIGHT_OF_APEX and (
@@ -935,10 +951,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
                 or w.side == LEFT_OF_APEX
                 or _is_behind(w, cython.address(apex), windows + apex.best, False)
             )
-    # The list is free again; its room stays with it.
-    s.lists[place].count = s.free_list
-    s.lists[place].half_edge = -1
-    s.free_list = place
+    release(s, place)
     if n_left > 0:
         add(s, previous_half_edge(h), s.to_left, n_left, True)
     if n_right > 0:

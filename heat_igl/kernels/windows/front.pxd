@@ -19,5 +19,12 @@ cdef void relax(
 cdef void take(Search* s, int j, double distance, int root) noexcept nogil
 cdef void tell(Search* s, int v, double distance) noexcept nogil
 cdef void append(Search* s, int t, Window* run, int n, bint in_front, bint mirrored) noexcept nogil
+
+
+# Make a list free again; its room stays with it.
+cdef inline void release(Search* s, int place) noexcept nogil:
+    s.lists[place].count = s.free_list
+    s.lists[place].half_edge = -1
+    s.free_list = place
 cdef bint has_room(List* one, int n) noexcept nogil
 cdef void add(Search* s, int e, Window* run, int n, bint in_front) noexcept nogil

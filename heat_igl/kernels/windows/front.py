@@ -27,7 +27,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
 from cython.cimports.heat_igl.kernels.windows.surface import classify, third
 from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdlib import free, malloc, realloc
-from cython.cimports.libc.string import memcpy, memmove
+from cython.cimports.libc.string import memmove
 
 
 def allocate(s: cython.pointer(Search)) -> cython.void:
@@ -279,33 +279,26 @@ def _joined_key(w: cython.pointer(Window), length: cython.double, bulge: cython.
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _lowest_key(
-    s: cython.pointer(Search), run: cython.pointer(Window), n: cython.int, length: cython.double, bulge: cython.double
+def _key(
+    s: cython.pointer(Search), w: cython.pointer(Window), length: cython.double, bulge: cython.double
 ) -> cython.double:
-    """The lowest key of n windows, the same in both frames of their half-edge.
+    """The key of a window, the same in both frames of its half-edge.
 
     Of parallel lines, the power of the root becomes the distance of the circle's centre.
     """
-    lowest: cython.double = INFINITY
     square: cython.double
     x: cython.double
-    for i in range(n):
-        w: cython.pointer(Window) = run + i
-        if w.is_plane:
-            x = w.x * length + w.depth * bulge
-            x = 0.5 * x if s.is_delaunay else w.x * (w.start if w.x > 0.0 else w.stop)
-            lowest = min(lowest, w.offset + x)
-            continue
-        if is_joined(w):
-            lowest = min(lowest, _joined_key(w, length, bulge))
-            continue
-        if s.is_delaunay:
-            square = w.x * (w.x - length) + w.depth * (w.depth + bulge)
-        else:
-            x = max(w.start - w.x, w.x - w.stop, 0.0)
-            square = x * x + w.depth * w.depth
-        lowest = min(lowest, w.offset + sqrt(max(square, 0.0)))
-    return lowest
+    if w.is_plane:
+        x = w.x * length + w.depth * bulge
+        return w.offset + (0.5 * x if s.is_delaunay else w.x * (w.start if w.x > 0.0 else w.stop))
+    if is_joined(w):
+        return _joined_key(w, length, bulge)
+    if s.is_delaunay:
+        square = w.x * (w.x - length) + w.depth * (w.depth + bulge)
+    else:
+        x = max(w.start - w.x, w.x - w.stop, 0.0)
+        square = x * x + w.depth * w.depth
+    return w.offset + sqrt(max(square, 0.0))
 
 
 def has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
@@ -353,14 +346,13 @@ def append(
     place: cython.int = s.slot[t]
     to: cython.pointer(Window)
     length: cython.double = s.length[t]
-    lowest: cython.double = _lowest_key(s, run, n, length, s.bulge[t])
-    if place < 0:
-        if lowest > s.last_key:
-            return
+    bulge: cython.double = s.bulge[t]
+    lowest: cython.double = INFINITY
+    is_new: cython.bint = place < 0
+    if is_new:
         place = _free_list(s)
         if place < 0:
             return
-        s.slot[t] = place
         s.lists[place].half_edge = t
         s.lists[place].count = 0
         s.lists[place].key = INFINITY
@@ -368,20 +360,25 @@ def append(
     if not has_room(one, n):
         s.failed = True
         return
+    to = one.windows + one.count
     if in_front != mirrored:
-        if one.count > 0:
-            memmove(one.windows + n, one.windows, one.count * cython.sizeof(Window))
         to = one.windows
-    else:
-        to = one.windows + one.count
+        if one.count > 0:
+            memmove(to + n, to, one.count * cython.sizeof(Window))
+    for i in range(n):
+        lowest = min(lowest, _key(s, run + i, length, bulge))
+        if mirrored:
+            to[n - 1 - i] = _mirrored(run[i], length)
+        else:
+            to[i] = run[i]
+    if is_new:
+        if lowest > s.last_key:
+            release(s, place)
+            return
+        s.slot[t] = place
     one.count += n
     s.n_windows += n
     s.n_waiting += n
-    if mirrored:
-        for i in range(n):
-            to[i] = _mirrored(run[n - 1 - i], length)
-    else:
-        memcpy(to, run, n * cython.sizeof(Window))
     if lowest < one.key:
         one.key = lowest
         push(s, lowest, t)

@@ -17,7 +17,7 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, prev
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.signals import is_interrupted
 from cython.cimports.heat_igl.kernels.windows.crossing import cross, over_corners
-from cython.cimports.heat_igl.kernels.windows.front import append, empty_front, pop, push
+from cython.cimports.heat_igl.kernels.windows.front import append, empty_front, pop, push, release
 from cython.cimports.heat_igl.kernels.windows.joining import may_join
 from cython.cimports.heat_igl.kernels.windows.sources import emit_point, emit_segment, emit_vertex
 from cython.cimports.heat_igl.kernels.windows.structures import (
@@ -306,9 +306,7 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
     o.n_windows -= n
     s.n_waiting -= n
     s.slot[h] = -1
-    one.count = s.free_list
-    one.half_edge = -1
-    s.free_list = place
+    release(s, place)
     return n + PER_LIST
 
 

@@ -253,7 +253,7 @@ cdef extern from *:
 # the two longest sides: on needles too, the cosine is off by no more than rounding of one.
 cdef inline double twice_product(double p, double q, double opposite) noexcept nogil:
     cdef double longer = p if p > q else q
-    cdef double shorter = q if p > q else p
+    cdef double shorter = p if q > p else q  # not by the same comparison: then compilers make a branch of both
     return (longer - opposite) * (longer + opposite) + shorter * shorter
 
 
@@ -309,6 +309,15 @@ cdef inline double straight(const Search* s, int v) noexcept nogil:
 
 cdef inline bint is_joined(const Window* w) noexcept nogil:
     return w.corner < 0
+
+
+# Copy what windows of one root share, in the pieces that were written last: the processor waits for a wider copy.
+cdef inline void keep_root(const Window* w, Window* out) noexcept nogil:
+    out.offset = w.offset
+    out.root = w.root
+    out.is_plane = w.is_plane
+    out.corner = w.corner
+    out.side = w.side
 
 
 # What a window adds to its offset at a point of its half-edge.
