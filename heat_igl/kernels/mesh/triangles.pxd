@@ -1,12 +1,12 @@
 from libc.math cimport sqrt
 
-# Half-edge 3 f + c is the side of face f opposite corner c.
+# Half-edge 3 f + c is the side of face f opposite corner c. Without a branch: corners come in any order.
 
 cdef inline int next_half_edge(int h) noexcept nogil:
-    return h - 2 if h % 3 == 2 else h + 1
+    return h + 1 - 3 * (h % 3 == 2)
 
 cdef inline int previous_half_edge(int h) noexcept nogil:
-    return h + 2 if h % 3 == 0 else h - 1
+    return h - 1 + 3 * (h % 3 == 0)
 
 cdef inline double foot(double base, double left, double right) noexcept nogil:
     # How far along its base, from the end of the side `left`, the apex of a triangle lies.

@@ -10,6 +10,13 @@ cdef extern from *:
         int corner : 30;
         unsigned side : 2;
     } Window;
+
+    // In the pieces that were written last: a processor waits for a wider copy of what it has just written.
+    static inline void keep_root(const Window* w, Window* out) {
+        out->offset = w->offset;
+        memcpy((char*) out + 56, (const char*) w + 56, 4);
+        memcpy((char*) out + 60, (const char*) w + 60, 4);
+    }
     """
     # The part of a half-edge that straight lines from one root cross, in the frame of the half-edge: its tail is the
     # origin, its head lies at (length, 0), the face that the lines enter above. If it is a plane, the lines are
@@ -28,6 +35,9 @@ cdef extern from *:
         int corner           # of the root, out of which the lines leave it: see `relax`; -1 if joined
         unsigned int side    # of the apex: see the sides below
         unsigned int is_plane
+
+    # Copy what windows of one root share: offset, root, corner and the flags.
+    void keep_root(const Window* w, Window* out) noexcept nogil
 
 cdef struct Apex:
     # The corner opposite a half-edge in its frame, the directions of the two sides there, and how it is reached.
@@ -309,15 +319,6 @@ cdef inline double straight(const Search* s, int v) noexcept nogil:
 
 cdef inline bint is_joined(const Window* w) noexcept nogil:
     return w.corner < 0
-
-
-# Copy what windows of one root share, in the pieces that were written last: the processor waits for a wider copy.
-cdef inline void keep_root(const Window* w, Window* out) noexcept nogil:
-    out.offset = w.offset
-    out.root = w.root
-    out.is_plane = w.is_plane
-    out.corner = w.corner
-    out.side = w.side
 
 
 # What a window adds to its offset at a point of its half-edge.
