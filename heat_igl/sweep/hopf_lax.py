@@ -11,7 +11,7 @@ from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.operators.metric_derivatives import plane_axes
-from heat_igl.plan import MOST_TURNING
+from heat_igl.plan import MOST_GROWTH, MOST_TURNING
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
@@ -55,25 +55,37 @@ class HopfLaxEngine(SimplexEngine):
             squares,
             *map(np.ascontiguousarray, (mean, squares.max(axis=(1, 2, 3)), slack, self._bend, gradient, place)),
         )
-        if (turning := self.turning) > MOST_TURNING:
-            warn_caller(
-                "the metric turns farther than the mesh resolves: over an edge, the ratio of its lengths in two "
-                f"directions changes by a factor of {turning:.2g} or more at a tenth of the faces, and distance may be "
-                "wrong by several percent, and by tens at single vertices: take a finer mesh",
-                AccuracyWarning,
+        turning, growth = self.resolution
+        if turning > MOST_TURNING:
+            what = (
+                f"turns farther than the mesh resolves: over an edge, the ratio of its lengths in two directions changes "
+                f"by a factor of {turning:.2g} or more at a tenth of the faces"
             )
+        elif growth > MOST_GROWTH:
+            what = (
+                f"grows faster than the mesh resolves: over an edge, its lengths change by a factor of {growth:.2g} or "
+                "more at one of fifty faces"
+            )
+        else:
+            return
+        warn_caller(
+            f"the metric {what}, and distance may be wrong by several percent, and by tens at single vertices: "
+            "take a finer mesh",
+            AccuracyWarning,
+        )
 
     @property
-    def turning(self) -> float:
-        """By how much the ratio of lengths in two directions changes over an edge, at a tenth of the simplices.
+    def resolution(self) -> tuple[float, float]:
+        """By how much the metric changes over an edge: the ratio of lengths in two directions, and lengths.
 
+        The first at a tenth of the simplices, the second at one of fifty, and 1 unless the metric is linear in between.
         From a sample of the simplices: between the corners of one, or between those that meet in a vertex, with planes
-        of triangles turned into each other. 1 where tensors differ by a factor alone, as those of speeds do.
+        of triangles turned into each other. The first is 1 where tensors differ by a factor alone, as those of speeds.
         """
         simplices = self._simplices
         tensors, corners = simplices.tensors, simplices.corners
         if tensors is None or simplices.place is None:
-            return 1.0
+            return 1.0, 1.0
         size = corners.shape[1]
         chosen = np.arange(0, len(corners), len(corners) // _SAMPLE + 1)
         one = other = np.repeat(chosen, size)
@@ -90,9 +102,12 @@ class HopfLaxEngine(SimplexEngine):
             once = np.cross(w[:, None], x[one])
             turned = x[one] + once + np.cross(w[:, None], once) / np.maximum(1 + cosine, _ROUNDING)[:, None, None]
             first, two = (axes @ g @ np.swapaxes(axes, 1, 2) for axes, g in ((x[one], first), (turned, two)))
-        stretch = np.linalg.eigvals(np.linalg.solve(first, two)).real
-        ratio = np.sqrt(stretch.max(axis=1) / np.maximum(stretch.min(axis=1), _ROUNDING))
-        return float(np.quantile(ratio.reshape(-1, size).max(axis=1), 0.9))
+        stretch = np.maximum(np.linalg.eigvals(np.linalg.solve(first, two)).real, _ROUNDING)
+        most, least = (np.sqrt(x.reshape(-1, size)) for x in (stretch.max(axis=1), stretch.min(axis=1)))
+        turning = float(np.quantile((most / least).max(axis=1), 0.9))
+        if tensors.shape[1] == 1:
+            return turning, 1.0
+        return turning, float(np.quantile(np.maximum(most, 1 / least).max(axis=1), 0.98))
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:  # noqa: ARG002
         """Lower distance to that of second order."""

@@ -350,7 +350,7 @@ class HopfLax(Facet):
         for i in range(self.p + 1):
             if i != c:
                 nearest = min(nearest, self.d[self.corners[s, i]])
-        if not nearest < min(best, self.d[self.corners[s, c]]):
+        if not nearest < best:
             return INFINITY
         linear: cython.double = self.linear(s, c)
         near: cython.double = nearest - self.low
