@@ -144,5 +144,5 @@ def test_wrong_fibres_are_refused(arguments, message):
 
 def test_faces_without_area_have_no_metric():
     mesh = Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 3], [0, 1, 2]])
-    with pytest.raises(heat_igl.MeshError, match=r"F\[1\] = \[0, 1, 2\] has no area, and so no metric"):
+    with pytest.raises(heat_igl.MeshError, match=r"F\[1\] = \[0, 1, 2\] has no area"):
         metric_operators(mesh, GOOD[:2])

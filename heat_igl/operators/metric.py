@@ -8,14 +8,14 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, names_guessed, real_numbers
+from heat_igl.errors import names_guessed, real_numbers
 from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay, lay_out, mollify
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.intrinsic import edge_length_operators, intrinsic_operators
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
 from heat_igl.operators.metric_simplices import MetricSimplices
-from heat_igl.operators.simplices import cotan_operators, longest_sides
+from heat_igl.operators.simplices import check_measures, longest_sides
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
@@ -98,7 +98,7 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
     """
     check_laplacian(laplacian)
     mesh = as_simplices(mesh)
-    _check_faces(mesh)
+    check_measures(mesh)
     g = real_numbers("metric", metric)
     if g.shape == (mesh.n_vertices, 3, 3) and mesh.n_vertices != mesh.n_faces:
         return _of_smooth_metric(mesh, _checked_at_corners(g, mesh), laplacian)
@@ -346,28 +346,33 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
 
 def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Operators:
     """The operators of tetrahedra with a metric g (m, 3, 3) on each, for heat, and `simplices` for distance."""
+    check_measures(mesh)
     m, n = mesh.n_faces, mesh.n_vertices
     # Each in a space of its own: edges times C have the lengths of the metric C C^T.
     corners = mesh.V[mesh.F]
     corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)
-    domain = cotan_operators(mesh)
     apart = np.arange(4 * m).reshape(-1, 4)
     # In units of the mean length: libigl multiplies up to six of them.
     pairs, lengths = simplices.edges
     unit = float(2.0 ** round(np.log2(float(lengths.mean()))))
     flat = corners.reshape(-1, 3) / unit
-    own = sp.csc_matrix((np.ones(4 * m), (apart.ravel(), mesh.F.ravel())), shape=(4 * m, n))
+    own = sp.csc_matrix((np.ones(4 * m), mesh.F.ravel(), np.arange(4 * m + 1)), shape=(n, 4 * m)).T
     G = (igl.grad(flat, apart) @ own).tocsc() / unit
     weights = np.abs(igl.volume(flat, apart)) * unit**3
     # A quarter of the volume for each corner, as igl.massmatrix has it.
     mass = np.bincount(mesh.F.ravel(), np.repeat(weights / 4, 4), minlength=n)
-    domain = replace(
-        domain,
+    domain = Operators(
         L=laplacian_of_gradient(G, weights),
         M=sp.diags(mass, format="csc"),
         gradient=G,
         weights=weights,
         face_sizes=longest_sides(lengths.reshape(m, -1)),
+        mean_edge_length=np.nan,
+        components=mesh.components,
+        boundary=mesh.boundary,
+        referenced=mesh.referenced,
+        longest_distance=np.nan,
+        is_surface=False,
         simplices=simplices,
         contrast=_contrast(g),
     )
@@ -386,16 +391,6 @@ def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths
         longest_distances=longest,
         surface=None,
     )
-
-
-def _check_faces(mesh: Mesh) -> None:
-    flat = mesh.measures <= 0
-    if flat.any():
-        first = int(np.argmax(flat))
-        raise MeshError(
-            f"F[{first}] = {mesh.F[first].tolist()} has no {'volume' if mesh.is_tetrahedral else 'area'}, and so no "
-            f"metric ({int(flat.sum())} of {mesh.n_faces} faces): remove these faces"
-        )
 
 
 def _checked(g: FloatArray, mesh: Mesh) -> FloatArray:
@@ -419,12 +414,11 @@ def _checked_at_corners(g: FloatArray, mesh: Mesh) -> FloatArray:
     """The metric (m, p + 1, 3, 3) at the corners of faces, from one per vertex."""
     symmetric = _symmetric(g)
     corners = symmetric[mesh.F]
-    inside = corners
-    if not mesh.is_tetrahedral:
-        axes = plane_axes(mesh)[:, None]
-        inside = axes @ corners @ np.swapaxes(axes, 2, 3)
-    smallest = np.full(mesh.n_vertices, np.inf)
-    np.minimum.at(smallest, mesh.F, np.linalg.eigvalsh(inside)[..., 0])
+    if mesh.is_tetrahedral:
+        smallest = np.where(mesh.referenced, np.linalg.eigvalsh(symmetric)[:, 0], np.inf)
+    else:
+        axes, smallest = plane_axes(mesh)[:, None], np.full(mesh.n_vertices, np.inf)
+        np.minimum.at(smallest, mesh.F, np.linalg.eigvalsh(axes @ corners @ np.swapaxes(axes, 2, 3))[..., 0])
     _check_definite(smallest, g)
     return np.asarray(corners)
 

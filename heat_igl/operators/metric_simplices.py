@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.kernels.sweep import hopf_lax
 from heat_igl.mesh import Mesh
 from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import FloatArray, IntArray
@@ -103,9 +104,8 @@ class MetricSimplices:
             raise ValueError("these simplices have lengths, and no tensors")
         if self.tensors.shape[1] == 1 and len(self.lengths):
             return self.lengths[:, None] ** 2
-        X = self.place[self.corners]
-        e = X[:, :, None] - X[:, None]
-        return np.ascontiguousarray(np.einsum("mijx,mqxy,mijy->mqij", e, self.tensors, e, optimize=True))
+        corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
+        return np.asarray(hopf_lax.squared_lengths(corners, V, np.ascontiguousarray(self.tensors)))
 
     @property
     def edges(self) -> tuple[IntArray, FloatArray]:
@@ -169,9 +169,10 @@ def _at_corners(mesh: Mesh, g: FloatArray) -> FloatArray:
     moments = np.concatenate(
         [one, centre, logs, *(x.reshape(m, -1) for x in products), (logs**2).sum(1, keepdims=True)], 1
     )
-    at = sp.csr_array((np.ones(4 * m), (mesh.F.ravel(), np.repeat(np.arange(m), 4))), shape=(n, m))
+    of_corners = sp.csr_array((np.ones(4 * m), mesh.F.ravel(), np.arange(0, 4 * m + 1, 4)), shape=(m, n))
+    at = of_corners.T.tocsr()
     # Around a vertex: the tetrahedra at it and at the other corners of these.
-    sums = at @ (at.T @ (at @ moments))
+    sums = at @ (of_corners @ (at @ moments))
     sums /= np.maximum(sums[:, :1], 1)
     middle, mean = sums[:, 1:4], sums[:, 4:10]
     spread = sums[:, 10:19].reshape(n, 3, 3) - middle[:, :, None] * middle[:, None]
@@ -185,11 +186,10 @@ def _at_corners(mesh: Mesh, g: FloatArray) -> FloatArray:
         return g[:, None]
     found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
     count = np.maximum(at.sum(axis=1), 1)[:, None]
+    least = share[mesh.F].min(axis=1)[:, None]
     for _ in range(10):
-        # A mean over neighbours flattens curves: until the means over the corners are the given tensors. From a corner
-        # where a speed doubles over an edge, distance is 1.8 % off after two rounds, 1.0 after ten, 0.8 after thirty.
-        rest = (logs - found[mesh.F].mean(axis=1)) * share[mesh.F].min(axis=1)[:, None]
-        found += at @ rest / count
+        # A mean over neighbours flattens curves: until the means over the corners are the given tensors.
+        found += at @ ((logs - of_corners @ found / 4) * least) / count
     found += level
     log = np.empty((n, 3, 3))
     log[:, i, j] = log[:, j, i] = found / off

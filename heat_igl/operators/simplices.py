@@ -36,7 +36,7 @@ def cotan_operators(mesh: Mesh, on_laplacian: OnLaplacian | None = None) -> Oper
     MeshError
         If a triangle has no area, or a tetrahedron no volume.
     """
-    _check_measures(mesh)
+    check_measures(mesh)
     G = _gradient(mesh.V, mesh.F, _unit(mesh))
     if not mesh.is_tetrahedral:
         return _assembled(mesh, _cotangent_laplacian(mesh, on_laplacian), G)
@@ -50,7 +50,7 @@ def cotan_operators(mesh: Mesh, on_laplacian: OnLaplacian | None = None) -> Oper
 
 def surface_operators(mesh: Mesh, surface: Surface, on_laplacian: OnLaplacian | None = None) -> Operators:
     """The operators on the mesh's own triangles as for `cotan_operators`, and `surface` with the same triangles."""
-    _check_measures(mesh)
+    check_measures(mesh)
     elements = TriangleElements(surface.triangulation, partial(_gradient, mesh.V, mesh.F, _unit(mesh)))
     return _assembled(mesh, _cotangent_laplacian(mesh, on_laplacian), elements, elements, surface)
 
@@ -106,7 +106,8 @@ def _assembled(
     )
 
 
-def _check_measures(mesh: Mesh) -> None:
+def check_measures(mesh: Mesh) -> None:
+    """Raise a MeshError if a triangle has no area, or a tetrahedron no volume."""
     flat = mesh.measures <= 0
     if flat.any():
         first = int(np.flatnonzero(flat)[0])

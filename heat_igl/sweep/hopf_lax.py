@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
-from heat_igl.kernels.sweep.hopf_lax import HopfLax
+from heat_igl.kernels.sweep.hopf_lax import HopfLax, measured
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.operators.metric_derivatives import plane_axes
@@ -40,37 +40,25 @@ class HopfLaxEngine(SimplexEngine):
 
     def __init__(self, simplices: MetricSimplices) -> None:
         super().__init__(simplices)
-        place = np.ascontiguousarray(simplices.place)
-        X = place[simplices.corners]
-        is_solid = X.shape[1] == 4
-        E = X[:, 1:] - X[:, :1]
-        others = np.swapaxes(np.linalg.inv(E) if is_solid else np.linalg.pinv(E), 1, 2)
-        gradient = np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)
-        squares = simplices.squared_lengths()
-        mean = squares[:, 0] if squares.shape[1] == 1 else squares.mean(axis=1)
-        shorter = squares / np.where(mean > 0, mean, np.inf)[:, None]
-        slack = np.sqrt(np.where(mean[:, None] > 0, shorter, 1.0).min(axis=(1, 2, 3)))
-        self._bend = _most_bend(mean, ((X[:, :, None] - X[:, None]) ** 2).sum(axis=3))
-        self._in_metric = (
-            squares,
-            *map(np.ascontiguousarray, (mean, squares.max(axis=(1, 2, 3)), slack, self._bend, gradient, place)),
-        )
+        place, squares = np.ascontiguousarray(simplices.place), simplices.squared_lengths()
+        mean, widest, slack, gradient, growth = measured(self._corners, place, squares)
+        # As that from one point, and more where waves come from a slower metric; by powers of two, which do not change
+        # when tensors change a little.
+        faster = (growth.max(initial=-np.inf, where=np.isfinite(growth)) - growth) / (simplices.corners.shape[1] - 1)
+        self._bend = _BEND * 2.0 ** np.round(faster)
+        self._in_metric = (squares, mean, widest, slack, self._bend, gradient, place)
         turning, growth = self.resolution
         if turning > MOST_TURNING:
-            what = (
-                f"turns farther than the mesh resolves: over an edge, the ratio of its lengths in two directions changes "
-                f"by a factor of {turning:.2g} or more at a tenth of the faces"
-            )
+            how, what = "turns farther", "the ratio of its lengths in two directions changes"
+            much = f"by a factor of {turning:.2g} or more at a tenth of the faces"
         elif growth > MOST_GROWTH:
-            what = (
-                f"grows faster than the mesh resolves: over an edge, its lengths change by a factor of {growth:.2g} or "
-                "more at one of fifty faces"
-            )
+            how, what = "grows faster", "its lengths change"
+            much = f"by a factor of {growth:.2g} or more at one of fifty faces"
         else:
             return
         warn_caller(
-            f"the metric {what}, and distance may be wrong by several percent, and by tens at single vertices: "
-            "take a finer mesh",
+            f"the metric {how} than the mesh resolves: over an edge, {what} {much}, and distance may be wrong by "
+            "several percent, and by tens at single vertices: take a finer mesh",
             AccuracyWarning,
         )
 
@@ -128,15 +116,3 @@ class HopfLaxEngine(SimplexEngine):
         found = self._found(sources.vertex_offset, distance, label, _SETTLED)
         answer = self.distance(sources)
         return FixedPointDerivative(self._simplices, sources, answer, self._bend, distance, label, *found)
-
-
-def _most_bend(mean: FloatArray, place: FloatArray) -> FloatArray:
-    """How far (m,) the square of distance bends at most on the edges of each simplex, in their squared lengths.
-
-    As that from one point, and more where waves come from a slower metric; by powers of two, which do not change
-    when tensors change a little. `mean` and `place` (m, p + 1, p + 1) are squared lengths in the metric and in space.
-    """
-    edges = (squares[:, 1:, :1] + squares[:, :1, 1:] - squares[:, 1:, 1:] for squares in (mean, place))
-    one, other = (np.linalg.slogdet(products)[1] for products in edges)
-    log = (one - other) / (mean.shape[1] - 1)
-    return np.asarray(_BEND * 2.0 ** np.round((log.max() - log) / np.log(2)))

@@ -24,9 +24,112 @@ from cython.cimports.heat_igl.kernels.sweep.hopf_lax import (
     MOST_VISITS,
     SETTLED,
 )
-from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
+from cython.cimports.libc.math import INFINITY, fabs, log, log2, sqrt
 
 from heat_igl.kernels.signals import raise_caught
+
+
+def squared_lengths(
+    corners: cython.const[cython.int][:, ::1],
+    V: cython.const[cython.double][:, ::1],
+    tensors: cython.const[cython.double][:, :, :, ::1],
+):
+    """Squared distances (m, q, p + 1, p + 1) between the corners of simplices (m, p + 1), in the q tensors of each."""
+    size: cython.int = corners.shape[1]
+    found = np.zeros((corners.shape[0], tensors.shape[1], size, size))
+    squares: cython.double[:, :, :, ::1] = found
+    s: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    e: cython.double[3]
+    with cython.nogil:
+        for s in range(corners.shape[0]):
+            for i in range(size):
+                for j in range(i):
+                    for x in range(3):
+                        e[x] = V[corners[s, j], x] - V[corners[s, i], x]
+                    for k in range(tensors.shape[1]):
+                        g = cython.address(tensors[s, k, 0, 0])
+                        square: cython.double = g[0] * e[0] * e[0] + g[4] * e[1] * e[1] + g[8] * e[2] * e[2]
+                        square += 2.0 * (g[1] * e[0] * e[1] + g[2] * e[0] * e[2] + g[5] * e[1] * e[2])
+                        squares[s, k, i, j] = squares[s, k, j, i] = square
+    return found
+
+
+def measured(
+    corners: cython.const[cython.int][:, ::1],
+    V: cython.const[cython.double][:, ::1],
+    squares: cython.const[cython.double][:, :, :, ::1],
+):
+    """What `HopfLax` takes of simplices beside their `squared_lengths`.
+
+    Returns
+    -------
+    mean, widest, slack, gradient
+        As there.
+    growth : (m,) float64
+        The square of the volume in the mean metric, over that in space, as a power of two.
+    """
+    size: cython.int = corners.shape[1]
+    m = corners.shape[0]
+    means, widths, slacks = np.zeros((m, size, size)), np.zeros(m), np.ones(m)
+    gradients, growths = np.zeros((m, size, 3)), np.zeros(m)
+    mean: cython.double[:, :, ::1] = means
+    widest: cython.double[::1] = widths
+    slack: cython.double[::1] = slacks
+    gradient: cython.double[:, :, ::1] = gradients
+    growth: cython.double[::1] = growths
+    s: cython.Py_ssize_t
+    k: cython.Py_ssize_t
+    e: cython.double[3][3]
+    P: cython.double[3][3]
+    with cython.nogil:
+        for s in range(corners.shape[0]):
+            for i in range(size):
+                for j in range(i):
+                    least: cython.double = INFINITY
+                    total: cython.double = 0.0
+                    for k in range(squares.shape[1]):
+                        total += squares[s, k, i, j]
+                        least = min(least, squares[s, k, i, j])
+                        widest[s] = max(widest[s], squares[s, k, i, j])
+                    mean[s, i, j] = mean[s, j, i] = total / squares.shape[1]
+                    if total > 0.0:
+                        slack[s] = min(slack[s], least / mean[s, i, j])
+            slack[s] = sqrt(slack[s])
+            for i in range(size - 1):
+                for x in range(3):
+                    e[i][x] = V[corners[s, i + 1], x] - V[corners[s, 0], x]
+                for j in range(size - 1):
+                    P[i][j] = 0.5 * (mean[s, i + 1, 0] + mean[s, j + 1, 0] - mean[s, i + 1, j + 1])
+            if size == 3:
+                # The third vector is the normal of a triangle, as long as twice its area.
+                _cross(e[0], e[1], e[2])
+                for i in range(3):
+                    P[i][2] = P[2][i] = 1.0 if i == 2 else 0.0
+            for i in range(size - 1):
+                _cross(e[(i + 1) % 3], e[(i + 2) % 3], cython.address(gradient[s, i + 1, 0]))
+            volume: cython.double = 0.0
+            for x in range(3):
+                volume += e[0][x] * gradient[s, 1, x]
+            for i in range(1, size):
+                for x in range(3):
+                    # A triangle without area has no gradient.
+                    gradient[s, i, x] = gradient[s, i, x] / volume if volume != 0.0 else 0.0
+                    gradient[s, 0, x] -= gradient[s, i, x]
+            square: cython.double = P[0][0] * (P[1][1] * P[2][2] - P[1][2] * P[1][2])
+            square += 2.0 * P[0][1] * P[1][2] * P[0][2] - P[1][1] * P[0][2] * P[0][2] - P[2][2] * P[0][1] * P[0][1]
+            growth[s] = log2(square / (fabs(volume) if size == 3 else volume * volume))
+    return means, widths, slacks, gradients, growths
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _cross(
+    a: cython.pointer[cython.double], b: cython.pointer[cython.double], into: cython.pointer[cython.double]
+) -> cython.void:
+    for x in range(3):
+        into[x] = a[(x + 1) % 3] * b[(x + 2) % 3] - a[(x + 2) % 3] * b[(x + 1) % 3]
 
 
 @cython.final
