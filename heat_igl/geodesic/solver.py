@@ -145,7 +145,7 @@ class GeodesicSolver(BatchedSolver):
         if isinstance(domain, PointCloud):
             chosen = distance_plan("points", method, tolerance)
             # For a sweep, as for heat, slivers between points are lengthened a little.
-            triangles = MeshTriangles(domain.triangles, None)
+            triangles = MeshTriangles(domain.triangles, None, orients=False)
             return self._on_triangles(triangles, chosen)
         chosen = distance_plan("triangles", method, tolerance)
         return self._on_triangles(MeshTriangles(domain), chosen)

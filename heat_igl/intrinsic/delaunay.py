@@ -11,7 +11,7 @@ from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.kernels.mesh.flipping import rounds
 
 
-def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
+def intrinsic_delaunay(triangulation: IntrinsicTriangulation, *, orients: bool = True) -> IntrinsicTriangulation:
     """Flip edges until the triangulation is intrinsic Delaunay (Fisher, Springborn, Bobenko, Schroeder 2007).
 
     An edge is flipped when the two cotangents opposite it sum to less than zero. Edges stay on the boundary, at edges
@@ -21,13 +21,16 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation) -> IntrinsicTriang
     ----------
     triangulation : IntrinsicTriangulation
         As `intrinsic_triangulation` makes it; left untouched.
+    orients : bool
+        Whether to reverse faces first, so that the seam is short; not if neighbours are oriented alike as far as
+        possible.
 
     Returns
     -------
     IntrinsicTriangulation
         The same surface on the same vertices; `triangulation` itself if no edge is flipped.
     """
-    given = triangulation if triangulation.aligned.all() else oriented(triangulation)
+    given = oriented(triangulation) if orients and not triangulation.aligned.all() else triangulation
     edges = HalfEdges.of(given)
     edges = edges._replace(length=edges.length.copy())
     # An edge of a seam keeps its place as those of more than two faces do, with its other half-edge next in the ring.

@@ -9,12 +9,11 @@ joined, and points in no triangle are inserted into the nearest one.
 
 from __future__ import annotations
 
-from collections import defaultdict
-
 import numpy as np
 
 from heat_igl.kernels.cloud.agreeing import agreement
 from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
+from heat_igl.kernels.cloud.joining_fans import joining_triangles
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles
 from heat_igl.kernels.mesh.gluing import glue
@@ -166,22 +165,26 @@ def with_one_fan(F: IntArray, is_pinched: BoolArray) -> IntArray:
     `is_pinched` (n,) are the vertices at which several fans meet, see `pinched_vertices`. No vertices are cut off:
     where several fans are the only connection between parts, they stay.
     """
-    n, given = len(is_pinched), F
+    n, given, without = len(is_pinched), F, [F[:0]]
     while is_pinched.any():
         around = np.flatnonzero(at_some_corner(is_pinched, F))
         left_out = around[_in_smaller_fans(F[around], is_pinched)]
         is_settled = np.ones(n, bool)
         is_settled[F[left_out]] = False
+        without.append(F[left_out])
         F = np.delete(F, left_out, axis=0)
         is_pinched = pinched_vertices(F, is_settled)
-    return F if F is given else _with_parts_joined(given, F, n)
+    return _with_parts_joined(given, F, np.concatenate(without), n)
 
 
-def _with_parts_joined(given: IntArray, kept: IntArray, n: int) -> IntArray:
+def _with_parts_joined(given: IntArray, kept: IntArray, without: IntArray, n: int) -> IntArray:
     """The triangles `kept`, and of the `given` ones those at parts that would be cut off: all but the largest."""
-    before, after = connected_components(given, n), connected_components(kept, n)
-    if before.max() == after.max():
+    if not len(without):
         return kept
+    after = connected_components(kept, n)
+    if (after[without] == after[without[:, :1]]).all():
+        return kept
+    before = connected_components(given, n)
     size = np.bincount(after)[after]
     largest = np.zeros(int(before.max()) + 1, np.int64)
     np.maximum.at(largest, before, size)
@@ -249,51 +252,8 @@ def with_fans_joined(P: FloatArray, F: IntArray, is_settled: BoolArray) -> IntAr
         return F
     is_near = np.zeros(len(P), bool)
     is_near[F[at_some_corner(is_pinched, F)]] = True
-    # The other two corners of each triangle at a vertex.
-    sides: defaultdict[int, list[tuple[int, int]]] = defaultdict(list)
-    added: list[tuple[int, int, int]] = []
-
-    def add(a: int, b: int, c: int) -> None:
-        sides[a].append((b, c))
-        sides[b].append((c, a))
-        sides[c].append((a, b))
-
-    for row in F[at_some_corner(is_near, F)].tolist():
-        add(*row)
-    for vertex in np.flatnonzero(is_pinched).tolist():
-        while True:
-            joint = _between_fans(P, vertex, sides[vertex])
-            free = next(((a, b) for a, b in joint if sum(b in side for side in sides[a]) < 2), None)
-            if free is None:
-                break
-            added.append((vertex, *free))
-            add(*added[-1])
-    return np.concatenate([F, np.array(added, F.dtype)]) if added else F
-
-
-def _between_fans(P: FloatArray, vertex: int, sides: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Ends of different fans, those with the smallest angle at the vertex first; `sides` are opposite to it."""
-    beside: defaultdict[int, list[int]] = defaultdict(list)
-    for a, b in sides:
-        beside[a].append(b)
-        beside[b].append(a)
-    fan: dict[int, int] = {}
-    for end, at in ((corner, others[0]) for corner, others in beside.items() if len(others) == 1):
-        if end not in fan:
-            before = end
-            while len(beside[at]) > 1:
-                before, at = at, sum(beside[at]) - before
-            fan[end] = fan[at] = end
-    ends = list(fan)
-    if len(ends) < 3:
-        return []
-    ways = P[ends] - P[vertex]
-    ways /= np.maximum(np.linalg.norm(ways, axis=1), np.finfo(float).tiny)[:, None]
-    cosine = (ways @ ways.T).tolist()
-    pairs = [
-        (-cosine[i][j], ends[i], ends[j]) for i in range(len(ends)) for j in range(i) if fan[ends[i]] != fan[ends[j]]
-    ]
-    return [(a, b) for _, a, b in sorted(pairs)]
+    added = joining_triangles(P, F[at_some_corner(is_near, F)].astype(np.int32), np.flatnonzero(is_pinched))
+    return np.concatenate([F, added.astype(F.dtype)])
 
 
 def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_settled: BoolArray) -> IntArray:

@@ -100,16 +100,16 @@ def fan_operators(mesh: PolygonMesh, laplacian: Laplacian = "auto") -> Operators
     return replace(operators(fans.mesh, laplacian), drawn_on=Surface(drawn, drawn, V=mesh.V), fans=fans)
 
 
-def unfolding_surface(mesh: Mesh, margin: float | None = None) -> Surface:
+def unfolding_surface(mesh: Mesh, margin: float | None = None, *, orients: bool = True) -> Surface:
     """The triangles of a triangle mesh in which paths are unfolded, as `operators` has them, without any operator.
 
-    Triangles thinner than `margin` are mollified, see `mollify`.
+    Triangles thinner than `margin` are mollified, see `mollify`; `orients` is that of `intrinsic_delaunay`.
     """
     history: tuple[Change, ...] = ()
     if has_nonmanifold_edges(mesh):
         mesh, history = _without_duplicates(mesh)
     faces = replace(intrinsic_triangulation(mesh, margin), history=history)
-    return Surface(intrinsic_delaunay(faces), faces, V=mesh.V)
+    return Surface(intrinsic_delaunay(faces, orients=orients), faces, V=mesh.V)
 
 
 def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Change, ...]]:

@@ -100,10 +100,12 @@ class MeshTriangles(Triangles):
         Triangles.
     margin : float, optional
         Thinner ones are mollified, see `mollify`.
+    orients : bool
+        See `intrinsic_delaunay`.
     """
 
-    def __init__(self, mesh: Mesh, margin: float | None = MARGIN) -> None:
-        self._mesh, self._margin = mesh, margin
+    def __init__(self, mesh: Mesh, margin: float | None = MARGIN, *, orients: bool = True) -> None:
+        self._mesh, self._margin, self._orients = mesh, margin, orients
 
     @property
     def components(self) -> IntArray:  # type: ignore[override]
@@ -115,7 +117,7 @@ class MeshTriangles(Triangles):
         """The triangles with their history."""
         from heat_igl.operators import unfolding_surface
 
-        return unfolding_surface(self._mesh, self._margin)
+        return unfolding_surface(self._mesh, self._margin, orients=self._orients)
 
     @property
     def given_faces(self) -> IntArray:
