@@ -32,7 +32,7 @@ cdef class HopfLax(Facet):
     cdef double[::1] pending
     cdef int[::1] n_visits
     cdef long long n_carried
-    cdef double unit, low
+    cdef double unit, low, nearest
     cdef const unsigned char[::1] fixed
     cdef double[::1] d
     cdef int[::1] label
@@ -56,7 +56,7 @@ cdef class HopfLax(Facet):
     cdef void spread(self) noexcept nogil
     cdef int nearest_corner(self) noexcept nogil
     cdef void face(self, int c) noexcept nogil
-    cdef double linear(self, int s, int c) noexcept nogil
+    cdef double linear(self, int s, int c, double limit, int from_v) noexcept nogil
     cdef double across(self, int s, int c, double da, double db, double dc) noexcept nogil
     cdef void sharpen(self, double least) noexcept nogil
     cdef void visit(self, int v) noexcept nogil

@@ -180,7 +180,7 @@ class HopfLax(Facet):
         self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
         self.fixed = np.isfinite(d).view(np.uint8)
         self.queue = PriorityQueue(n)
-        self.handed = np.full(n, np.inf)
+        self.handed, self.facet = np.full(n, np.inf), np.full(n, -1, np.int32)
         with cython.nogil:
             self.spread()
         raise_caught()
@@ -204,7 +204,8 @@ class HopfLax(Facet):
         """
         n = self.d.shape[0]
         self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
-        self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
+        np.asarray(self.facet)[np.asarray(self.fixed).view(bool)] = -1
+        self.place = np.zeros((n, self.p))
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen(settled)
@@ -246,10 +247,10 @@ class HopfLax(Facet):
                         u: cython.int = self.corners[s, c]
                         if u == v:
                             continue
-                        value: cython.double = self.linear(s, c)
+                        value: cython.double = self.linear(s, c, self.d[u], v)
                         if value < self.d[u]:
                             self.label[u] = self.label[self.corners[s, self.nearest_corner()]]
-                            self.d[u] = value
+                            self.d[u], self.facet[u] = value, s * size + c
                             if value + gain * fabs(value) < self.handed[u]:
                                 self.wait(u)
                 v = self.nearest_waiting()
@@ -281,8 +282,11 @@ class HopfLax(Facet):
                 self.share[k] = 0.0
                 k += 1
 
-    def linear(self, s: cython.int, c: cython.int) -> cython.double:
-        """The least value at corner c of simplex s with T linear; sets `side` and `share`."""
+    def linear(self, s: cython.int, c: cython.int, limit: cython.double, from_v: cython.int) -> cython.double:
+        """The least value at corner c of simplex s with T linear; sets `side`, `share` and `nearest`.
+
+        It may be inf if it is not below `limit`, or if a vertex `from_v` has no share in it, unless that is negative.
+        """
         self.face(c)
         sq = cython.address(self.mean[s, 0, 0])
         size: cython.int = self.p + 1
@@ -293,9 +297,12 @@ class HopfLax(Facet):
         i: cython.int
         j: cython.int
         d: cython.double[3]
-        d[2] = INFINITY
+        d[2] = self.nearest = INFINITY
         for i in range(self.p):
             d[i] = self.d[self.corners[s, self.side[i]]]
+            self.nearest = min(self.nearest, d[i])
+        if not self.nearest < limit:
+            return INFINITY
         if self.p == 3 and d[0] < INFINITY and d[1] < INFINITY and d[2] < INFINITY:
             value: cython.double = self.across(s, c, d[0], d[1], d[2])
             if value < INFINITY:
@@ -304,11 +311,13 @@ class HopfLax(Facet):
             if d[i] == INFINITY:
                 continue
             to: cython.double = sq[size * c + self.side[i]]
-            value = d[i] + sqrt(to)
-            if value < best:
-                best, at, other = value, i, -1
+            is_from: cython.bint = from_v < 0 or self.corners[s, self.side[i]] == from_v
+            if is_from:
+                value = d[i] + sqrt(to)
+                if value < best:
+                    best, at, other = value, i, -1
             for j in range(i + 1, self.p):
-                if d[j] == INFINITY:
+                if d[j] == INFINITY or not (is_from or self.corners[s, self.side[j]] == from_v):
                     continue
                 # From corner i, along the edge to corner j.
                 base: cython.double = sq[size * self.side[i] + self.side[j]]
@@ -448,17 +457,11 @@ class HopfLax(Facet):
 
         It is at least what first order and the nearest corner say, with some margin.
         """
-        i: cython.int
-        nearest: cython.double = INFINITY
-        for i in range(self.p + 1):
-            if i != c:
-                nearest = min(nearest, self.d[self.corners[s, i]])
-        if not nearest < best:
-            return INFINITY
-        linear: cython.double = self.linear(s, c)
-        near: cython.double = nearest - self.low
-        sag: cython.double = near - sqrt(max(near * near - self.widest[s], 0.0))
-        if not nearest + self.slack[s] * (linear - nearest) - sag < best:
+        linear: cython.double = self.linear(s, c, best, -1)
+        near: cython.double = self.nearest - self.low
+        # Between corners at one distance from a point, the square is less by at most a third of a squared edge.
+        sag: cython.double = near - sqrt(max(near * near - 0.5 * self.widest[s], 0.0))
+        if not self.nearest + self.slack[s] * (linear - self.nearest) - sag < best:
             return INFINITY
         return self.curved(s, c, linear, best)
 
@@ -473,8 +476,8 @@ class HopfLax(Facet):
                 at = c if k == 0 else self.side[k - 1]
             sq = cython.address(self.squares[s, at, 0, 0])
             for i in range(self.p):
-                for j in range(self.p):
-                    self.product[9 * k + 3 * i + j] = 0.5 * (
+                for j in range(i + 1):
+                    self.product[9 * k + 3 * i + j] = self.product[9 * k + 3 * j + i] = 0.5 * (
                         sq[size * c + self.side[i]]
                         + sq[size * c + self.side[j]]
                         - sq[size * self.side[i] + self.side[j]]
