@@ -6,6 +6,7 @@
     python scripts/metrics_table.py layers [--border 24]       # layers of metrics
     python scripts/metrics_table.py faces [--edge 20]          # a metric per face
     python scripts/metrics_table.py grids [--rows 48]          # pixels and voxels, beside fast marching
+    python scripts/metrics_table.py smooth [--rows 48]         # tensors that change smoothly in bodies
 
 metrics and bodies: the mean of |d - exact| / exact over vertices and ``--sources`` in percent, "-" where a method does
 not apply; "heat" is the paper's method. For bodies also how much too long the worst value is, by how much it is below
@@ -19,8 +20,9 @@ reference is the shortest way through points on the borders, ``--border`` for ea
 largest of |d - reference| / reference, and those of the reference with half as many points.
 grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels as rows, at their centres, from one of
 them. Beside the default: scikit-fmm (by pip), whose front begins as a circle of 2.5 pixels, and pykonal if it is
-installed. Mean and largest error in percent, and seconds of one query with its preparation. docs/metrics.md has the
-tables.
+installed. Mean and largest error in percent, and seconds of one query with its preparation.
+smooth: a cylinder that is twisted, and a cube with a speed that grows linearly, with tensors per tetrahedron and at the
+vertices; the same of fim-python, if it is installed, which takes those per tetrahedron. docs/metrics.md has the tables.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -480,18 +483,83 @@ def on_grids(options: argparse.Namespace, _: Random) -> Iterator[Row]:
         V = np.stack(
             [x.ravel() for x in reversed(centres(mask.shape))] + [np.zeros(mask.size)] * (3 - mask.ndim), axis=1
         )
-        truth = exact(V, int(np.ravel_multi_index(source, mask.shape)))[mask.ravel()]
+        truth = np.where(mask, exact(V, int(np.ravel_multi_index(source, mask.shape))).reshape(mask.shape), 0)
         row: Row = {"grid": f"{name}, {' x '.join(map(str, mask.shape))}"}
         for method, query in GRIDS.items():
-            row[method] = dict.fromkeys(("mean", "largest", "s"), np.nan)
-            try:
-                start = time.process_time()
-                found = query(mask, speed, source)[mask]
-            except ImportError:
-                continue
-            took, off = time.process_time() - start, np.abs(excess(found, truth))
-            row[method] = {"mean": off.mean(), "largest": off.max(), "s": took}
+            row[method] = timed(truth, query, mask, speed, source)
         yield row
+
+
+# Bodies with tensors that change smoothly.
+
+
+def twist(x: FloatArray, k: float) -> tuple[FloatArray, FloatArray]:
+    """Points (..., 3) turned about the third axis by k z, and the metric that the map pulls back."""
+    c, s = np.cos(k * x[..., 2]), np.sin(k * x[..., 2])
+    image = np.stack([c * x[..., 0] - s * x[..., 1], s * x[..., 0] + c * x[..., 1], x[..., 2]], axis=-1)
+    J = np.zeros((*x.shape, 3))
+    J[..., 0, 0], J[..., 0, 1], J[..., 1, 0], J[..., 1, 1], J[..., 2, 2] = c, -s, s, c, 1
+    J[..., 0, 2], J[..., 1, 2] = -k * image[..., 1], k * image[..., 0]
+    return image, np.swapaxes(J, -1, -2) @ J
+
+
+def cylinder(rings: int, rng: Random) -> Mesh:
+    """Delaunay tetrahedra of points on disks of radius 1, up to the height 1.5; points inside are moved."""
+    disk, levels = shapes.disk(rings), np.linspace(0, 1.5, round(1.5 * rings) + 1)
+    V = np.concatenate([disk.V + np.array([0, 0, z]) for z in levels])
+    is_inside = (np.hypot(V[:, 0], V[:, 1]) < 1 - 0.5 / rings) & (V[:, 2] > 0) & (V[:, 2] < 1.5)
+    V[is_inside] = moved(V[is_inside], 0.2 / rings, rng)
+    return delaunay(V)
+
+
+def smooth(rows: int, rng: Random) -> Iterator[tuple[str, Mesh, Callable[[FloatArray], FloatArray], int, FloatArray]]:
+    """Names, meshes, metrics (k, 3, 3) at places (k, 3), a source, and exact distances."""
+    for k in (2.0, 4.0):
+        for rings in (rows // 12, rows // 6, rows // 4):
+            mesh = cylinder(rings, rng)
+            source = int(np.linalg.norm(mesh.V - [0.4, 0.3, 0.5], axis=1).argmin())
+            name = f"twisted, 1 : {((k + np.hypot(k, 2)) / 2) ** 2:.2g}"
+            yield name, mesh, lambda x, k=k: twist(x, k)[1], source, straight(twist(mesh.V, k)[0], source)
+    for c, place in ((3, 0.5), (20, 0.5), (20, 0.0)):
+        for cells in (rows // 6, rows // 4, 5 * rows // 12):
+            mesh = moved_inside(shapes.box(cells), rng, 0.25 / cells)
+            source, speed = int(np.linalg.norm(mesh.V - place, axis=1).argmin()), 1 + (c - 1) * mesh.V[:, 2]
+            apart = ((mesh.V - mesh.V[source]) ** 2).sum(axis=1)
+            exact = np.arccosh(1 + (c - 1) ** 2 * apart / (2 * speed * speed[source])) / (c - 1)
+            metric = lambda x, c=c: np.eye(3) / (1 + (c - 1) * x[:, 2, None, None]) ** 2  # noqa: E731
+            yield f"speeds 1 : {c}, from {'the middle' if place else 'a slow corner'}", mesh, metric, source, exact
+
+
+def by_fim(mesh: Mesh, g: FloatArray, source: int) -> FloatArray:
+    from fimpy.solver import create_fim_solver
+
+    solver = create_fim_solver(mesh.V, mesh.F, np.linalg.inv(g), device="cpu", precision=np.float64)
+    return np.asarray(solver.comp_fim(np.array([source]), np.zeros(1)))
+
+
+def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
+    default = lambda mesh, g, source: GeodesicSolver(metric_operators(mesh, g)).distance(source)  # noqa: E731
+    for name, mesh, metric, source, exact in smooth(options.rows, rng):
+        centres = metric(mesh.V[mesh.F].mean(axis=1))
+        row: Row = {"body": name, "n": mesh.n_vertices, "m": mesh.n_faces}
+        for method, query, g in (
+            ("fim", by_fim, centres),
+            ("face", default, centres),
+            ("vertex", default, metric(mesh.V)),
+        ):
+            row[method] = timed(exact, query, mesh, g, source)
+        yield row
+
+
+def timed(exact: FloatArray, query: Callable[..., FloatArray], *arguments: Any) -> Row:
+    """Mean and largest error in percent, and seconds; nan if what it needs is not installed."""
+    try:
+        start = time.process_time()
+        found = query(*arguments)
+    except ImportError:
+        return dict.fromkeys(("mean", "largest", "s"), np.nan)
+    took, off = time.process_time() - start, np.abs(excess(found, exact))
+    return {"mean": off.mean(), "largest": off.max(), "s": took}
 
 
 def summary(samples: Samples) -> Row:
@@ -508,6 +576,13 @@ def both(key: str) -> str:
 
 def mean_and_largest(**heads: str) -> dict[str, str]:
     return {f"{head}, %": f"{{{key}[0]:.2g}} and {{{key}[1]:.2g}}" for key, head in heads.items()}
+
+
+def errors_and_seconds(**heads: str) -> dict[str, str]:
+    return {
+        f"{head}, % and s": f"{{{key}[mean]:.2g}} and {{{key}[largest]:.2g}}, {{{key}[s]:.2g}}"
+        for key, head in heads.items()
+    }
 
 
 HALF = {"half": "reference, half the points"}
@@ -527,11 +602,9 @@ COLUMNS = {
     "layers": {"layers": "{case}"}
     | mean_and_largest(border="source on the border", beside="1.5 edges away", middle="in the middle", **HALF),
     "faces": {"metric per face": "{case}"} | mean_and_largest(default="default", **HALF),
-    "grids": {"grid": "{grid}"}
-    | {
-        f"{head}, % and s": f"{{{key}[mean]:.2g}} and {{{key}[largest]:.2g}}, {{{key}[s]:.2g}}"
-        for key, head in {"default": "default", "fmm": "scikit-fmm", "konal": "pykonal"}.items()
-    },
+    "grids": {"grid": "{grid}"} | errors_and_seconds(default="default", fmm="scikit-fmm", konal="pykonal"),
+    "smooth": {"body": "{body}", "vertices": "{n}", "tetrahedra": "{m}"}
+    | errors_and_seconds(fim="fim-python", face="per tetrahedron", vertex="at the vertices"),
 }  # fmt: skip
 ROWS = {
     "metrics": on_metrics,
@@ -540,6 +613,7 @@ ROWS = {
     "layers": on_layers,
     "faces": on_faces,
     "grids": on_grids,
+    "smooth": on_smooth,
 }
 
 
