@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.curves.geodesics import GeodesicPathSolver
-from heat_igl.curves.places import Waypoints, mixed_places, snapped
+from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.shortening import Shortened, as_curve
 from heat_igl.errors import SourceError, shown
 from heat_igl.mesh import MeshLike, SurfaceCurve, as_simplices
+from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import FloatArray, IntArray
 
 _MOST_PIECES = 1_000_000
@@ -86,4 +87,4 @@ def _along(leg: Shortened, share: float, corners: FloatArray) -> tuple[int, Floa
     before = ends[i - 1] if i else 0.0
     here = (wanted - before) / (ends[i] - before) if ends[i] > before else 0.0
     weights = leg.points[i, 0] + min(max(here, 0.0), 1.0) * (leg.points[i, 1] - leg.points[i, 0])
-    return int(leg.faces[i]), snapped(weights[None])[0]
+    return int(leg.faces[i]), on_simplex(weights[None])[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.curves.geodesics import GeodesicPathSolver
-from heat_igl.curves.places import Waypoints, mixed_places, snapped
+from heat_igl.curves.places import Waypoints, mixed_places
 from heat_igl.curves.shortening import as_curve
 from heat_igl.errors import SourceError, names_guessed, positive, truth
 from heat_igl.heat import SignedHeatSolver
@@ -13,6 +13,7 @@ from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoi
 from heat_igl.mesh.grouping import enumerate_runs
 from heat_igl.mesh.projection import ClosestPoints, Projector, checked_points
 from heat_igl.mesh.surface_points import unchecked_curve
+from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 # Twice so many faces are followed between two samples, half a mean edge length apart.
@@ -132,7 +133,7 @@ def curve_on(
             f"the polyline leaves the surface by {found.gap[far]:.6g} on the line from "
             f"positions[{line[min(far, len(line) - 1)]}], at {places[far].tolist()}; tolerance is {tolerance:.6g}"
         )
-    faces, barycentric = found.points.faces, snapped(found.points.barycentric)
+    faces, barycentric = found.points.faces, on_simplex(found.points.barycentric)
     component = mesh.components[mesh.F[faces, 0]]
     jumps = component[1:] != component[:-1]
     if not jumps.any():

@@ -8,7 +8,6 @@ from threading import RLock
 import numpy as np
 
 from heat_igl.curves.places import CommonFaces, Waypoints, corners, mixed_places
-from heat_igl.curves.routes import Router
 from heat_igl.curves.shortening import FaceSequence, Shortened, Shortener, as_curve, course_of
 from heat_igl.errors import MeshError, SourceError, names_guessed, truth
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
@@ -140,7 +139,6 @@ class GeodesicPathSolver:
             raise MeshError("paths need triangles, but the mesh is tetrahedral")
         self._shortener = Shortener(self._mesh)
         self._corner_at = corners(self._mesh)
-        self._router: Router | None = None
         # The tables hold what one search leaves behind.
         self._one_at_a_time = RLock()
 
@@ -173,13 +171,13 @@ class GeodesicPathSolver:
         if closed:
             around = np.append(np.arange(len(faces)), 0)
             with self._one_at_a_time:
-                return self._loop(self._routes.legs(faces[around], barycentric[around]))
+                return self._loop(self._shortener.courses(faces[around], barycentric[around]))
         return as_curve(self.geodesics(faces, barycentric), is_closed=False).on(self._mesh)
 
     def geodesics(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
         """The geodesics between checked places (k,), each from one to the next."""
         with self._one_at_a_time:
-            return [self._shortener.shortest(leg) for leg in self._routes.legs(faces, barycentric)]
+            return [self._shortener.shortest(leg) for leg in self._shortener.courses(faces, barycentric)]
 
     def pieces(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
         """From each checked place (k,) to the next: straight in a face that holds both, or else the geodesic."""
@@ -199,12 +197,6 @@ class GeodesicPathSolver:
     @cached_property
     def _common(self) -> CommonFaces:
         return CommonFaces(self._mesh)
-
-    @property
-    def _routes(self) -> Router:
-        if self._router is None:
-            self._router = Router(self._mesh, self._shortener.faces)
-        return self._router
 
     def _loop(self, legs: list[FaceSequence]) -> SurfaceCurve:
         """The closed geodesic of the loop that these legs make."""

@@ -8,10 +8,11 @@ from typing import cast
 import numpy as np
 
 from heat_igl.errors import SourceError
-from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
+from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.projection import points_beside
 from heat_igl.sources import Sources, are_positions, named_vertices
+from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import FloatArray, IntArray
 
 # Vertices, points, or a sequence of both.
@@ -28,7 +29,7 @@ def places(name: str, mesh: Mesh, points: Sources, corner_at: IntArray | None = 
             points.positions(mesh)  # which checks the faces
         except SourceError as error:
             raise SourceError(f"{name}: {error}") from None
-        return points.faces, snapped(points.barycentric)
+        return points.faces, on_simplex(points.barycentric)
     rows = isinstance(points, np.ndarray | list | tuple) and len(points) > 0 and np.ndim(points[0]) == 1
     if rows or are_positions(points):
         return places(name, mesh, points_beside(mesh, points, name))  # type: ignore[arg-type]
@@ -79,9 +80,3 @@ class CommonFaces:
         face = int(faces[0]) if faces[0] == faces[1] else self.of(corners[barycentric > 0])
         here = self._mesh.F[face][None, :, None] == corners[:, None]
         return face, np.einsum("kij,kj->ki", here, barycentric)
-
-
-def snapped(barycentric: FloatArray) -> FloatArray:
-    """Barycentric coordinates with those below `ON_SIDE` set to 0."""
-    weights = np.where(barycentric < ON_SIDE, 0.0, barycentric)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))

@@ -10,10 +10,11 @@ import numpy as np
 from heat_igl.errors import SourceError, real_numbers, shown
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels.paths import straightest
-from heat_igl.mesh import ON_SIDE, MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
+from heat_igl.mesh import MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
 from heat_igl.mesh.cloud_orientation import on_one_side
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
+from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 # The compiled module, whose signatures are those of Cython.
@@ -213,8 +214,7 @@ class Tracer:
         """
         if isinstance(points, SurfacePoints):
             points.positions(self._mesh)  # which checks the faces
-            weights = np.where(points.barycentric < ON_SIDE, 0.0, points.barycentric)
-            weights /= weights.sum(axis=1, keepdims=True)
+            weights = on_simplex(points.barycentric)
             corner = self._surface.F[points.faces, weights.argmax(axis=1)]
             vertices = np.where((weights.max(axis=1) == 1) & in_frame, corner, -1)
             return _Starts(points.faces.copy(), np.ascontiguousarray(weights), vertices)

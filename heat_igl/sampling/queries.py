@@ -14,15 +14,12 @@ from heat_igl.runtime import TimeLeft
 from heat_igl.sources import named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
-# Rows of distances in memory at a time.
-_BLOCK = 8
 
-
-def checked_vertices(name: str, vertices: ArrayLike, n: int, distinct: bool = True) -> IntArray:
+def checked_vertices(name: str, vertices: ArrayLike, n: int) -> IntArray:
     """Indices of distinct `vertices`, in the given order; a `SourceError` that calls them `name` for any others."""
     named = named_vertices(cast(Any, vertices), n, name)
     values, counts = np.unique(named, return_counts=True)
-    if distinct and len(values) < len(named):
+    if len(values) < len(named):
         raise SourceError(f"{name} must be distinct, but vertex {values[counts > 1][0]} is there twice")
     return named
 
@@ -37,7 +34,6 @@ def as_solver(solver: Solver | MeshLike) -> Solver:
 def distance_rows(solver: Solver, vertices: IntArray) -> Iterator[AnyArray]:
     """Distances (n,) from each of `vertices`, solved in blocks."""
     left = TimeLeft("queries are done", len(vertices))
-    for start in range(0, len(vertices), _BLOCK):
-        block = vertices[start : start + _BLOCK]
-        yield from solver.distances([[int(v)] for v in block])
-        left(len(block))
+    for row in solver.iter_distances([[int(v)] for v in vertices]):
+        left()
+        yield row
