@@ -107,7 +107,7 @@ def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArr
 
 
 class Shortener:
-    """Finds courses on a triangle mesh, and shortens them, one after another: each thread needs an object of its own."""
+    """Finds courses on a triangle mesh, and shortens them, one after another; each thread needs its own."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
@@ -127,7 +127,7 @@ class Shortener:
         return search.EdgeRoutes(self._faces, self._mesh.V)
 
     def courses(self, faces: IntArray, barycentric: FloatArray) -> list[FaceSequence]:
-        """The k - 1 shortest ways along edges between places (k,), each to the next; a `SourceError` if there is none."""
+        """The k - 1 shortest ways along edges from each place (k,) to the next; a `SourceError` if there is none."""
         F, V, found = self._mesh.F, self._mesh.V, []
         for i in range(len(faces) - 1):
             ends, places = faces[i : i + 2].astype(np.int32), barycentric[i : i + 2]

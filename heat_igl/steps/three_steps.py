@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -288,57 +288,6 @@ def _front_rate(operators: Operators, t: float | FloatArray) -> FloatArray:
     return np.asarray(2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
 
 
-class DivergenceTables(NamedTuple):
-    """All that the divergence takes of a triangulation, a row per face, so that a pass reads little memory.
-
-    `order` (n,) are the vertices as they are visited, and `corners` (m, 3) their places in it. The `numbers` (m, 5) of
-    a face are one over the length of the side from corner 0 to corner 1; the foot of corner 2 on it, from 0 to 1; one
-    over the height; the area; one over the square of the rate below which a direction is not trusted fully.
-    """
-
-    order: IntArray
-    corners: AnyArray
-    numbers: FloatArray
-
-
-def divergence_tables(
-    elements: TriangleElements, weights: FloatArray, full_rate: FloatArray, order: IntArray | None
-) -> DivergenceTables:
-    """The tables of `elements`, for faces of area `weights` (m,) and vertices visited in `order`.
-
-    `full_rate` (m,) is the rate of decay from which on a direction is trusted fully, 0 for any.
-    """
-    F = elements.corners
-    n, m = 1 + int(F.max(initial=-1)) if order is None else len(order), len(F)
-    order = np.arange(n) if order is None else order
-    place = np.empty(n, np.int32)
-    place[order] = np.arange(n, dtype=np.int32)
-    corners = place[F]
-    first = np.minimum(np.minimum(corners[:, 0], corners[:, 1]), corners[:, 2])
-    # No two of these numbers are equal, so that every way of sorting gives the same.
-    by_first = np.sort(first.astype(np.int64) * m + np.arange(m)) % m
-    numbers = np.empty((m, 5))
-    with np.errstate(divide="ignore"):
-        for column, values in enumerate((*elements.frames(), weights, full_rate**-2.0)):
-            numbers[:, column] = values[by_first]
-    return DivergenceTables(order, corners[by_first], numbers)
-
-
-def normalized_divergence(t: DivergenceTables, u: FloatArray, smallest: float, of_log: bool = False) -> FloatArray:
-    """Integrated divergence (n, k) of -grad u / |grad u|, times |grad log u| / full_rate if that is below 1.
-
-    It follows the gradient of log u if `of_log`, on faces with no corner below `smallest`. It is 0 if no
-    component of grad u reaches `smallest`, and of length 1 if u is not positive.
-    """
-    divergence = np.zeros(u.shape)
-    for column, of_column in zip(u.T, divergence.T, strict=True):
-        ordered = column[t.order].astype(np.float64, copy=False)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            log_u = np.log(ordered)
-        of_column[t.order] = divergence_of_descent(t.corners, t.numbers, ordered, log_u, smallest, of_log)
-    return divergence
-
-
 class NormalizedDivergence:
     """The right-hand side of step 3: the divergence of the field X of step 2.
 
@@ -366,34 +315,59 @@ class NormalizedDivergence:
         fitted: bool = False,
     ) -> None:
         self._arguments = operators, t, order, fitted
-        self._full_rate: FloatArray | None = None
-        self._tables: DivergenceTables | None = None
-        full_rate = None if t is None else lowest_full_rate(operators, t, fitted)
+        self._full_rate = np.zeros(len(operators.weights)) if t is None else lowest_full_rate(operators, t, fitted)
+        self._tables: tuple[AnyArray, FloatArray] | None = None
         if isinstance(operators.gradient, TriangleElements):
-            full_rate = np.zeros(len(operators.weights)) if full_rate is None else full_rate
-            self._tables = divergence_tables(operators.gradient, operators.weights, full_rate, order)
+            self._order = np.arange(operators.n) if order is None else order
+            self._tables = _divergence_tables(operators.gradient, operators.weights, self._full_rate, self._order)
         else:
-            self._full_rate = full_rate
             _ = operators.D  # made on first use otherwise, in the middle of the first query
 
     def divergence(self, u: FloatArray) -> FloatArray:
         """Integrated divergence (n, k) for heat (n, k)."""
-        operators, _, _, fitted = self._arguments
-        if self._tables is not None:
-            return normalized_divergence(self._tables, u, LOWEST_HEAT, fitted)
+        operators, t, _, fitted = self._arguments
         divergence = np.empty(u.shape)
         # One column at a time: the field of all takes more memory than the caches hold.
-        for column, of_column in zip(np.ascontiguousarray(u.T), divergence.T, strict=True):
+        for column, of_column in zip(u.T, divergence.T, strict=True):
+            if self._tables is not None:
+                ordered = column[self._order].astype(np.float64, copy=False)
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    log_u = np.log(ordered)
+                of_column[self._order] = divergence_of_descent(*self._tables, ordered, log_u, LOWEST_HEAT, fitted)
+                continue
+            column = np.ascontiguousarray(column)
             X = normalize(operators, column, fitted)
-            if self._full_rate is not None:
+            if t is not None:
                 X *= np.tile(_share_of_rate(operators, column, self._full_rate), operators.dimension)
             of_column[:] = operators.D @ X
         return divergence
 
-    def __reduce__(
-        self,
-    ) -> tuple[type[NormalizedDivergence], tuple[Operators, float | FloatArray | None, IntArray | None, bool]]:
+    def __reduce__(self) -> tuple[type[NormalizedDivergence], tuple[Any, ...]]:
         return NormalizedDivergence, self._arguments
+
+
+def _divergence_tables(
+    elements: TriangleElements, weights: FloatArray, full_rate: FloatArray, order: IntArray
+) -> tuple[AnyArray, FloatArray]:
+    """All that the divergence takes of a triangulation, a row per face, so that a pass reads little memory.
+
+    Corners (m, 3) int32 are places in the `order` in which vertices are visited; faces have the order of their first
+    corners there. The numbers (m, 5) of a face are one over the length of the side from corner 0 to corner 1; the foot
+    of corner 2 on it, from 0 to 1; one over the height; the area; one over the square of `full_rate`, the rate below
+    which a direction is not trusted fully, 0 for any.
+    """
+    F = elements.corners
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    corners = place[F]
+    first = np.minimum(np.minimum(corners[:, 0], corners[:, 1]), corners[:, 2])
+    # No two of these numbers are equal, so that every way of sorting gives the same.
+    by_first = np.sort(first.astype(np.int64) * len(F) + np.arange(len(F))) % len(F)
+    numbers = np.empty((len(F), 5))
+    with np.errstate(divide="ignore"):
+        for column, values in enumerate((*elements.frames(), weights, full_rate**-2.0)):
+            numbers[:, column] = values[by_first]
+    return corners[by_first], numbers
 
 
 class PoissonProblem:
