@@ -186,5 +186,5 @@ def test_what_leaves_the_bounds_is_brought_back():
     Bounds(surface).shorten(d)
     assert (d <= along_edges * (1 + 1e-9)).all()
     d = straight / 2
-    Bounds(surface).lengthen(d, sources, sources.points)
+    Bounds(surface).lengthen(d, sources)
     np.testing.assert_allclose(d, straight, rtol=1e-9)

@@ -14,7 +14,7 @@ from heat_igl.sources import SourceSet
 from heat_igl.sweep import SweepEngine
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import Engine, OperatorTriangles, WindowEngine, contradicted
-from heat_igl.windows.bounds import Bounds
+from heat_igl.windows.bounds import Bounds, raise_to_lines, source_places
 
 # Mean shortfall from which on all distances are raised to straight lines.
 _RAISED = 0.005
@@ -27,8 +27,6 @@ _SHORT_IN_VOLUMES, _WORST_IN_VOLUMES = 0.1, 0.2
 _MOST_VERTICES, _MOST_EDGES = 2000, 1000
 # Lines from many sources to fewer vertices.
 _MOST_LINES = 16000
-# With more sources, a tree finds the nearest sooner than a loop over all.
-_FEW_SOURCES = 32
 # From so many, lines to all vertices take a few percent of a query.
 _VERY_FEW_SOURCES = 4
 # Mean difference from a sweep from which on a warning is issued. A sweep is itself wrong by up to 3 %, mostly by less
@@ -291,45 +289,18 @@ class Checker:
         """
         if self._bounds is not None:
             self._bounds.shorten(distance, share=_STEEP)
-        if check.is_short or len(sources.offsets) <= _VERY_FEW_SOURCES:
-            return check._replace(raised=self.raise_to_lines(distance, sources))
-        return check
-
-    def raise_to_lines(self, distance: FloatArray, sources: SourceSet) -> bool:
-        """Raise an answer (n,) to the straight lines from the sources, in place; returns whether that was done.
-
-        Nothing is done for many sources with different offsets.
-        """
         places = self._places(sources)
-        if places is None or self._V is None:
-            return False
-        positions, offsets = places
-        if len(offsets) <= _FEW_SOURCES:
-            line = checking.straight_lines(self._V, positions, offsets)
-        elif np.ptp(offsets) == 0:
-            from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
-
-            line = cKDTree(positions).query(self._V)[0] + offsets[0]
-        else:
-            return False
-        line[sources.vertices] = 0.0
-        np.maximum(distance, line, out=distance)
-        return True
+        if places is None or self._V is None or not (check.is_short or len(sources.offsets) <= _VERY_FEW_SOURCES):
+            return check
+        return check._replace(raised=raise_to_lines(distance, self._V, *places))
 
     def _places(self, sources: SourceSet) -> tuple[FloatArray, FloatArray] | None:
-        """Positions (k, 3) and offsets (k,) of the sources; None for curves, which have no one position."""
-        if self._V is None or len(sources.segments.faces):
+        """As `source_places`; from a vertex that no face uses there is no distance to check."""
+        places = source_places(self._V, self._F, sources)
+        if places is None:
             return None
-        # From a vertex that no face uses there is no distance to check.
-        used = self._referenced[sources.vertices]
-        positions, offsets = self._V[sources.vertices[used]], sources.vertex_offset[used]
-        points = sources.points
-        if len(points.faces) and self._F is not None:
-            inside = np.einsum("kc,kcx->kx", points.barycentric, self._V[self._F[points.faces]])
-            positions, offsets = np.concatenate([positions, inside]), np.concatenate([offsets, points.offset])
-        if not len(offsets):
-            return None
-        return np.ascontiguousarray(positions), np.ascontiguousarray(offsets, np.float64)
+        used = np.append(self._referenced[sources.vertices], np.ones(len(sources.points.faces), bool))
+        return (places[0][used], places[1][used]) if used.any() else None
 
 
 def _sample(items: IntArray, most: int) -> IntArray:

@@ -183,9 +183,14 @@ class SolverParts:
     diagnostics: Diagnostics
 
 
-def prepare_mesh(mesh: Mesh | PointCloud, options: SolverOptions, known: Analysis | None = None) -> SolverParts:
+def prepare_mesh(
+    mesh: Mesh | PointCloud | PolygonMesh, options: SolverOptions, known: Analysis | None = None
+) -> SolverParts:
     """The parts of a solver on `mesh`; a `known` order of elimination is taken if it fits."""
     start = time.perf_counter()
+    if isinstance(mesh, PolygonMesh):
+        domain = fan_operators(mesh, options.laplacian)
+        return prepare(domain, options, seconds_operators=time.perf_counter() - start, V=mesh.V)
     begun: list[Future[Analysis]] = []
     with pool(1) as beside:
 
@@ -208,13 +213,6 @@ def _t_coef_of_points(triangles: Mesh) -> float:
     sides = np.sort(igl.edge_lengths(triangles.V, triangles.F), axis=1)
     ratio = np.median(sides[:, 2] / np.maximum(sides[:, 0], np.finfo(float).tiny))
     return T_COEF_RANDOM_POINTS if ratio > RANDOM_SIDES else T_COEF_EVEN_POINTS
-
-
-def prepare_polygons(mesh: PolygonMesh, options: SolverOptions) -> SolverParts:
-    """The parts of a solver on the triangles around the virtual vertices of polygons."""
-    start = time.perf_counter()
-    domain = fan_operators(mesh, options.laplacian)
-    return prepare(domain, options, seconds_operators=time.perf_counter() - start, V=mesh.V)
 
 
 def prepare(

@@ -11,7 +11,7 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning, checked_cutoff, names_guessed
 from heat_igl.heat.batches import BatchedSolver, LabelledDistance
 from heat_igl.heat.checking import AnswerCheck
-from heat_igl.heat.parts import Magnitude, SolverOptions, SolverParts, prepare, prepare_mesh, prepare_polygons
+from heat_igl.heat.parts import Magnitude, SolverOptions, SolverParts, prepare, prepare_mesh
 from heat_igl.heat.solution import Diagnostics, HeatSolution
 from heat_igl.heat.source_terms import Seeds, SourceTerm, drop_overtaken, right_hand_side, warmest_sources
 from heat_igl.linear import Backend
@@ -124,11 +124,10 @@ class HeatMethodSolver(BatchedSolver):
                 raise ValueError(f"laplacian={options.laplacian!r} is for meshes: operators have a Laplacian already")
             # Whoever made the operators chose the triangulation.
             chosen = replace(options, laplacian="intrinsic-delaunay")
-            self._mesh, self._parts = None, prepare(domain, chosen)
-        elif isinstance(domain, PolygonMesh):
-            self._mesh, self._parts = None, prepare_polygons(domain, options)
+            self._parts = prepare(domain, chosen)
         else:
-            self._mesh, self._parts = domain, prepare_mesh(domain, options)
+            self._mesh = None if isinstance(domain, PolygonMesh) else domain
+            self._parts = prepare_mesh(domain, options)
 
     @classmethod
     def from_edge_lengths(
@@ -201,7 +200,7 @@ class HeatMethodSolver(BatchedSolver):
             if fans is None:
                 raise ValueError("this solver was made from operators and has no vertices to move: make it again")
             positions = fans.polygons.triangles.with_vertices(V).V
-            return self._of(prepare_polygons(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
+            return self._of(prepare_mesh(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
         moved = self._mesh.with_vertices(V)
         options, known = self._parts.options, self._parts.analysis
         solver = self._of(prepare_mesh(moved, options, known), moved)
@@ -317,11 +316,9 @@ class HeatMethodSolver(BatchedSolver):
         A field of length 1 is the paper's method, and a time step or a boundary that was asked for has a purpose: their
         answers are left as they are.
         """
-        parts = self._parts
-        check = parts.checker.check(distance, sources)
-        if not parts.is_default:
-            return check
-        return parts.checker.hold_to_bounds(distance, sources, check)
+        checker = self._parts.checker
+        check = checker.check(distance, sources)
+        return checker.hold_to_bounds(distance, sources, check) if self._parts.is_default else check
 
     def _compared(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck) -> AnswerCheck:
         """The check of an answer (n,), which is compared with another engine where it may be wrong."""

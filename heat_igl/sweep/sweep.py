@@ -107,7 +107,7 @@ class SweepEngine(TriangleEngine):
         distance[np.isnan(distance)] = np.inf
         distance[sources.vertices] = np.minimum(distance[sources.vertices], sources.vertex_offset)
         self._bounds.shorten(distance, labels)
-        self._bounds.lengthen(distance, sources, points)
+        self._bounds.lengthen(distance, sources)
         _warn_if_moved(swept, distance, self._triangles.mean_edge_length)
         return self._with_copies(distance), self._with_copies(labels)
 

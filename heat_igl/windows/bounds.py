@@ -8,12 +8,15 @@ import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels.mesh import bounds as kernels
+from heat_igl.kernels.mesh import checking
 from heat_igl.operators import Surface
-from heat_igl.sources import SourcePoints, SourceSet
+from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Less than this fraction is rounding.
 _ROUNDING = 1e-12
+# With more sources, a tree finds the nearest sooner than a loop over all.
+_FEW = 32
 _NO_LABELS = np.empty(0, np.int64)
 
 
@@ -53,26 +56,39 @@ class Bounds:
         if kernels.is_longer(*self._edges, distance, share):
             kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels, share)
 
-    def lengthen(self, distance: FloatArray, sources: SourceSet, points: SourcePoints) -> None:
-        """Raise distances (n,) to the straight lines from the nearest source, in place.
+    def lengthen(self, distance: FloatArray, sources: SourceSet) -> None:
+        """Raise distances (n,) to the straight lines from the nearest source, in place, where positions are known."""
+        places = source_places(self._surface.V, self._surface.given_faces, sources)
+        if places is not None and self._surface.V is not None:
+            raise_to_lines(distance, self._surface.V, *places)
 
-        Where sources begin at different distances, or are curves, or positions are not known, nothing is raised.
-        """
-        V, F = self._surface.V, self._surface.given_faces
-        offset = np.concatenate([sources.vertex_offset, points.offset])
-        if V is None or len(sources.segments.faces) or offset.any() or (len(points.faces) and F is None):
-            return
-        places = V[sources.vertices]
-        if F is not None and len(points.faces):
-            inside = np.einsum("pc,pcx->px", points.barycentric, V[F[points.faces]])
-            places = np.concatenate([places, inside])
-        if len(places) == 1:
-            kernels.lengthen(V, places[0], distance)
-        else:
-            from scipy.spatial import KDTree  # takes as long to import as the rest of the package
 
-            straight = np.asarray(KDTree(places).query(V)[0])
-            np.maximum(distance, straight * (1 - _ROUNDING), out=distance)
+def source_places(V: FloatArray | None, F: IntArray | None, sources: SourceSet) -> tuple[FloatArray, FloatArray] | None:
+    """Positions (k, 3) and offsets (k,) of the sources; None for curves, which have no one position."""
+    points = sources.points
+    if V is None or len(sources.segments.faces) or (len(points.faces) and F is None):
+        return None
+    places = V[sources.vertices]
+    if F is not None and len(points.faces):
+        places = np.concatenate([places, np.einsum("pc,pcx->px", points.barycentric, V[F[points.faces]])])
+    return np.ascontiguousarray(places), np.ascontiguousarray(sources.offsets, np.float64)
+
+
+def raise_to_lines(distance: FloatArray, V: FloatArray, places: FloatArray, offsets: FloatArray) -> bool:
+    """Raise distances (n,) to the straight lines from the nearest place, in place; returns whether that was done.
+
+    Nothing is done for many places with different offsets.
+    """
+    if len(places) <= _FEW:
+        line = checking.straight_lines(V, places, offsets)
+    elif np.ptp(offsets) == 0:
+        from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
+
+        line = cKDTree(places).query(V)[0] + offsets[0]
+    else:
+        return False
+    np.maximum(distance, line * (1 - _ROUNDING), out=distance)
+    return True
 
 
 def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:

@@ -1,8 +1,8 @@
-"""Bounds of a distance that take no search: paths along edges from above, straight lines from below."""
+"""A bound of a distance that takes no search: paths along edges."""
 
 import cython
 import numpy as np
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.libc.math import fabs
 
 
 def is_longer(
@@ -154,18 +154,3 @@ def _far_end(
         near, far = far, near
     # Not by rounding, which would pass along many edges.
     return far if d[near] + length[e] * (1 + share) < d[far] * (1 - 1e-12) else -1
-
-
-def lengthen(V: cython.const[cython.double][:, ::1], place: cython.const[cython.double][::1], d: cython.double[::1]):
-    """Raise `d` (n,) to the straight lines from a place (3,) to the vertices V (n, 3), in place."""
-    with cython.nogil:
-        for i in range(d.shape[0]):
-            x: cython.double = V[i, 0] - place[0]
-            y: cython.double = V[i, 1] - place[1]
-            z: cython.double = V[i, 2] - place[2]
-            squared: cython.double = x * x + y * y + z * z
-            # Few are shorter, and only those need a root.
-            if squared > d[i] * d[i]:
-                straight: cython.double = sqrt(squared) * (1 - 1e-12)
-                if d[i] < straight:
-                    d[i] = straight
