@@ -289,7 +289,7 @@ class Checker:
         """
         if self._bounds is not None:
             self._bounds.shorten(distance, share=_STEEP)
-        places = self._places(sources)
+        places = source_places(self._V, self._F, sources)
         if places is None or self._V is None or not (check.is_short or len(sources.offsets) <= _VERY_FEW_SOURCES):
             return check
         return check._replace(raised=raise_to_lines(distance, self._V, *places))

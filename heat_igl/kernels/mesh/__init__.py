@@ -1,7 +1,7 @@
 """Triangles by their corners and edge lengths: joined along edges, numbered, flipped and refined.
 
-Half-edge ``3 f + c`` is the side of face f opposite its corner c; `triangles.pxd` steps from one to the next. A mesh
-goes through these modules, as far as its use needs:
+Half-edge ``3 f + c`` is the side of face f opposite its corner c; `triangles.pxd` steps from one to the next, and
+`straight.pxd` carries a straight line through a face. A mesh goes through these modules, as far as its use needs:
 
 1. `incidence` finds the edges and components of a mesh.
 2. `gluing` joins the half-edges that share an edge and takes their lengths, without the edges of a mesh;

@@ -20,15 +20,6 @@ cdef struct Location:
     int face
     double u, v, w
 
-# The straight walk in the plane of the first face: from, to, and the difference.
-cdef struct Walk:
-    double ox, oy, tx, ty, dx, dy
-
-# The side by which the walk leaves a face: the half-edge, and the ends of it to the right (r) and left (s) of the ray.
-cdef struct Exit:
-    int h
-    double rx, ry, sx, sy
-
 
 cdef class _Refinement:
     cdef Flips flips
@@ -47,4 +38,3 @@ cdef class _Refinement:
 
 cdef void _find_sharp(Flips t, int n_faces, unsigned char[::1] seen, unsigned char[::1] is_sharp) noexcept nogil
 cdef Location _circumcenter(Flips t, int f) noexcept nogil
-cdef Location _walk(Flips t, Walk ray, Exit way) noexcept nogil

@@ -8,7 +8,8 @@ Delaunay again. Only for surfaces without a boundary: there the walk cannot leav
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.flipping import SPLIT, Flips
-from cython.cimports.heat_igl.kernels.mesh.refinement import LEAST, MOST_STEPS, SHARPEST, Exit, Location, Walk
+from cython.cimports.heat_igl.kernels.mesh.refinement import LEAST, MOST_STEPS, SHARPEST, Location
+from cython.cimports.heat_igl.kernels.mesh.straight import INSIDE, OVER_SIDE, Exit, Ray, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
@@ -184,62 +185,39 @@ def _circumcenter(t: Flips, f: cython.int) -> Location:
     u, v, w = u / total, v / total, w / total
     if u >= 0.0 and v >= 0.0 and w >= 0.0:
         return Location(f, u, v, w)
-    # Laid out with corner 0 in the origin and corner 1 on the first axis; the walk begins in the centroid.
-    px: cython.double[3]
-    py: cython.double[3]
-    px[0], py[0], px[1], py[1] = 0.0, 0.0, c, 0.0
-    px[2], py[2] = foot(c, b, a), 2.0 * area(a, b, c) / c
-    ray: Walk
-    ray.ox, ray.oy = (c + px[2]) / 3.0, py[2] / 3.0
-    ray.tx, ray.ty = v * c + w * px[2], w * py[2]
-    ray.dx, ray.dy = ray.tx - ray.ox, ray.ty - ray.oy
-    # The ray leaves by the side whose ends lie to the right and to the left of it.
-    side: cython.int = 2
-    i: cython.int
-    j: cython.int
-    for corner in range(3):
-        i, j = (corner + 1) % 3, (corner + 2) % 3
-        if (
-            ray.dx * (py[i] - ray.oy) - ray.dy * (px[i] - ray.ox) <= 0.0
-            and ray.dx * (py[j] - ray.oy) - ray.dy * (px[j] - ray.ox) > 0.0
-        ):
-            side = corner
-    i, j = (side + 1) % 3, (side + 2) % 3
-    return _walk(t, ray, Exit(3 * f + side, px[i], py[i], px[j], py[j]))
-
-
-def _walk(t: Flips, ray: Walk, way: Exit) -> Location:
-    """Locate the end of a ray that leaves a face, by unfolding the faces that it crosses into the plane."""
+    # From the centroid, in the frame of the side from corner 0 to corner 1.
+    apex: cython.double = foot(c, b, a)
+    height: cython.double = 2.0 * area(a, b, c) / c
+    x: cython.double = (c + apex) / 3.0
+    y: cython.double = height / 3.0
+    dx: cython.double = v * c + w * apex - x
+    dy: cython.double = w * height - y
+    left: cython.double = sqrt(dx * dx + dy * dy)
+    ray: Ray = Ray(3 * f + 2, INSIDE, x, y, dx / left, dy / left)
     for _ in range(MOST_STEPS):
-        h: cython.int = t.twin[way.h]
+        h: cython.int = ray.h
+        size: cython.double = area(t.length[h], t.length[next_half_edge(h)], t.length[previous_half_edge(h)])
+        way: Exit = cross(cython.address(t.length[0]), 2.0 * size, cython.address(ray))
+        across: cython.double = way.left + way.right
+        if not across > 0.0:
+            break
+        share: cython.double = way.left / across
+        step: cython.double = way.head_ahead + share * (way.tail_ahead - way.head_ahead)
+        if step >= left:
+            at_apex: cython.double = (ray.y + left * ray.dy) * t.length[h] / (2.0 * size)
+            apex = foot(t.length[h], t.length[previous_half_edge(h)], t.length[next_half_edge(h)])
+            at_head: cython.double = (ray.x + left * ray.dx - at_apex * apex) / t.length[h]
+            at_tail: cython.double = 1.0 - at_apex - at_head
+            if h % 3 == 0:
+                return Location(h // 3, at_apex, at_tail, at_head)
+            if h % 3 == 1:
+                return Location(h // 3, at_head, at_apex, at_tail)
+            return Location(h // 3, at_tail, at_head, at_apex)
+        left -= step
+        h = t.twin[way.h]
         if h < 0:
             break
-        # Seen from the face beyond, the side runs from s to r; the apex q lies beyond.
-        base: cython.double = t.length[h]
-        following: cython.double = t.length[next_half_edge(h)]
-        preceding: cython.double = t.length[previous_half_edge(h)]
-        along: cython.double = foot(base, preceding, following) / base
-        across: cython.double = 2.0 * area(base, following, preceding) / (base * base)
-        ex: cython.double = way.rx - way.sx
-        ey: cython.double = way.ry - way.sy
-        qx: cython.double = way.sx + along * ex - across * ey
-        qy: cython.double = way.sy + along * ey + across * ex
-        # Barycentric coordinates of the target in this face: at the apex, after it (s) and before it (r).
-        area2: cython.double = ex * (qy - way.sy) - ey * (qx - way.sx)
-        at_q: cython.double = (ex * (ray.ty - way.sy) - ey * (ray.tx - way.sx)) / area2
-        at_s: cython.double = ((qx - way.rx) * (ray.ty - way.ry) - (qy - way.ry) * (ray.tx - way.rx)) / area2
-        at_r: cython.double = 1.0 - at_q - at_s
-        if at_s >= 0.0 and at_r >= 0.0:
-            if h % 3 == 0:
-                return Location(h // 3, at_q, at_s, at_r)
-            if h % 3 == 1:
-                return Location(h // 3, at_r, at_q, at_s)
-            return Location(h // 3, at_s, at_r, at_q)
-        if ray.dx * (qy - ray.oy) - ray.dy * (qx - ray.ox) > 0.0:
-            # The apex lies to the left: leave between r and the apex.
-            way.sx, way.sy, way.h = qx, qy, next_half_edge(h)
-        else:
-            way.rx, way.ry, way.h = qx, qy, previous_half_edge(h)
+        ray = Ray(h, OVER_SIDE, share * t.length[h], 0.0, way.dx, way.dy)
     return Location(-1, 0.0, 0.0, 0.0)
 
 

@@ -14,6 +14,6 @@ distance is needed. `heat_igl.curves.shortening` and `.straightest` make the arg
 4. `shortening`: an open curve is done then. A loop is straightened from one of its points to itself, and from another
    one, until its length stays the same (`Loop`).
 
-`straightest` is independent of these: a line goes straight on over edges, and past a vertex with equal angles on both
-sides.
+`straightest` is independent of these: a line goes straight on over edges (`kernels.mesh.straight`, as paths traced back
+through windows and the search for circumcenters do), and past a vertex with equal angles on both sides.
 """

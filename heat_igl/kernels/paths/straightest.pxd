@@ -1,4 +1,5 @@
 from heat_igl.kernels.mesh.segments cimport Segments
+from heat_igl.kernels.mesh.straight cimport Exit, Ray
 
 cdef extern from *:
     """
@@ -18,25 +19,6 @@ cdef enum:
     MOST_IDLE = 10000
 
 
-# A point on the base of a face, and the direction in which it moves.
-# The base is half-edge `h`, from the tail in the origin to the head on the first axis; the face is above it. The point
-# is the share `s` of the base from the tail, unless it `is_inside` the face. `is_at_tail`: it is the tail, and leaves
-# across the side opposite.
-cdef struct Heading:
-    long long h
-    double s, dx, dy
-    bint is_inside, is_at_tail
-
-# Face `f` in the plane, with its corners (x, y) from the tail of side `side` on; the ray starts in the origin, and leaves
-# at the share `share` of the side from point `k` to the next.
-cdef struct FaceInPlane:
-    long long f
-    int side, k
-    double x[3]
-    double y[3]
-    double share
-
-
 cdef class _Tracer:
     cdef double[:, ::1] l
     cdef double[::1] area
@@ -44,11 +26,11 @@ cdef class _Tracer:
     cdef long long[::1] twin
     cdef double[:, ::1] half
     cdef Segments segments  # None if they are not asked for
-    # Of the geodesic being traced: the ray, the face laid out around it, and where it enters and leaves that face in
-    # barycentric coordinates.
-    cdef Heading ray
-    cdef FaceInPlane face
-    cdef double entry[3], leave[3]
+    # Of the geodesic being traced: the ray into a face, and where it leaves that, by the share of the side. In
+    # barycentric coordinates, where it enters and leaves.
+    cdef Ray ray
+    cdef Exit exit
+    cdef double share, entry[3], leave[3]
 
     cdef int trace_one(
         self, long long face, double* at, double turn, double length, long long* end_face, double* end,
@@ -56,7 +38,6 @@ cdef class _Tracer:
     ) except -1 nogil
     cdef bint start(self, long long f, double turn) noexcept nogil
     cdef bint leave_corner(self, long long corner, double turn) noexcept nogil
-    cdef void lay_out(self) noexcept nogil
     cdef double find_exit(self, double travelled) noexcept nogil
     cdef bint pass_vertex(self) noexcept nogil
     cdef bint cross_side(self) noexcept nogil

@@ -14,6 +14,6 @@ out in the plane before the half-edge gives the distance of every point of the w
 - `joining`: within a tolerance, neighbouring windows become one, and gaps between windows are closed.
 - `search`: takes one entry after the other from the queue, on one thread or on two.
 - `windows`: what Python calls, one search for all vertices or many local ones.
-- `paths`: shortest paths back from where windows arrived.
+- `paths`: shortest paths back from where windows arrived, by `kernels.mesh.straight`.
 - `derivatives`: their lengths as functions of the edge lengths.
 """

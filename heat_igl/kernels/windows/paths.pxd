@@ -1,4 +1,5 @@
 from heat_igl.kernels.mesh.segments cimport Segments
+from heat_igl.kernels.mesh.straight cimport Exit, Ray
 
 cdef class InnerSources:
     cdef int n, n_points
@@ -22,10 +23,7 @@ cdef struct LineEnd:
     double crossing
 
 cdef struct Line:
-    # A line that enters the face of a half-edge at x from its tail, in a direction with dy > 0. In an outward frame, x
-    # is measured from the head.
-    int half_edge
-    double x, dx, dy
+    Ray ray
     double walked        # from where the straight part of the path ends
     long long n_segments
 
@@ -72,8 +70,8 @@ cdef class PathTracer:
     cdef int straight(self, const LineEnd* begin) except -4 nogil
     cdef bint leads(self, const LineEnd* begin, int v, double left) noexcept nogil
     cdef int go_through(self, const LineEnd* begin, const Line* line) except -4 nogil
-    cdef bint is_too_far(self, const LineEnd* begin, int h, const Line* line) noexcept nogil
-    cdef void go_over(self, int h, const Line* line) noexcept nogil
+    cdef bint is_too_far(self, const LineEnd* begin, const Line* line) noexcept nogil
+    cdef void go_over(self, const Line* line) noexcept nogil
     cdef void note(self, int t, const Line* line, bint mirrored) noexcept nogil
     cdef bint is_at_source(self, const LineEnd* begin, int f, double* here, double walked) noexcept nogil
     cdef int add(self, int f, double* here, int h, double x) except -1 nogil

@@ -5,6 +5,7 @@ Sources inside faces, points and segments, have the roots n + i for source i of 
 
 import cython
 from cython.cimports.heat_igl.kernels.mesh.segments import Segments
+from cython.cimports.heat_igl.kernels.mesh.straight import OVER_SIDE, Exit, Ray, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
@@ -182,14 +183,14 @@ class PathTracer:
         y: cython.double = here[h % 3] * self.double_area[f] / length
         # The outward frame of h begins at its head.
         x = length - (here[previous_half_edge(h) % 3] * length + here[h % 3] * x)
-        line.x = length - begin.crossing
-        line.walked = sqrt((line.x - x) * (line.x - x) + y * y)
+        at: cython.double = length - begin.crossing
+        line.walked = sqrt((at - x) * (at - x) + y * y)
         if line.walked <= 0.0:
             return LOST
-        line.dx, line.dy = (line.x - x) / line.walked, y / line.walked
-        self.add(f, here, h, line.x)
+        line.ray = Ray(h, OVER_SIDE, at, 0.0, (at - x) / line.walked, y / line.walked)
+        self.add(f, here, h, at)
         self.n_lines = 0
-        self.go_over(h, cython.address(line))
+        self.go_over(cython.address(line))
         while self.n_lines > 0:
             self.n_lines -= 1
             v = self.go_through(begin, cython.address(self.line[self.n_lines]))
@@ -207,65 +208,49 @@ class PathTracer:
         self, begin: cython.pointer[cython.const[LineEnd]], line: cython.pointer[cython.const[Line]]
     ) -> cython.int:
         """Carry a line through the face that it enters: a vertex it leads to, GO_ON, AT_SOURCE or LOST."""
-        t: cython.int = line.half_edge
+        t: cython.int = line.ray.h
         g: cython.int = t // 3
-        left: cython.int = previous_half_edge(t)
-        right: cython.int = next_half_edge(t)
-        length: cython.double = self.length[t]
-        apex_x: cython.double = foot(length, self.length[left], self.length[right])
-        apex_y: cython.double = self.double_area[g] / length
         here: cython.double[3]
         corner: cython.double[3]
-        side: cython.int
-        ux: cython.double
-        uy: cython.double
         out: Line
+        share: cython.double = line.ray.x / self.length[t]
         self.segments.n = line.n_segments
         self.n_steps += 1
         if self.n_steps > MOST_STEPS:
             return LOST
-        here[t % 3], here[right % 3], here[left % 3] = 0.0, 1.0 - line.x / length, line.x / length
-        x: cython.double = apex_x - line.x
+        here[t % 3], here[next_half_edge(t) % 3], here[previous_half_edge(t) % 3] = 0.0, 1.0 - share, share
+        at_corner(t % 3, corner)
         if self.is_at_source(begin, g, here, line.walked):
             return self.add_to_source(g, here, begin.root)
-        if self.leads(begin, self.vertex[t], line.walked + sqrt(x * x + apex_y * apex_y)):
-            at_corner(t % 3, corner)
+        if self.leads(begin, self.vertex[t], line.walked + apart(cython.address(self.length[3 * g]), here, corner)):
             self.segments.append(g, here, corner)
             return self.vertex[t]
-        # Out over the side between the tail of t and the apex, or over the one between the apex and the head.
-        if x * line.dy - apex_y * line.dx > 0.0:
-            side = left
-            ux, uy = apex_x / self.length[side], apex_y / self.length[side]
-            x = line.x
-        else:
-            side = right
-            ux, uy = (length - apex_x) / self.length[side], -apex_y / self.length[side]
-            x = line.x - length
-        # The outward frame of the side has the axes (ux, uy) and (-uy, ux).
-        across: cython.double = ux * line.dy - uy * line.dx
+        way: Exit = cross(cython.address(self.length[0]), self.double_area[g], cython.address(line.ray))
+        across: cython.double = way.left + way.right
         if across <= 0.0:
             return GO_ON  # given up
-        out.x = x * line.dy / across + (0.0 if side == left else self.length[side])
-        out.x = min(max(out.x, 0.0), self.length[side])
-        out.dx, out.dy = ux * line.dx + uy * line.dy, across
-        out.walked = line.walked + max(x * uy / across, 0.0)
-        if self.is_too_far(begin, side, cython.address(out)):
+        share = way.left / across
+        out.ray = Ray(way.h, OVER_SIDE, share * self.length[way.h], 0.0, way.dx, way.dy)
+        out.walked = line.walked + max(way.head_ahead + share * (way.tail_ahead - way.head_ahead), 0.0)
+        if self.is_too_far(begin, cython.address(out)):
             return GO_ON
-        self.add(g, here, side, out.x)
-        self.go_over(side, cython.address(out))
+        self.add(g, here, way.h, out.ray.x)
+        self.go_over(cython.address(out))
         return GO_ON
 
     def is_too_far(
-        self, begin: cython.pointer[cython.const[LineEnd]], h: cython.int, line: cython.pointer[cython.const[Line]]
+        self, begin: cython.pointer[cython.const[LineEnd]], line: cython.pointer[cython.const[Line]]
     ) -> cython.bint:
-        """Whether the ends of a half-edge are farther from the source than the rest of the path allows."""
+        """Whether the ends of the half-edge that a line leaves over are farther from the source than it allows."""
+        h: cython.int = line.ray.h
         left: cython.double = begin.distance - line.walked + ASTRAY * begin.distance
         at_head: cython.double = self.distance[self.vertex[previous_half_edge(h)]]
         at_tail: cython.double = self.distance[self.vertex[next_half_edge(h)]]
-        return at_head > left + line.x or at_tail > left + self.length[h] - line.x
+        return at_head > left + line.ray.x or at_tail > left + self.length[h] - line.ray.x
 
-    def go_over(self, h: cython.int, line: cython.pointer[cython.const[Line]]) -> cython.void:
-        """Note a line, in the outward frame of h, for each face beyond h."""
+    def go_over(self, line: cython.pointer[cython.const[Line]]) -> cython.void:
+        """Note a line, in the outward frame of the half-edge that it leaves over, for each face beyond."""
+        h: cython.int = line.ray.h
         t: cython.int = self.twin[h]
         if t >= 0:
             self.note(t, line, not self.aligned[h])
@@ -280,9 +265,10 @@ class PathTracer:
         if self.n_lines == MOST_LINES:
             return
         to = cython.address(self.line[self.n_lines])
-        to.half_edge, to.n_segments, to.walked, to.dy = t, self.segments.n, line.walked, line.dy
-        to.x = self.length[t] - line.x if mirrored else line.x
-        to.dx = -line.dx if mirrored else line.dx
+        to.ray, to.n_segments, to.walked = line.ray, self.segments.n, line.walked
+        to.ray.h = t
+        if mirrored:
+            to.ray.x, to.ray.dx = self.length[t] - line.ray.x, -line.ray.dx
         self.n_lines += 1
 
     def is_at_source(
