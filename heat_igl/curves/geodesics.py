@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from functools import cached_property
 from threading import RLock
+from typing import Any
 
 import numpy as np
 
 from heat_igl.curves.places import CommonFaces, Waypoints, corners, mixed_places
-from heat_igl.curves.shortening import FaceSequence, Shortened, Shortener, as_curve, course_of
+from heat_igl.curves.shortening import FaceSequence, Shortened, as_curve, course_of, shortener
 from heat_igl.errors import MeshError, SourceError, names_guessed, truth
+from heat_igl.kernels.paths import routes
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 
 def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
@@ -137,7 +139,7 @@ class GeodesicPathSolver:
         self._mesh: Mesh = as_simplices(mesh)
         if self._mesh.is_tetrahedral:
             raise MeshError("paths need triangles, but the mesh is tetrahedral")
-        self._shortener = Shortener(self._mesh)
+        self._faces, self._kernel = shortener(self._mesh)
         self._corner_at = corners(self._mesh)
         # The tables hold what one search leaves behind.
         self._one_at_a_time = RLock()
@@ -154,7 +156,7 @@ class GeodesicPathSolver:
             raise SourceError(f"curve must be a SurfaceCurve, not {type(curve).__name__}: see edge_curve and curve_on")
         course = course_of(self._mesh, curve)
         with self._one_at_a_time:
-            found = self._shortener.shortest(course, is_closed=curve.is_closed)
+            found = self._shortest(course, is_closed=curve.is_closed)
         return as_curve([found], is_closed=curve.is_closed).on(self._mesh)
 
     def path(self, waypoints: Waypoints, closed: bool = False) -> SurfaceCurve:
@@ -171,13 +173,13 @@ class GeodesicPathSolver:
         if closed:
             around = np.append(np.arange(len(faces)), 0)
             with self._one_at_a_time:
-                return self._loop(self._shortener.courses(faces[around], barycentric[around]))
+                return self._loop(self._courses(faces[around], barycentric[around]))
         return as_curve(self.geodesics(faces, barycentric), is_closed=False).on(self._mesh)
 
     def geodesics(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
         """The geodesics between checked places (k,), each from one to the next."""
         with self._one_at_a_time:
-            return [self._shortener.shortest(leg) for leg in self._shortener.courses(faces, barycentric)]
+            return [self._shortest(leg) for leg in self._courses(faces, barycentric)]
 
     def pieces(self, faces: IntArray, barycentric: FloatArray) -> list[Shortened]:
         """From each checked place (k,) to the next: straight in a face that holds both, or else the geodesic."""
@@ -198,6 +200,47 @@ class GeodesicPathSolver:
     def _common(self) -> CommonFaces:
         return CommonFaces(self._mesh)
 
+    @cached_property
+    def _ways(self) -> Any:
+        return routes.EdgeRoutes(self._faces, self._mesh.V)
+
+    def _courses(self, faces: IntArray, barycentric: FloatArray) -> list[FaceSequence]:
+        """The k - 1 shortest ways along edges from each place (k,) to the next; a `SourceError` if there is none."""
+        F, V, found = self._mesh.F, self._mesh.V, []
+        for i in range(len(faces) - 1):
+            ends, places = faces[i : i + 2].astype(np.int32), barycentric[i : i + 2]
+            # Within one face there is nothing to find.
+            way = np.array([-1], np.int32), ends[:0]
+            if ends[0] != ends[1]:
+                around: list[AnyArray] = []
+                for face, place in zip(ends, places, strict=True):
+                    held, point = F[face][place > 0], place @ V[F[face]]
+                    around += [held, np.linalg.norm(V[held] - point, axis=1)]
+                way = self._ways.route(*around, point)
+            if way is None:
+                raise SourceError(
+                    f"no path leads from waypoints[{i}] to waypoints[{i + 1}]: they lie on different components of the "
+                    "mesh"
+                )
+            vertices, between = way
+            joins = np.full((len(vertices), 3), -1, np.int32)
+            joins[:, 2] = vertices
+            found.append(FaceSequence(np.concatenate([ends[:1], between, ends[1:]]), joins, places))
+        return found
+
+    def _shortest(self, course: FaceSequence, *, is_closed: bool = False) -> Shortened:
+        """The locally shortest curve of the class of a course: between the ends, or as a loop."""
+        faces, joins, ends = course
+        stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed)
+        if stuck >= 0:
+            # Two faces have only this vertex in common: every loop of the class passes it, so the loop is a path from
+            # it to itself.
+            vertex = joins[stuck, 2]
+            faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
+            at = (self._mesh.F[faces[[0, -1]]] == vertex).astype(float)
+            _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False)
+        return Shortened(*found)
+
     def _loop(self, legs: list[FaceSequence]) -> SurfaceCurve:
         """The closed geodesic of the loop that these legs make."""
         loop = FaceSequence(
@@ -205,7 +248,7 @@ class GeodesicPathSolver:
             np.concatenate([leg.joins for leg in legs]),
             legs[0].ends[[0, 0]],
         )
-        found = self._shortener.shortest(loop, is_closed=True)
+        found = self._shortest(loop, is_closed=True)
         if not found.length > 0:
             raise SourceError(
                 "the loop through the waypoints contracts to a point, so no closed geodesic belongs to it: lead it "

@@ -1,9 +1,8 @@
-"""The faces that a curve, or a shortest way along edges, runs through, and the shortest curve of the same class."""
+"""Curves as the faces that they run through, which is what the kernel of paths shortens."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import igl
@@ -11,16 +10,14 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.intrinsic import HalfEdges, corner_angles
-from heat_igl.kernels.paths import routes, shortening, strips
+from heat_igl.kernels.paths import shortening, strips
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.mesh.grouping import group_by_label
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-# The compiled modules, whose signatures are those of Cython.
-kernel: Any = shortening
-search: Any = routes
+# The compiled module, whose signatures are those of Cython.
 tables: Any = strips
 # Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
 _SHORTEST = 1e-12
@@ -106,61 +103,18 @@ def _joins(mesh: Mesh, f: IntArray, g: IntArray, at: FloatArray) -> tuple[AnyArr
     return joins, share
 
 
-class Shortener:
-    """Finds courses on a triangle mesh, and shortens them, one after another; each thread needs its own."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-        face, edge = _faces(mesh), mesh.facets
-        edges, _ = HalfEdges.of_mesh(mesh)
-        first_corner, corner = (rows.astype(np.int32) for rows in group_by_label(mesh.F.ravel(), mesh.n_vertices))
-        self._faces = tables.FaceTable(face, edges, first_corner, corner)
-        sums = np.bincount(mesh.F.ravel(), face["angle"].ravel(), mesh.n_vertices)
-        # At a vertex with angles of 2 pi or more, and on the boundary, at most one side is locally shortest. On edges
-        # of more than two faces there are more than two sides.
-        sums[edge.vertices[edge.n_faces != 2]] = np.inf
-        half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
-        self._kernel = kernel.Shortener(self._faces, half_turn, int(np.diff(first_corner).max()))
-
-    @cached_property
-    def _ways(self) -> Any:
-        return search.EdgeRoutes(self._faces, self._mesh.V)
-
-    def courses(self, faces: IntArray, barycentric: FloatArray) -> list[FaceSequence]:
-        """The k - 1 shortest ways along edges from each place (k,) to the next; a `SourceError` if there is none."""
-        F, V, found = self._mesh.F, self._mesh.V, []
-        for i in range(len(faces) - 1):
-            ends, places = faces[i : i + 2].astype(np.int32), barycentric[i : i + 2]
-            # Within one face there is nothing to find.
-            way = np.array([-1], np.int32), ends[:0]
-            if ends[0] != ends[1]:
-                points = np.einsum("kc,kcx->kx", places, V[F[ends]])
-                start, goal = (F[face][place > 0] for face, place in zip(ends, places, strict=True))
-                before, after = (np.linalg.norm(V[c] - x, axis=1) for c, x in zip((start, goal), points, strict=True))
-                way = self._ways.route(start, before, goal, after, points[1])
-            if way is None:
-                raise SourceError(
-                    f"no path leads from waypoints[{i}] to waypoints[{i + 1}]: they lie on different components of the "
-                    "mesh"
-                )
-            vertices, between = way
-            joins = np.full((len(vertices), 3), -1, np.int32)
-            joins[:, 2] = vertices
-            found.append(FaceSequence(np.concatenate([ends[:1], between, ends[1:]]), joins, places))
-        return found
-
-    def shortest(self, course: FaceSequence, *, is_closed: bool = False) -> Shortened:
-        """The locally shortest curve of the class of a course: between the ends, or as a loop."""
-        faces, joins, ends = course
-        stuck, *found = self._kernel.shorten(faces, joins, ends, is_closed)
-        if stuck >= 0:
-            # Two faces have only this vertex in common: every loop of the class passes it, so the loop is a path from
-            # it to itself.
-            vertex = joins[stuck, 2]
-            faces, joins = np.roll(faces, -stuck - 1), np.roll(joins, -stuck - 1, axis=0)[:-1]
-            at = (self._mesh.F[faces[[0, -1]]] == vertex).astype(float)
-            _, *found = self._kernel.shorten(faces, np.ascontiguousarray(joins), at, False)
-        return Shortened(*found)
+def shortener(mesh: Mesh) -> tuple[Any, Any]:
+    """The table of the triangles of a mesh, and the kernel that shortens curves on them."""
+    face, edge = _faces(mesh), mesh.facets
+    edges, _ = HalfEdges.of_mesh(mesh)
+    first_corner, corner = (rows.astype(np.int32) for rows in group_by_label(mesh.F.ravel(), mesh.n_vertices))
+    table = tables.FaceTable(face, edges, first_corner, corner)
+    sums = np.bincount(mesh.F.ravel(), face["angle"].ravel(), mesh.n_vertices)
+    # At a vertex with angles of 2 pi or more, and on the boundary, at most one side is locally shortest. On edges of
+    # more than two faces there are more than two sides.
+    sums[edge.vertices[edge.n_faces != 2]] = np.inf
+    half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
+    return table, shortening.Shortener(table, half_turn, int(np.diff(first_corner).max()))
 
 
 def _faces(mesh: Mesh) -> AnyArray:

@@ -9,7 +9,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.flipping import SPLIT, Flips
 from cython.cimports.heat_igl.kernels.mesh.refinement import LEAST, MOST_STEPS, SHARPEST, Location
-from cython.cimports.heat_igl.kernels.mesh.straight import INSIDE, OVER_SIDE, Exit, Ray, cross
+from cython.cimports.heat_igl.kernels.mesh.straight import INSIDE, OVER_SIDE, Exit, Heading, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
@@ -193,7 +193,7 @@ def _circumcenter(t: Flips, f: cython.int) -> Location:
     dx: cython.double = v * c + w * apex - x
     dy: cython.double = w * height - y
     left: cython.double = sqrt(dx * dx + dy * dy)
-    ray: Ray = Ray(3 * f + 2, INSIDE, x, y, dx / left, dy / left)
+    ray: Heading = Heading(3 * f + 2, INSIDE, x, y, dx / left, dy / left)
     for _ in range(MOST_STEPS):
         h: cython.int = ray.h
         size: cython.double = area(t.length[h], t.length[next_half_edge(h)], t.length[previous_half_edge(h)])
@@ -217,7 +217,7 @@ def _circumcenter(t: Flips, f: cython.int) -> Location:
         h = t.twin[way.h]
         if h < 0:
             break
-        ray = Ray(h, OVER_SIDE, share * t.length[h], 0.0, way.dx, way.dy)
+        ray = Heading(h, OVER_SIDE, share * t.length[h], 0.0, way.dx, way.dy)
     return Location(-1, 0.0, 0.0, 0.0)
 
 

@@ -7,7 +7,7 @@ cdef enum Begin:
 
 # A straight line into the face of half-edge h, in the frame of h: the tail is the origin, the head lies on the first
 # axis, the face above. It begins at (x, y), which is on that axis unless it is `INSIDE`, in the unit direction (dx, dy).
-cdef struct Ray:
+cdef struct Heading:
     int h, begin
     double x, y, dx, dy
 
@@ -20,7 +20,7 @@ cdef struct Exit:
 
 
 # Go straight on through one face, of triangles with sides `length` and this double area.
-cdef inline Exit cross(const double* length, double double_area, const Ray* ray) noexcept nogil:
+cdef inline Exit cross(const double* length, double double_area, const Heading* ray) noexcept nogil:
     cdef Exit out
     cdef int left = previous_half_edge(ray.h), right = next_half_edge(ray.h)
     cdef double base = length[ray.h]

@@ -187,7 +187,7 @@ class Loop:
 @cython.final
 @cython.cclass
 class Shortener:
-    """Shortens curves on the same faces, one after another; see `heat_igl.curves.shortening.Shortener`."""
+    """Shortens curves on the same faces, one after another; see `heat_igl.curves.GeodesicPathSolver`."""
 
     def __init__(self, faces: FaceTable, half_turn, most_corners):
         self.course = Course(faces, most_corners)

@@ -1,5 +1,5 @@
 from heat_igl.kernels.mesh.segments cimport Segments
-from heat_igl.kernels.mesh.straight cimport Exit, Ray
+from heat_igl.kernels.mesh.straight cimport Exit, Heading
 
 cdef extern from *:
     """
@@ -28,7 +28,7 @@ cdef class _Tracer:
     cdef Segments segments  # None if they are not asked for
     # Of the geodesic being traced: the ray into a face, and where it leaves that, by the share of the side. In
     # barycentric coordinates, where it enters and leaves.
-    cdef Ray ray
+    cdef Heading ray
     cdef Exit exit
     cdef double share, entry[3], leave[3]
 

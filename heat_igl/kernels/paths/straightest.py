@@ -2,7 +2,7 @@
 
 import cython
 from cython.cimports.heat_igl.kernels.mesh.segments import Segments
-from cython.cimports.heat_igl.kernels.mesh.straight import INSIDE, OUT_OF_TAIL, OVER_SIDE, Ray, cross
+from cython.cimports.heat_igl.kernels.mesh.straight import INSIDE, OUT_OF_TAIL, OVER_SIDE, Heading, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot
 from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_RAY, PI
 from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
@@ -91,7 +91,7 @@ class _Tracer:
         x: cython.double = foot(base, self.l[f, (side + 2) % 3], self.l[f, (side + 1) % 3])
         x = self.entry[(k + 1) % 3] * base + apex * x
         y: cython.double = apex * 2.0 * self.area[f] / base
-        self.ray = Ray(cython.cast(cython.int, 3 * f + side), INSIDE, x, y, cos(turn), sin(turn))
+        self.ray = Heading(cython.cast(cython.int, 3 * f + side), INSIDE, x, y, cos(turn), sin(turn))
         return True
 
     def leave_corner(self, corner: cython.longlong, turn: cython.double) -> cython.bint:
@@ -132,7 +132,7 @@ class _Tracer:
         for c in range(3):
             self.entry[c] = 1.0 if c == k else 0.0
         h: cython.int = cython.cast(cython.int, 3 * f + (k + 2) % 3)
-        self.ray = Ray(h, OUT_OF_TAIL, 0.0, 0.0, cos(turn), sin(turn))
+        self.ray = Heading(h, OUT_OF_TAIL, 0.0, 0.0, cos(turn), sin(turn))
         return True
 
     def find_exit(self, travelled: cython.double) -> cython.double:
@@ -190,7 +190,7 @@ class _Tracer:
         self.entry[(t + 2) % 3] = 1.0 - self.share
         size: cython.double = hypot(p.dx, p.dy)
         x: cython.double = (1.0 - self.share) * self.l[t // 3, t % 3]
-        self.ray = Ray(cython.cast(cython.int, t), OVER_SIDE, x, 0.0, p.dx / size, fabs(p.dy) / size)
+        self.ray = Heading(cython.cast(cython.int, t), OVER_SIDE, x, 0.0, p.dx / size, fabs(p.dy) / size)
         return True
 
     def store(self, f: cython.longlong) -> cython.int:

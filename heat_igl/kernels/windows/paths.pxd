@@ -1,5 +1,5 @@
 from heat_igl.kernels.mesh.segments cimport Segments
-from heat_igl.kernels.mesh.straight cimport Exit, Ray
+from heat_igl.kernels.mesh.straight cimport Exit, Heading
 
 cdef class InnerSources:
     cdef int n, n_points
@@ -23,7 +23,7 @@ cdef struct LineEnd:
     double crossing
 
 cdef struct Line:
-    Ray ray
+    Heading ray
     double walked        # from where the straight part of the path ends
     long long n_segments
 

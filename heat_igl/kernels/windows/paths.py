@@ -5,7 +5,7 @@ Sources inside faces, points and segments, have the roots n + i for source i of 
 
 import cython
 from cython.cimports.heat_igl.kernels.mesh.segments import Segments
-from cython.cimports.heat_igl.kernels.mesh.straight import OVER_SIDE, Exit, Ray, cross
+from cython.cimports.heat_igl.kernels.mesh.straight import OVER_SIDE, Exit, Heading, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
@@ -187,7 +187,7 @@ class PathTracer:
         line.walked = sqrt((at - x) * (at - x) + y * y)
         if line.walked <= 0.0:
             return LOST
-        line.ray = Ray(h, OVER_SIDE, at, 0.0, (at - x) / line.walked, y / line.walked)
+        line.ray = Heading(h, OVER_SIDE, at, 0.0, (at - x) / line.walked, y / line.walked)
         self.add(f, here, h, at)
         self.n_lines = 0
         self.go_over(cython.address(line))
@@ -230,7 +230,7 @@ class PathTracer:
         if across <= 0.0:
             return GO_ON  # given up
         share = way.left / across
-        out.ray = Ray(way.h, OVER_SIDE, share * self.length[way.h], 0.0, way.dx, way.dy)
+        out.ray = Heading(way.h, OVER_SIDE, share * self.length[way.h], 0.0, way.dx, way.dy)
         out.walked = line.walked + max(way.head_ahead + share * (way.tail_ahead - way.head_ahead), 0.0)
         if self.is_too_far(begin, cython.address(out)):
             return GO_ON
