@@ -8,7 +8,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, positive
-from heat_igl.heat.directions import rigid_angles
 from heat_igl.mesh import MeshLike, one_sided
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
@@ -106,10 +105,8 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     directions, tables = PathDirections(surface), from_triangulation(surface.unfolding)
     indptr, ways, distance = _paths(tables, triangles.V, chosen, limit)
     angles, polar = directions.of_ways(ways), directions.angles
-    back, departure = (
-        rigid_angles(angle, polar, at)
-        for angle, at in ((angles.back, ways.vertex), (angles.departure, np.repeat(chosen, np.diff(indptr))))
-    )
+    back = polar.from_polar(ways.vertex, angles.back)
+    departure = polar.from_polar(np.repeat(chosen, np.diff(indptr)), angles.departure)
     turn = back + np.pi - departure - angles.turning
     rotation = turn - 2 * np.pi * np.rint(turn / (2 * np.pi))
     values = [np.nan_to_num(value) for value in (angles.departure, in_circle(back + np.pi), rotation)]

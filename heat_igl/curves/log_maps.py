@@ -9,6 +9,7 @@ import numpy as np
 from heat_igl.errors import SourceError, names_guessed, require_choice
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.heat import VectorHeatSolver
+from heat_igl.intrinsic import TangentFrames
 from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray
@@ -70,43 +71,32 @@ def log_map(
     >>> np.linalg.norm(vectors, axis=1)[[4, 15, 19]].round(6).tolist()
     [4.0, 3.0, 5.0]
     """
-    if isinstance(mesh, VectorHeatSolver):
-        return mesh.log_map(_one_vertex(source, mesh.n_vertices))
+    if not isinstance(mesh, GeodesicSolver | VectorHeatSolver):
+        require_choice("method", method, get_args(LogMapMethod))
+        given = as_mesh(mesh)
+        triangles, is_cloud = as_simplices(given), isinstance(given, PointCloud)
+        vertex = _vertex(source, triangles.n_vertices)
+        if method == "exact" and vertex is not None and not (is_cloud or triangles.is_tetrahedral):
+            vectors = vectors_from(triangles, int(triangles.originals[vertex]))
+            if vectors is not None:
+                return vectors[triangles.originals]
+        if method == "vector-heat":
+            mesh = VectorHeatSolver(given)
+        else:
+            mesh = GeodesicSolver(given, method="exact") if is_cloud else GeodesicSolver(triangles)
+    vertex = _vertex(source, mesh.n_vertices)
     if isinstance(mesh, GeodesicSolver):
-        _require_one(source, mesh.n_vertices)
         found = mesh.directions(source)
-        return _vectors(found.distance, found.departure)
-    require_choice("method", method, get_args(LogMapMethod))
-    mesh = as_mesh(mesh)
-    triangles = as_simplices(mesh)
-    if method == "vector-heat":
-        return VectorHeatSolver(mesh).log_map(_one_vertex(source, triangles.n_vertices))
-    _require_one(source, triangles.n_vertices)
-    if isinstance(mesh, PointCloud):
-        found = GeodesicSolver(mesh, method="exact").directions(source)
-        return _vectors(found.distance, found.departure)
-    if not triangles.is_tetrahedral and not isinstance(source, SurfacePoints):
-        vertex = triangles.originals[named_vertices(source, triangles.n_vertices, "source")[0]]
-        vectors = vectors_from(triangles, int(vertex))
-        if vectors is not None:
-            return vectors[triangles.originals]
-    found = GeodesicSolver(triangles).directions(source)
-    return _vectors(found.distance, found.departure)
-
-
-def _vectors(distance: FloatArray, departure: FloatArray) -> FloatArray:
-    length = np.where(np.isfinite(distance), distance, 0.0)
-    return np.stack([length * np.cos(departure), length * np.sin(departure)], axis=1)
-
-
-def _one_vertex(source: Sources, n: int) -> int:
-    if isinstance(source, SurfacePoints):
+        return TangentFrames.from_angles(found.departure, np.where(np.isfinite(found.distance), found.distance, 0.0))
+    if vertex is None:
         raise SourceError("the vector heat method starts at vertices: take another method for a point in a face")
-    _require_one(source, n)
-    return int(named_vertices(source, n, "source")[0])
+    return mesh.log_map(vertex)
 
 
-def _require_one(source: Sources, n: int) -> None:
-    k = len(source) if isinstance(source, SurfacePoints) else len(named_vertices(source, n, "source"))
-    if k != 1:
-        raise SourceError(f"source must be one vertex or point, not {k}")
+def _vertex(source: Sources, n: int) -> int | None:
+    """The vertex that is the one source, None for a point in a face."""
+    is_point = isinstance(source, SurfacePoints)
+    places = source.faces if isinstance(source, SurfacePoints) else named_vertices(source, n, "source")
+    if len(places) != 1:
+        raise SourceError(f"source must be one vertex or point, not {len(places)}")
+    return None if is_point else int(places[0])

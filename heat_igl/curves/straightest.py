@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import SourceError, real_numbers, shown
+from heat_igl.errors import SourceError, is_number, real_numbers, shown
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels.paths import straightest
 from heat_igl.mesh import MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
@@ -85,12 +85,14 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
         raise SourceError(f"start must be one vertex or point, not {len(begin.faces)}")
     if vector.ndim != 1:
         raise ValueError(f"direction must be one vector (2,) or (3,), but it has shape {vector.shape}")
-    distance = _checked_length(length)
-    tracer.refuse_endless("length", np.array([distance]))
+    if not is_number(length) or not 0 <= length < np.inf:
+        raise ValueError(f"length must be a finite number of at least 0, not {shown(length)}")
+    distance = np.array([float(length)])
+    tracer.refuse_endless("length", distance)
     turn, size = tracer.directions("direction", begin, vector)
     if not size[0] > 0:
         raise ValueError(f"direction = {np.asarray(direction).tolist()} is 0 in the tangent plane: it needs a length")
-    return tracer.curve(begin, turn, np.array([distance]))
+    return tracer.curve(begin, turn, distance)
 
 
 def exp_map(mesh: MeshLike, source: Sources, vectors: ArrayLike) -> SurfacePoints:
@@ -281,13 +283,3 @@ class Tracer:
         faces, points = kernel.trace(self._triangles, *given, *_Ends.of(1), True)
         faces, points = on_one_side(faces, points, self._mesh.n_faces)
         return SurfaceCurve(faces, points[:, 0], points[:, 1], mesh=self._mesh)
-
-
-def _checked_length(length: float) -> float:
-    try:
-        number = float(length)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not (np.isfinite(number) and number >= 0):
-        raise ValueError(f"length must be a finite number of at least 0, not {shown(length)}")
-    return number

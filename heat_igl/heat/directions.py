@@ -91,23 +91,14 @@ def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: Pola
     Paths start at vertices: `sources` (k,) has the one of each label.
     """
     start = sources[np.maximum(labels, 0)]
-    departure = rigid_angles(angles.departure, polar, start)
+    departure = polar.from_polar(start, angles.departure)
     turn = _arrival(angles.back, polar) - departure - angles.turning
     return np.where(labels < 0, 0.0, np.exp(1j * np.where(np.isnan(turn), 0.0, turn)))
 
 
-def rigid_angles(angles: FloatArray, polar: PolarAngles, vertices: IntArray) -> FloatArray:
-    """Polar angles (k,) at vertices (k,) as transport has them: on the boundary in the plane of the faces.
-
-    See `PolarAngles.rigid`.
-    """
-    flat = angles / polar.scale[vertices] + (np.pi - polar.sums[vertices]) / 2
-    return np.where(polar.on_boundary[vertices], flat, angles)
-
-
 def _arrival(back: FloatArray, polar: PolarAngles) -> FloatArray:
     """The angle (n,) in the frame opposite the polar angle `back` (n,)."""
-    return in_circle(rigid_angles(back, polar, np.arange(len(back))) + np.pi)
+    return in_circle(polar.from_polar(np.arange(len(back)), back) + np.pi)
 
 
 def directions_from_one_side(found: Directions, frames: TangentFrames, n: int, m: int) -> Directions:

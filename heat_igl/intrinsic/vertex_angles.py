@@ -47,19 +47,18 @@ class PolarAngles:
     first: IntArray
 
     def rigid(self, tail: IntArray) -> tuple[FloatArray, FloatArray]:
-        """The angle (3 m,) of each half-edge for transport, and the factor (n,) of angles in faces.
+        """The angle (3 m,) of each half-edge with that tail for transport, and the factor (n,) of angles in faces."""
+        return self.from_polar(tail, self.outgoing), np.where(self.on_boundary, 1.0, self.scale)
 
-        Inside these are `outgoing` and `scale`. The faces at a boundary vertex lie in a plane already: transport takes
-        their angles as they are, so that a flat piece with corners has no curvature, and turns them until the middle
-        between the two boundary edges is at pi / 2, as in `outgoing`.
+    def from_polar(self, vertices: IntArray, angles: FloatArray) -> FloatArray:
+        """The angle (k,) for transport of directions at vertices that have the given polar angles (k,).
 
-        Parameters
-        ----------
-        tail : (3 m,) int64
-            Tail of each half-edge.
+        The same inside. The faces at a boundary vertex lie in a plane already: transport takes their angles as they
+        are, so that a flat piece with corners has no curvature, and turns them until the middle between the two
+        boundary edges is at pi / 2, as in `outgoing`.
         """
-        flat = self.outgoing / self.scale[tail] + (np.pi - self.sums[tail]) / 2
-        return np.where(self.on_boundary[tail], flat, self.outgoing), np.where(self.on_boundary, 1.0, self.scale)
+        flat = angles / self.scale[vertices] + (np.pi - self.sums[vertices]) / 2
+        return np.where(self.on_boundary[vertices], flat, angles)
 
     def to_polar(self, vertices: IntArray, angles: FloatArray) -> FloatArray:
         """The polar angle (k,) of directions at vertices that have the given angles (k,) for transport.
