@@ -87,7 +87,8 @@ def raise_to_lines(distance: FloatArray, V: FloatArray, places: FloatArray, offs
         line = cKDTree(places).query(V)[0] + offsets[0]
     else:
         return False
-    np.maximum(distance, line * (1 - _ROUNDING), out=distance)
+    # Less rounding, which is a share of the lines without the offsets.
+    np.maximum(distance, line - _ROUNDING * (line - offsets.min()), out=distance)
     return True
 
 
