@@ -8,6 +8,7 @@ import numpy as np
 
 from heat_igl.curves.cut_mesh import CutMesh
 from heat_igl.curves.face_cutting import Point, cut_triangle
+from heat_igl.curves.places import corners
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import lay_out
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, named_entries
@@ -110,8 +111,8 @@ class _Cut:
         # The side from corner 0 to corner 1 has a length unless both are in one place, and then no flip matters.
         sides = np.maximum(mesh.edge_lengths[mesh.facets.of_face[touched]], np.finfo(float).tiny)
         flat = lay_out(sides)
-        for face, corners, low, high in zip(touched.tolist(), flat, *first.tolist(), strict=True):
-            parts = self._cut_face(face, corners, order[low:high])
+        for face, plane, low, high in zip(touched.tolist(), flat, *first.tolist(), strict=True):
+            parts = self._cut_face(face, plane, order[low:high])
             new_faces += parts
             old_of_new += [face] * len(parts)
         whole = np.flatnonzero(~is_touched)
@@ -211,8 +212,7 @@ class _Cut:
         mesh, n = self._mesh, self._mesh.n_vertices
         faces = np.full(n + len(self._place), -1)
         barycentric = np.zeros((len(faces), 3))
-        corner = np.full(n, -1)
-        corner[mesh.F.ravel()[::-1]] = np.arange(mesh.F.size)[::-1]
+        corner = corners(mesh)
         used = np.flatnonzero(corner >= 0)
         faces[used] = corner[used] // 3
         barycentric[:n, 0] = 1

@@ -416,11 +416,11 @@ def _damped_field(parts: SolverParts, terms: list[SourceTerm], u: FloatArray) ->
     return X, magnitude
 
 
-def _imposed_faces(domain: Operators, term: SourceTerm) -> IntArray:
-    """The faces (k,) near points and curves on which the field is the gradient of the known distances."""
+def _impose_near_field(domain: Operators, term: SourceTerm, X: FloatArray, magnitude: FloatArray) -> None:
+    """Near points and curves, replace the field X (d m,) of length `magnitude` (m,) by that of the known distances."""
     if not term.seen.any():
-        return np.empty(0, np.int64)
-    known = np.zeros(domain.n, np.int8)
+        return
+    m, known = len(magnitude), np.zeros(domain.n, np.int8)
     known[term.near.vertex] = 1
     known[term.near.vertex[term.seen]] = 2
     if domain.surface is None:
@@ -428,16 +428,10 @@ def _imposed_faces(domain: Operators, term: SourceTerm) -> IntArray:
         of_face = abs(domain.G.tocsr())
         unknown, seen = (of_face @ (known == kind) for kind in (0, 2))
         unknown, seen = (rows.reshape(domain.dimension, -1).sum(axis=0) for rows in (unknown, seen))
-        return np.flatnonzero((unknown == 0) & (seen > 0))
-    corners = known[domain.surface.triangulation.F]
-    return np.flatnonzero((corners > 0).all(axis=1) & (corners == 2).any(axis=1))
-
-
-def _impose_near_field(domain: Operators, term: SourceTerm, X: FloatArray, magnitude: FloatArray) -> None:
-    """Near points and curves, replace the field X (d m,) of length `magnitude` (m,) by the exact gradient."""
-    faces, m = _imposed_faces(domain, term), len(magnitude)
-    if not len(faces):
-        return
+        faces = np.flatnonzero((unknown == 0) & (seen > 0))
+    else:
+        corners = known[domain.surface.triangulation.F]
+        faces = np.flatnonzero((corners > 0).all(axis=1) & (corners == 2).any(axis=1))
     gradient = (domain.G[:, term.near.vertex] @ term.near.value).reshape(-1, m)[:, faces]
     length = np.linalg.norm(gradient, axis=0)
     X.reshape(-1, m)[:, faces] = gradient / np.where(length > 0, length, 1)

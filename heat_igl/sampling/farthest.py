@@ -67,7 +67,11 @@ def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -
     referenced = solver.referenced
     used = referenced.copy()
     used[first] = True
-    _check_count(k, len(first), int(used.sum()))
+    least, most = len(first), int(used.sum())
+    if not isinstance(k, int | np.integer) or isinstance(k, bool) or not least <= k <= most:
+        raise ValueError(
+            f"k must be an integer from {least}, the vertices to start from, to {most}, all there are, not {shown(k)}"
+        )
     sites = np.empty(k, np.int64)
     labels = np.full(solver.n_vertices, -1)
     distance = np.full(solver.n_vertices, np.inf)
@@ -85,10 +89,3 @@ def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -
             labels[sites[i]] = i
         left()
     return VoronoiCells(sites, labels, distance)
-
-
-def _check_count(k: int, least: int, most: int) -> None:
-    if not isinstance(k, int | np.integer) or isinstance(k, bool) or not least <= k <= most:
-        raise ValueError(
-            f"k must be an integer from {least}, the vertices to start from, to {most}, all there are, not {shown(k)}"
-        )

@@ -18,7 +18,7 @@ from cython.cimports.heat_igl.kernels.paths.strips import (
     other_side,
     weighted,
 )
-from cython.cimports.libc.math import hypot, sqrt
+from cython.cimports.libc.math import hypot
 
 _CROSSING = np.dtype([("leave", "i4"), ("enter", "i4")])
 _AROUND = np.dtype([("enter", "i4"), ("leave", "i4"), ("before", "i4")])
@@ -233,13 +233,9 @@ class Funnel:
         p: Corners
         f: cython.int = face
         first = cython.address(s.triangle[f])
-        a: cython.double = first.length[0]
-        b: cython.double = first.length[1]
-        c: cython.double = first.length[2]
-        half: cython.double = 0.5 * (a + b + c)
-        p.x[0], p.y[0], p.x[1], p.y[1] = 0.0, 0.0, c, 0.0
-        p.x[2] = 0.5 * ((b - a) * (b + a) / c + c)
-        p.y[2] = 2.0 * sqrt(max(half * (half - a) * (half - b) * (half - c), 0.0)) / c
+        base: cython.double = first.length[2]
+        p.x[0], p.y[0], p.x[1], p.y[1] = 0.0, 0.0, base, 0.0
+        p.x[2], p.y[2] = base * (1.0 - first.along[2]), base * first.above[2]
         self.first = p
         self.x, self.y = weighted(start, p.x), weighted(start, p.y)
         entered: cython.int = -1
