@@ -211,7 +211,7 @@ T_COEF_FITTED = 0.5
 T_COEF_ROUGH = 0.15
 # The paper's: t = h^2.
 T_COEF = 1.0
-# The sides of random points' triangles differ so much that heat needs a larger step, see docs/clouds.md.
+# The sides of random points' triangles differ so much that heat needs a larger step, see docs/clouds_theory.md.
 T_COEF_EVEN_POINTS, T_COEF_RANDOM_POINTS = 0.5, 1.0
 # Median ratio of the longest to the shortest side above which points count as random: these have 1.9, the vertices of
 # meshes 1.2 to 1.8.

@@ -14,8 +14,8 @@ potpourri3d factors, and of a later query; with the mean errors, and the share o
 counting folds, with a star where the cloud warned. log-maps: on the vertices of meshes, against the exact one of the
 mesh: the median angle between them in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in
 percent at the points of the surface, of default / potpourri3d / the shortest path in the graph of 8 neighbours, which
-is what there is without a solver; a star follows where the cloud warned. Needs the extra ``bench``; docs/clouds.md
-shows the tables.
+is what there is without a solver; a star follows where the cloud warned. Needs the extra ``bench``. The tables are in
+docs/clouds_theory.md.
 """
 
 from __future__ import annotations

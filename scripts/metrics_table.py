@@ -22,7 +22,8 @@ grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels 
 them. Beside the default: scikit-fmm (by pip), whose front begins as a circle of 2.5 pixels, and pykonal if it is
 installed. Mean and largest error in percent, and seconds of one query with its preparation.
 smooth: a cylinder that is twisted, and a cube with a speed that grows linearly, with tensors per tetrahedron and at the
-vertices; the same of fim-python, if it is installed, which takes those per tetrahedron. docs/metrics.md has the tables.
+vertices; the same of fim-python, if it is installed, which takes those per tetrahedron. docs/metrics_theory.md
+has the tables.
 """
 
 from __future__ import annotations

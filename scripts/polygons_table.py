@@ -1,6 +1,6 @@
 """The heat method on polygons: triangles of the polygons, and triangles around virtual vertices.
 
-    python scripts/polygons_table.py cow.obj spot.obj --docs docs/metrics.md    # on the duals of these meshes
+    python scripts/polygons_table.py cow.obj spot.obj --docs docs/metrics_theory.md    # on the duals of these meshes
 
 The dual of a triangle mesh has a polygon around each vertex inside, its corners in the middles of the faces, which in
 general is not planar. Polygons in a file are taken as they are. Prints the mean of |d - exact| / exact in percent, with
