@@ -3,17 +3,13 @@
 Real meshes come from the pymeshlab wheel; all others are made by the shapes and the zoo of the package, from seeds.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
@@ -94,10 +90,10 @@ def pygeodesic_distance(mesh: heat_igl.Mesh, source: int) -> np.ndarray:
 
 
 @pytest.fixture
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+def in_this_process(monkeypatch):
     """Native reference solvers without the child process that guards them, which takes most of their time."""
 
-    def call(function: str, arrays: Mapping[str, Any], parameters: Mapping[str, Any] | None = None, **_: Any) -> Any:
+    def call(function, arrays, parameters=None, **_):
         module, name = function.split(":")
         return guarded.Reply(dict(getattr(importlib.import_module(module), name)(**arrays, **(parameters or {}))), None)
 
@@ -105,21 +101,21 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="session")
-def cow() -> heat_igl.Mesh:
+def cow():
     return heat_igl.read_mesh(wheel_path("cow.obj"))
 
 
 @pytest.fixture(scope="session")
-def bunny() -> heat_igl.Mesh:
+def bunny():
     return heat_igl.read_mesh(wheel_path("bunny.obj"))
 
 
 @pytest.fixture(scope="session")
-def sphere() -> heat_igl.Mesh:
+def sphere():
     """A sphere without symmetries, of 2562 vertices."""
     return perturbed(heat_igl.shapes.icosphere(4))
 
 
 @pytest.fixture(scope="session")
-def solver(sphere: heat_igl.Mesh) -> heat_igl.HeatMethodSolver:
+def solver(sphere):
     return heat_igl.HeatMethodSolver(sphere)

@@ -5,8 +5,6 @@ of a face are joined by the straight line between them, so a shortest path in it
 shorter than the true distance, and as close to it as the points on the edges are dense.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph

@@ -1,7 +1,5 @@
 """Meshes that several tests measure on, besides those of `heat_igl.shapes`."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Distance as a function of PyTorch and JAX; skipped where they are not installed."""
 
-from __future__ import annotations
-
 import importlib.util
 
 import numpy as np
@@ -17,7 +15,7 @@ def sphere() -> Mesh:
 
 
 @pytest.mark.parametrize("name", ["torch", "jax"])
-def test_what_to_install_is_said(name: str) -> None:
+def test_what_to_install_is_said(name):
     if importlib.util.find_spec(name) is not None:
         assert importlib.import_module(f"heat_igl.applications.{name}").geodesic_distance
         return
@@ -26,7 +24,7 @@ def test_what_to_install_is_said(name: str) -> None:
 
 
 class TestTorch:
-    def test_gradients_are_those_of_differences(self) -> None:
+    def test_gradients_are_those_of_differences(self):
         torch = pytest.importorskip("torch")
         from heat_igl.applications.torch import geodesic_distance
 
@@ -36,7 +34,7 @@ class TestTorch:
             lambda V: geodesic_distance(V, mesh.F, [0, 70], method="exact"), (V,), eps=1e-6, atol=1e-5, rtol=1e-4
         )
 
-    def test_types_and_solver(self) -> None:
+    def test_types_and_solver(self):
         torch = pytest.importorskip("torch")
         from heat_igl.applications.torch import geodesic_distance
 
@@ -51,7 +49,7 @@ class TestTorch:
         np.testing.assert_allclose(distance.detach().numpy(), expected, rtol=1e-5)
         np.testing.assert_allclose(V.grad.numpy(), pull_back(np.ones(len(expected))), atol=1e-4)
 
-    def test_what_cannot_be_used(self) -> None:
+    def test_what_cannot_be_used(self):
         torch = pytest.importorskip("torch")
         from heat_igl.applications.torch import geodesic_distance
 
@@ -78,21 +76,21 @@ class TestTorch:
 
 
 class TestJax:
-    def test_gradients_under_jit(self) -> None:
+    def test_gradients_under_jit(self):
         jax = pytest.importorskip("jax")
         from heat_igl.applications.jax import geodesic_distance
 
         mesh = sphere()
         expected, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(3)
 
-        def loss(V: object) -> object:
+        def loss(V):
             return (geodesic_distance(V, mesh.F, 3, method="exact") ** 2).sum()
 
         value, gradient = jax.jit(jax.value_and_grad(loss))(mesh.V)
         assert float(value) == pytest.approx((expected**2).sum(), rel=1e-4)
         np.testing.assert_allclose(np.asarray(gradient), pull_back(2 * expected), atol=1e-3)
 
-    def test_what_cannot_be_used(self) -> None:
+    def test_what_cannot_be_used(self):
         pytest.importorskip("jax")
         from heat_igl.applications.jax import geodesic_distance
 

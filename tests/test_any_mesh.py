@@ -1,7 +1,5 @@
 """Everything that takes a mesh takes meshes of other libraries: each public function is called with one."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from pathlib import Path
@@ -120,7 +118,7 @@ class Drawn:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Drawn) and self.content == other.content
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None
 
     def save(self, path: Path) -> None:
         path.write_text(self.content)
@@ -141,7 +139,7 @@ def public(module: Any) -> set[str]:
     return {name for name in module.__all__ if takes_a_mesh(getattr(module, name)) if name not in NOT_CALLED}
 
 
-def test_every_function_with_a_mesh_is_called() -> None:
+def test_every_function_with_a_mesh_is_called():
     found = public(heat_igl) | {f"plots.{name}" for name in public(plots)}
     found |= {f"reference.{name}" for name in public(reference) - IN_PROCESSES}
     found |= {f"metrics.{name}" for name in public(metrics)}
@@ -154,7 +152,7 @@ def plain(value: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", CALLS)
-def test_a_mesh_of_another_library_gives_the_same(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_of_another_library_gives_the_same(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     if name.startswith("plots."):
         pytest.importorskip("matplotlib")

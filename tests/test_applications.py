@@ -1,32 +1,30 @@
 """The applications: searches that must agree with Dijkstra's, particles that must agree with scikit-image's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from surfaces import twice
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.applications import EdgePath, EdgeSearch, particle_length, reconstruct, skeleton, zones_of_influence
+from heat_igl.applications import EdgeSearch, particle_length, reconstruct, skeleton, zones_of_influence
 from heat_igl.reference import edge_paths
 
 # A* along edges.
 
 
 @pytest.fixture(scope="module")
-def pairs(bunny) -> list[tuple[int, int]]:
+def pairs(bunny):
     return [(int(a), int(b)) for a, b in np.random.default_rng(0).integers(bunny.n_vertices, size=(100, 2))]
 
 
 @pytest.fixture(scope="module")
-def by_dijkstra(bunny, pairs) -> list[EdgePath]:
+def by_dijkstra(bunny, pairs):
     search = EdgeSearch(bunny)
     return [search.path(a, b) for a, b in pairs]
 
 
 @pytest.fixture(scope="module")
-def landmarks(bunny) -> tuple[heat_igl.HeatMethodSolver, list[int]]:
+def landmarks(bunny):
     solver = heat_igl.HeatMethodSolver(bunny)
     return solver, heat_igl.farthest_points(solver, 8, start=int(np.argmax(solver.distance(0)))).tolist()
 

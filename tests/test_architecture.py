@@ -1,7 +1,5 @@
 """Rooms stand in their order, and optional libraries are loaded only where they are used."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -44,7 +42,7 @@ zarr
 """.split()
 
 
-def test_rooms_import_only_from_those_below() -> None:
+def test_rooms_import_only_from_those_below():
     """In a process of its own: the linter silences the loggers of this one."""
     pytest.importorskip("importlinter")
     code = "import sys; from importlinter.cli import lint_imports; sys.exit(lint_imports(no_cache=True))"
@@ -52,7 +50,7 @@ def test_rooms_import_only_from_those_below() -> None:
     assert result.returncode == 0, result.stdout + result.stderr
 
 
-def test_the_page_lists_the_rooms_in_the_order_of_the_contract() -> None:
+def test_the_page_lists_the_rooms_in_the_order_of_the_contract():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf8"))
     (contract,) = settings["tool"]["importlinter"]["contracts"]
     page = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf8")

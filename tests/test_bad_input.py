@@ -5,8 +5,6 @@ each. A case without a pattern is a neighbour: the nearest valid input of its fa
 To add cases, write a generator of `Case` and add it to `GENERATORS`.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random
@@ -812,7 +810,7 @@ def run_all(directory: Path) -> None:
 
 
 @pytest.fixture(scope="session")
-def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+def outcomes(tmp_path_factory):
     directory = tmp_path_factory.mktemp("bad_input")
     done = run_python("-W", "error", __file__, str(directory), cwd=directory, timeout=300)
     lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
@@ -822,7 +820,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
 
 
 @pytest.mark.parametrize("name", cases())
-def test_case(name: str, outcomes: dict[str, dict[str, Any]]) -> None:
+def test_case(name, outcomes):
     case, outcome = cases()[name], outcomes[name]
     if not case.patterns:
         assert outcome["error"] == "", outcome["message"]
@@ -832,18 +830,18 @@ def test_case(name: str, outcomes: dict[str, dict[str, Any]]) -> None:
         assert re.search(pattern, outcome["message"]), outcome["message"]
 
 
-def test_mutated_files_are_meshes_or_mesh_errors(outcomes: dict[str, dict[str, Any]]) -> None:
+def test_mutated_files_are_meshes_or_mesh_errors(outcomes):
     assert outcomes["fuzz"]["tried"] > 3000
     assert outcomes["fuzz"]["unclear"] == []
 
 
-def test_every_cut_is_noticed(outcomes: dict[str, dict[str, Any]]) -> None:
+def test_every_cut_is_noticed(outcomes):
     assert outcomes["fuzz"]["accepted prefixes"] == []
 
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=400) | st.text(max_size=200).map(str.encode), extension=st.sampled_from(EXTENSIONS))
-def test_garbage_is_a_mesh_error(tmp_path: Path, content: bytes, extension: str) -> None:
+def test_garbage_is_a_mesh_error(tmp_path, content, extension):
     path = tmp_path / f"garbage.{extension}"
     path.write_bytes(content)
     with pytest.raises(MeshError, match=r"garbage\."):

@@ -1,7 +1,5 @@
 """The paper's other ways: closed forms, the order at which each converges, and the contract that all of them share."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -19,7 +17,7 @@ MESH_METHODS = {
 
 
 @pytest.fixture(scope="module")
-def pieces() -> Mesh:
+def pieces():
     """Two disks, and a vertex that no face uses."""
     disk = perturbed(shapes.disk(6))
     n = disk.n_vertices

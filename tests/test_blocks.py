@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import itertools
 import pickle
 import threading
@@ -28,7 +26,7 @@ def test_blocks_keep_to_the_memory_and_use_the_threads():
 
 
 @pytest.mark.parametrize("threads", ["1", "2"])
-def test_rows_are_worked_off_once_each_in_order(threads: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_are_worked_off_once_each_in_order(threads, monkeypatch):
     monkeypatch.setenv("HEAT_IGL_NUM_THREADS", threads)
     for n, most in ((0, 5), (1, 5), (7, 5), (100, 5), (100, 1000)):
         found = over_rows(np.arange(n).__getitem__, n, most)
@@ -36,17 +34,17 @@ def test_rows_are_worked_off_once_each_in_order(threads: str, monkeypatch: pytes
         assert all(0 < len(rows) <= most for rows in found)
 
 
-def test_rows_are_worked_off_by_all_processors_and_errors_come_through(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_are_worked_off_by_all_processors_and_errors_come_through(monkeypatch):
     monkeypatch.setattr("heat_igl.runtime.threads.n_threads", lambda: 2)
     both_busy = threading.Barrier(2, timeout=10)
 
-    def wait_for_the_other(_: slice) -> int:
+    def wait_for_the_other(_):
         both_busy.wait()
         return threading.get_ident()
 
     assert len(set(over_rows(wait_for_the_other, 8, 1))) == 2
 
-    def refuse_the_last(rows: slice) -> None:
+    def refuse_the_last(rows):
         if rows.stop == 8:
             raise ValueError("row 7")
 
@@ -55,7 +53,7 @@ def test_rows_are_worked_off_by_all_processors_and_errors_come_through(monkeypat
 
 
 def test_in_order_works_on_several_threads_and_draws_no_more_than_it_has_room_for():
-    drawn: list[int] = []
+    drawn = []
     both_busy = threading.Barrier(2, timeout=10)
 
     def items():
@@ -63,7 +61,7 @@ def test_in_order_works_on_several_threads_and_draws_no_more_than_it_has_room_fo
             drawn.append(i)
             yield i
 
-    def work(i: int) -> int:
+    def work(i):
         both_busy.wait()
         return 10 * i
 

@@ -1,7 +1,5 @@
 """The command line: what it prints, what it leaves behind, and how it fails."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -9,7 +7,6 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -42,20 +39,20 @@ def assert_one_line(stderr: str, *words: str) -> None:
 
 
 @pytest.fixture
-def ball(tmp_path: Path) -> Path:
+def ball(tmp_path):
     io.write_mesh(tmp_path / "sphere.off", shapes.icosphere(2))
     return tmp_path / "sphere.off"
 
 
 @pytest.fixture
-def two_spheres(tmp_path: Path) -> Path:
+def two_spheres(tmp_path):
     one = shapes.icosphere(1)
     path = tmp_path / "two.off"
     io.write_mesh(path, twice(one))
     return path
 
 
-def test_distance_writes_what_the_library_returns_and_a_picture(ball: Path) -> None:
+def test_distance_writes_what_the_library_returns_and_a_picture(ball):
     done = command(
         "distance", ball, "--source", 12, "--source", 40, "--output", "out.ply", "--picture", "out.png",
         cwd=ball.parent,
@@ -70,7 +67,7 @@ def test_distance_writes_what_the_library_returns_and_a_picture(ball: Path) -> N
     assert files(ball.parent) == {"sphere.off", "out.ply", "out.png"}
 
 
-def test_distance_from_positions_in_space(ball: Path) -> None:
+def test_distance_from_positions_in_space(ball):
     done = command("distance", ball, "--source", 12, "--at", "0.3,-2,0.1", "--cutoff", 0.5, "--output", "out.ply",
                    cwd=ball.parent)  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -86,9 +83,7 @@ def test_distance_from_positions_in_space(ball: Path) -> None:
         assert_one_line(refused.stderr, words)
 
 
-def test_paths_and_traces_are_those_of_the_library(
-    ball: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_paths_and_traces_are_those_of_the_library(ball, capsys, monkeypatch):
     monkeypatch.chdir(ball.parent)
     mesh = shapes.icosphere(2)
     place = heat_igl.closest_points(mesh, [0.3, 2, 0.1]).points
@@ -118,9 +113,8 @@ def test_paths_and_traces_are_those_of_the_library(
     ],
 )
 def test_a_request_without_meaning_names_its_option_and_leaves_no_file(
-    ball: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str], status: int, words: tuple[str, ...],
-) -> None:  # fmt: skip
+    ball, capsys, monkeypatch, arguments, status, words
+):
     monkeypatch.chdir(ball.parent)
     assert cli.run([arguments[0], str(ball), *arguments[1:]]) == status
     assert_one_line(capsys.readouterr().err, *words)
@@ -128,13 +122,13 @@ def test_a_request_without_meaning_names_its_option_and_leaves_no_file(
 
 
 @pytest.mark.parametrize("option", ["--output=/proc/out.ply", "--picture=/proc/out.png"])
-def test_an_output_that_cannot_be_written(ball: Path, option: str) -> None:
+def test_an_output_that_cannot_be_written(ball, option):
     done = command("distance", ball, "--source", 0, option, cwd=ball.parent)
     assert (done.returncode, done.stdout) == (1, "")
     assert_one_line(done.stderr, "/proc/out", "cannot be written")
 
 
-def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
+def test_without_typer_one_line_names_the_extra(tmp_path):
     code = "import sys; sys.modules['typer'] = None; from heat_igl.__main__ import main; sys.exit(main())"
     done = run_python("-c", code, cwd=tmp_path)
     assert done.returncode == 1
@@ -142,7 +136,7 @@ def test_without_typer_one_line_names_the_extra(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
-def test_an_interrupt_ends_the_command_without_a_traceback(tmp_path: Path) -> None:
+def test_an_interrupt_ends_the_command_without_a_traceback(tmp_path):
     code = (
         # A process started in the background inherits that interrupts are ignored; a user's is not.
         "import signal, sys, time; from heat_igl import cli; from heat_igl.cli import comparison\n"
@@ -162,7 +156,7 @@ def test_an_interrupt_ends_the_command_without_a_traceback(tmp_path: Path) -> No
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs a shell with pipes")
-def test_a_closed_pipe_is_no_traceback(ball: Path) -> None:
+def test_a_closed_pipe_is_no_traceback(ball):
     with subprocess.Popen(
         [sys.executable, "-m", "heat_igl", "info", str(ball)], env=ENVIRONMENT, stdout=-1, stderr=-1, text=True
     ) as running:
@@ -174,7 +168,7 @@ def test_a_closed_pipe_is_no_traceback(ball: Path) -> None:
 
 
 @pytest.mark.slow
-def test_demo_does_the_whole_job(tmp_path: Path) -> None:
+def test_demo_does_the_whole_job(tmp_path):
     done = command("demo", "--out", "made/results", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -189,9 +183,7 @@ def test_demo_does_the_whole_job(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("method", ["windows", "sweep", "heat"])
-def test_the_method_is_that_of_the_front_door(
-    ball: Path, capsys: pytest.CaptureFixture[str], method: heat_igl.geodesic.DistanceMethod
-) -> None:
+def test_the_method_is_that_of_the_front_door(ball, capsys, method):
     output = ball.with_name("out.ply")
     assert cli.run(["distance", str(ball), "--source=3", f"--output={output}", f"--method={method}"]) == 0
     expected = heat_igl.geodesic_distance(ball, 3, method=method)
@@ -200,7 +192,7 @@ def test_the_method_is_that_of_the_front_door(
     assert re.search(rf"^plan +{engine}\b", capsys.readouterr().out, re.MULTILINE)
 
 
-def test_options_reach_the_solver(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_reach_the_solver(ball, capsys):
     output = ball.with_name("out.ply")
     options = {"t_coef": 7.0, "laplacian": "cotan", "boundary": "dirichlet", "magnitude": "damped", "backend": "scipy"}
     arguments = [f"--{name.replace('_', '-')}={value}" for name, value in options.items()]
@@ -210,7 +202,7 @@ def test_options_reach_the_solver(ball: Path, capsys: pytest.CaptureFixture[str]
     assert f"{solver.t:.6g}" in capsys.readouterr().out
 
 
-def test_a_warning_of_the_package_is_one_line(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_warning_of_the_package_is_one_line(ball, capsys):
     assert cli.run(["distance", str(ball), "--source", "3", "--t", "1e-300"]) == 0
     first, *others = capsys.readouterr().err.splitlines()
     assert first.startswith("heat-igl: warning: t = 1e-300 is too small")
@@ -225,14 +217,7 @@ def test_a_warning_of_the_package_is_one_line(ball: Path, capsys: pytest.Capture
         (["--laplacian=graph"], 2, ("graph", "auto, intrinsic-delaunay, intrinsic-delaunay-refined, cotan")),
     ],
 )
-def test_a_bad_option_stops_before_anything_is_solved(
-    ball: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    status: int,
-    words: tuple[str, ...],
-) -> None:
+def test_a_bad_option_stops_before_anything_is_solved(ball, capsys, monkeypatch, arguments, status, words):
     monkeypatch.chdir(ball.parent)
     Path("folder.png").mkdir()
     monkeypatch.setattr(distances.SolverChoice, "on", lambda *_: pytest.fail("solved before it checked"))
@@ -241,7 +226,7 @@ def test_a_bad_option_stops_before_anything_is_solved(
     assert files(ball.parent) == {"sphere.off", "folder.png"}
 
 
-def test_tetrahedra_go_to_vtu_only(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tetrahedra_go_to_vtu_only(tmp_path, capsys):
     box = tmp_path / "box.mesh"
     io.write_mesh(box, shapes.box(2))
     assert cli.run(["distance", str(box), "--source", "0", "--output", str(tmp_path / "out.ply")]) == 1
@@ -255,10 +240,8 @@ def test_tetrahedra_go_to_vtu_only(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "time step" in capsys.readouterr().out
 
 
-def test_a_failure_while_drawing_leaves_old_files_alone(
-    ball: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: object, **__: object) -> None:
+def test_a_failure_while_drawing_leaves_old_files_alone(ball, capsys, monkeypatch):
+    def full(*_, **__):
         raise OSError(28, "No space left on device", "out.png")
 
     monkeypatch.setattr(drawing, "plot", full)
@@ -271,8 +254,8 @@ def test_a_failure_while_drawing_leaves_old_files_alone(
     assert files(ball.parent) == {"sphere.off", "out.ply"}
 
 
-def test_a_fault_of_the_package_is_not_hidden(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
+def test_a_fault_of_the_package_is_not_hidden(ball, monkeypatch):
+    def broken(*_):
         raise TypeError("a bug")
 
     monkeypatch.setattr(comparison, "read_mesh_or_cloud", broken)
@@ -288,7 +271,7 @@ def commands() -> list[str]:
 
 
 @pytest.mark.parametrize("name", commands())
-def test_every_command_has_json_and_examples(capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_every_command_has_json_and_examples(capsys, name):
     assert cli.run([name, "--help"]) == 0
     out = capsys.readouterr().out
     assert "--json FILE" in out
@@ -296,14 +279,14 @@ def test_every_command_has_json_and_examples(capsys: pytest.CaptureFixture[str],
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_examples_are_understood(example: str) -> None:
+def test_examples_are_understood(example):
     command = typer.main.get_command(application())
     name, *arguments = example.split()
     context = command.commands[name].make_context(name, arguments)
     assert all(value is not None for key, value in context.params.items() if key in ("mesh", "folder", "store"))
 
 
-def test_json_holds_what_the_lines_say(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_holds_what_the_lines_say(ball, capsys):
     arguments = [
         "distance",
         str(ball),
@@ -326,8 +309,8 @@ def test_json_holds_what_the_lines_say(ball: Path, capsys: pytest.CaptureFixture
     assert json.loads(file.read_text())["farthest"] == found["farthest"]
 
 
-def test_json_of_the_other_commands(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def printed(*arguments: str) -> dict[str, Any]:
+def test_json_of_the_other_commands(ball, capsys):
+    def printed(*arguments):
         assert cli.run([arguments[0], str(ball), *arguments[1:], "--json=-"]) == 0
         return json.loads(capsys.readouterr().out)
 
@@ -346,7 +329,7 @@ def test_json_of_the_other_commands(ball: Path, capsys: pytest.CaptureFixture[st
     assert validation["rows"][0]["errors"]["mean"] < 0.05
 
 
-def test_distances_as_text(two_spheres: Path) -> None:
+def test_distances_as_text(two_spheres):
     file = two_spheres.with_name("d.csv")
     assert cli.run(["distance", str(two_spheres), "--source=3", f"--output={file}"]) == 0
     first, *lines = file.read_text().splitlines()
@@ -360,7 +343,7 @@ def test_distances_as_text(two_spheres: Path) -> None:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """A sphere, and a circle around its pole."""
     monkeypatch.chdir(tmp_path)
     sphere = shapes.icosphere(3)
@@ -369,7 +352,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_signed_draws_a_mesh_of_which_curves_reach_a_part(two_spheres: Path) -> None:
+def test_signed_draws_a_mesh_of_which_curves_reach_a_part(two_spheres):
     mesh = read_mesh(two_spheres)
     loops = two_spheres.with_name("loops.obj")
     write_curves(loops, mesh, heat_igl.isolines(mesh, mesh.V[:, 2], [0.1])[0])
@@ -378,7 +361,7 @@ def test_signed_draws_a_mesh_of_which_curves_reach_a_part(two_spheres: Path) -> 
     assert drawn.read_bytes().startswith(b"\x89PNG")
 
 
-def test_signed_writes_what_the_library_returns(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_signed_writes_what_the_library_returns(folder, capsys):
     arguments = ["signed", "sphere.ply", "--curves=circle.obj", "--output=out.ply"]
     assert cli.run([*arguments, "--picture=out.png"]) == 0
     sphere = read_mesh("sphere.ply")
@@ -392,7 +375,7 @@ def test_signed_writes_what_the_library_returns(folder: Path, capsys: pytest.Cap
     assert f"{(phi < 0).sum()} vertices, down to" in capsys.readouterr().out
 
 
-def test_cut_writes_the_pieces(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_cut_writes_the_pieces(folder, capsys):
     assert cli.run(["cut", "sphere.ply", "--curves=circle.obj", "--output=part.ply", "--split"]) == 0
     parts = [read_mesh(folder / f"part_{i}.ply") for i in (0, 1)]
     assert not (folder / "part.ply").exists()
@@ -403,7 +386,7 @@ def test_cut_writes_the_pieces(folder: Path, capsys: pytest.CaptureFixture[str])
     assert read_mesh("whole.ply").n_faces == sum(part.n_faces for part in parts)
 
 
-def test_polylines_are_those_that_were_written(folder: Path) -> None:
+def test_polylines_are_those_that_were_written(folder):
     sphere = read_mesh("sphere.ply")
     curves = heat_igl.isolines(sphere, sphere.V[:, 2], [0.1, 0.5])
     path = heat_igl.edge_curve(sphere, [0, int(sphere.edges[sphere.edges[:, 0] == 0][0, 1])])
@@ -424,7 +407,7 @@ def test_polylines_are_those_that_were_written(folder: Path) -> None:
         ("v 0 0 0\nl 1\n", "line 2: a curve needs two vertices or more"),
     ],
 )
-def test_files_without_curves(tmp_path: Path, text: str, match: str) -> None:
+def test_files_without_curves(tmp_path, text, match):
     (tmp_path / "bad.obj").write_text(text)
     with pytest.raises(MeshError, match=match):
         read_polylines(tmp_path / "bad.obj")
@@ -441,9 +424,7 @@ def test_files_without_curves(tmp_path: Path, text: str, match: str) -> None:
         (["isolines", "sphere.ply", "--source=5", "--spacing=1e-9", "--output=a.obj"], "over 10000"),
     ],
 )
-def test_failures_are_one_line(
-    folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
-) -> None:
+def test_failures_are_one_line(folder, capsys, arguments, words):
     circle = (folder / "circle.obj").read_text()
     n = circle.count("v ")
     (folder / "far.obj").write_text(f"{circle}v 9 0 0\nv 9 1 0\nl {n + 1} {n + 2}\n")
@@ -457,7 +438,7 @@ def test_failures_are_one_line(
 
 
 @pytest.mark.usefixtures("folder")
-def test_commands_for_curves_take_point_clouds(capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_for_curves_take_point_clouds(capsys):
     """Lines of one command are those that another reads; they lie on the triangles between the points."""
     cloud = heat_igl.PointCloud(shapes.icosphere(3).V)
     heat_igl.write_point_cloud("cloud.xyz", cloud)

@@ -1,7 +1,5 @@
 """What works on a mesh works on points, or is refused by name: a table of operations and kinds of domains."""
 
-from __future__ import annotations
-
 import pickle
 from functools import cache
 
@@ -46,7 +44,7 @@ table = pytest.mark.parametrize("name", DOMAINS)
 
 @table
 @pytest.mark.parametrize("method", ["auto", "windows", "heat"])
-def test_distance_is_between_straight_lines_and_paths_along_edges(name: str, method: str) -> None:
+def test_distance_is_between_straight_lines_and_paths_along_edges(name, method):
     made = domain(name)
     solver = heat_igl.HeatMethodSolver(made) if method == "heat" else GeodesicSolver(made, method=method)
     found, V = solver.distance(A), surface(name).V
@@ -60,7 +58,7 @@ def test_distance_is_between_straight_lines_and_paths_along_edges(name: str, met
 
 
 @table
-def test_cells_and_neighbours(name: str) -> None:
+def test_cells_and_neighbours(name):
     made, both = domain(name), np.stack([exact(name, A), exact(name, B)])
     found = GeodesicSolver(made, method="exact").voronoi([A, B])
     np.testing.assert_allclose(found.distance, both.min(axis=0), atol=1e-9)
@@ -74,7 +72,7 @@ def test_cells_and_neighbours(name: str) -> None:
 
 
 @table
-def test_frames_are_orthonormal_and_tangent(name: str) -> None:
+def test_frames_are_orthonormal_and_tangent(name):
     frames, mesh = heat_igl.tangent_frames(domain(name)), surface(name)
     axes = np.stack([frames.x, frames.y, frames.normal], axis=1)
     np.testing.assert_allclose(axes @ axes.transpose(0, 2, 1), np.tile(np.eye(3), (mesh.n_vertices, 1, 1)), atol=1e-9)
@@ -86,7 +84,7 @@ def test_frames_are_orthonormal_and_tangent(name: str) -> None:
 
 @pytest.mark.filterwarnings("ignore:heat is off")
 @table
-def test_a_geodesic_along_the_log_map_ends_at_the_vertex_and_one_back_at_the_source(name: str) -> None:
+def test_a_geodesic_along_the_log_map_ends_at_the_vertex_and_one_back_at_the_source(name):
     """Paths that bend at a vertex of negative curvature do not: these are few."""
     made, V = domain(name), surface(name).V
     vectors = heat_igl.log_map(made, A)
@@ -111,7 +109,7 @@ def test_a_geodesic_along_the_log_map_ends_at_the_vertex_and_one_back_at_the_sou
 
 
 @table
-def test_vectors_keep_their_length(name: str) -> None:
+def test_vectors_keep_their_length(name):
     solver = heat_igl.VectorHeatSolver(domain(name))
     length = np.linalg.norm(solver.transport(A, [[3, 4]]), axis=1)
     np.testing.assert_allclose(length[length > 0], 5)
@@ -120,7 +118,7 @@ def test_vectors_keep_their_length(name: str) -> None:
 
 
 @table
-def test_paths_have_the_length_of_the_distance(name: str) -> None:
+def test_paths_have_the_length_of_the_distance(name):
     made, mesh = domain(name), surface(name)
     path = heat_igl.shortest_path(made, A, B)
     assert path.lengths(mesh).sum() == pytest.approx(exact(name, A)[B], rel=1e-6)
@@ -130,7 +128,7 @@ def test_paths_have_the_length_of_the_distance(name: str) -> None:
 
 
 @table
-def test_a_mean_of_two_points_is_halfway(name: str) -> None:
+def test_a_mean_of_two_points_is_halfway(name):
     mean = heat_igl.karcher_mean(domain(name), [A, B])
     ways = heat_igl.geodesic_distance(domain(name), mean, method="exact")[[A, B]]
     np.testing.assert_allclose(ways, exact(name, A)[B] / 2, rtol=1e-3)
@@ -139,7 +137,7 @@ def test_a_mean_of_two_points_is_halfway(name: str) -> None:
 
 
 @table
-def test_isolines_are_where_the_distance_is_and_cut_the_surface(name: str) -> None:
+def test_isolines_are_where_the_distance_is_and_cut_the_surface(name):
     mesh, level = surface(name), 0.5 * exact(name, A).max()
     (lines,) = heat_igl.isolines(domain(name), exact(name, A), [level])
     for line in lines:
@@ -153,7 +151,7 @@ def test_isolines_are_where_the_distance_is_and_cut_the_surface(name: str) -> No
 
 
 @table
-def test_signed_distance(name: str) -> None:
+def test_signed_distance(name):
     """Of a line around the source: negative on its left, where the source is."""
     if name == "cloud with one side":
         with pytest.raises(MeshError, match="no oriented manifold: the left and the right of a curve need one"):
@@ -168,7 +166,7 @@ def test_signed_distance(name: str) -> None:
 
 
 @table
-def test_transport_along_each_path_and_derivatives(name: str) -> None:
+def test_transport_along_each_path_and_derivatives(name):
     if name == "cloud with one side":
         with pytest.raises(MeshError, match="no oriented manifold: parallel transport along paths needs one"):
             heat_igl.log_maps_within(domain(name), 0.3, A)
@@ -186,7 +184,7 @@ def test_transport_along_each_path_and_derivatives(name: str) -> None:
 
 
 @table
-def test_values_places_and_the_page(name: str) -> None:
+def test_values_places_and_the_page(name):
     made, mesh = domain(name), surface(name)
     np.testing.assert_allclose(heat_igl.smooth(made, np.ones(mesh.n_vertices), 0.3), 1)
     middle = SurfacePoints([5], [[1 / 3, 1 / 3, 1 / 3]]).positions(mesh)
@@ -196,7 +194,7 @@ def test_values_places_and_the_page(name: str) -> None:
 
 
 @table
-def test_sources_of_all_kinds(name: str) -> None:
+def test_sources_of_all_kinds(name):
     made, mesh, solver = domain(name), surface(name), GeodesicSolver(domain(name), method="exact")
     both = exact(name, A), exact(name, B)
     along = solver.distance(heat_igl.shortest_path(made, A, B))
@@ -214,7 +212,7 @@ def test_sources_of_all_kinds(name: str) -> None:
 
 
 @table
-def test_other_positions_metrics_and_matrices(name: str) -> None:
+def test_other_positions_metrics_and_matrices(name):
     """Twice the positions, or four times the metric, are twice the distance; normals are not those of other points."""
     made, solver = domain(name), GeodesicSolver(domain(name), method="exact")
     twice = solver.with_vertices(2 * made.V).distance(A)

@@ -1,7 +1,5 @@
 """Batches: the same bits as a solver's, bad meshes apart, and nothing lost or done twice when processes die."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -463,7 +461,7 @@ def test_killed_processes_lose_nothing_and_repeat_nothing(processes, tmp_path):
         sys.executable, "-m", "heat_igl", "batch", str(folder), "--store", str(store), "--sources", str(source_file),
     ]  # fmt: skip
 
-    def client(*arguments: str) -> subprocess.Popen[str]:
+    def client(*arguments):
         return subprocess.Popen(
             [*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
         )
@@ -502,7 +500,7 @@ def test_killed_processes_lose_nothing_and_repeat_nothing(processes, tmp_path):
         np.testing.assert_array_equal(got, expected(mesh, range(256)))
 
 
-def test_a_bundle_that_kills_its_workers_is_handed_out_again_mesh_by_mesh() -> None:
+def test_a_bundle_that_kills_its_workers_is_handed_out_again_mesh_by_mesh():
     """So that only the mesh to blame ends in the report."""
     from distributed import Future, KilledWorker
 

@@ -1,11 +1,8 @@
 """The drop-in modules: the calls of libigl, potpourri3d, gdist and pygeodesic, and what they return."""
 
-from __future__ import annotations
-
 import importlib.util
 import inspect
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import igl
@@ -27,17 +24,17 @@ needs_potpourri3d = pytest.mark.skipif(importlib.util.find_spec("potpourri3d") i
 
 
 @pytest.fixture(scope="module")
-def ball() -> Mesh:
+def ball():
     return shapes.icosphere(3)
 
 
 @pytest.fixture(scope="module")
-def torus() -> Mesh:
+def torus():
     return shapes.torus(24, 16)
 
 
 @pytest.fixture
-def peer() -> Any:
+def peer():
     return pytest.importorskip("potpourri3d")
 
 
@@ -48,7 +45,7 @@ def lengths(points: np.ndarray) -> float:
 # --- libigl -----------------------------------------------------------------------------------------------------------
 
 
-def test_every_other_name_is_libigl_s() -> None:
+def test_every_other_name_is_libigl_s():
     assert drop_in.cotmatrix is igl.cotmatrix
     assert {"grad", "exact_geodesic", "heat_geodesic"} <= set(dir(drop_in))
     with pytest.raises(AttributeError, match="cotmatrx"):
@@ -64,9 +61,7 @@ def test_every_other_name_is_libigl_s() -> None:
         ([], [5, 90], [2], []),
     ],
 )
-def test_exact_geodesic_agrees_with_libigl(
-    torus: Mesh, VS: list[int], FS: list[int], VT: list[int], FT: list[int]
-) -> None:
+def test_exact_geodesic_agrees_with_libigl(torus, VS, FS, VT, FT):
     given = {name: np.array(found, np.int64) for name, found in (("VS", VS), ("FS", FS), ("VT", VT), ("FT", FT))}
     found = drop_in.exact_geodesic(torus.V, torus.F, **given)
     assert np.allclose(found, igl.exact_geodesic(torus.V, torus.F, **given), rtol=1e-9, atol=1e-9)
@@ -76,7 +71,7 @@ def test_exact_geodesic_agrees_with_libigl(
     assert np.array_equal(older, drop_in.exact_geodesic(torus.V, torus.F, VS=[0], VT=[5, 1]))
 
 
-def test_heat_geodesics_take_data_in_three_ways(ball: Mesh) -> None:
+def test_heat_geodesics_take_data_in_three_ways(ball):
     expected = heat_igl.HeatMethodSolver(ball, t=0.01).distance([4, 9])
     for arguments, named in (((0.01,), {}), ((), {"t": 0.01})):
         data = drop_in.HeatGeodesicsData()
@@ -109,7 +104,7 @@ def methods(kind: type) -> set[str]:
     return {name for name in dir(kind) if not name.startswith("_") and callable(getattr(kind, name))}
 
 
-def test_every_name_is_there(peer: Any) -> None:
+def test_every_name_is_there(peer):
     theirs = public(peer)
     assert set(theirs) == set(pp3d.__all__)
     for name in pp3d.__all__:
@@ -118,7 +113,7 @@ def test_every_name_is_there(peer: Any) -> None:
 
 
 @pytest.mark.parametrize("name", pp3d.__all__)
-def test_arguments_and_defaults_are_theirs(peer: Any, name: str) -> None:
+def test_arguments_and_defaults_are_theirs(peer, name):
     ours, theirs = getattr(pp3d, name), getattr(peer, name)
     pairs = [(ours, theirs)]
     if inspect.isclass(ours):
@@ -135,7 +130,7 @@ def test_arguments_and_defaults_are_theirs(peer: Any, name: str) -> None:
 
 
 @needs_potpourri3d
-def test_distances_agree_within_the_error_of_heat(peer: Any, ball: Mesh) -> None:
+def test_distances_agree_within_the_error_of_heat(peer, ball):
     for sources in ([5], [5, 100, 333]):
         exact = np.arccos(np.clip(ball.V @ ball.V[sources].T, -1, 1)).min(axis=1)
         ours, theirs = (
@@ -148,14 +143,14 @@ def test_distances_agree_within_the_error_of_heat(peer: Any, ball: Mesh) -> None
     assert np.array_equal(one.compute_distance(5), pp3d.compute_distance(ball.V, ball.F, 5))
 
 
-def test_a_larger_time_step_is_larger_in_proportion(ball: Mesh) -> None:
+def test_a_larger_time_step_is_larger_in_proportion(ball):
     standard = heat_igl.HeatMethodSolver(ball)
     wide = pp3d.MeshHeatMethodDistanceSolver(ball.V, ball.F, t_coef=4.0)
     assert wide._solver.t == pytest.approx(4 * standard.t)
     assert pp3d.MeshHeatMethodDistanceSolver(ball.V, ball.F)._solver.t == standard.t
 
 
-def test_faces_that_repeat_a_vertex_are_left_out(ball: Mesh) -> None:
+def test_faces_that_repeat_a_vertex_are_left_out(ball):
     faces = np.concatenate([ball.F, [[3, 3, 8]]])
     assert np.array_equal(pp3d.compute_distance(ball.V, faces, 5), pp3d.compute_distance(ball.V, ball.F, 5))
     with pytest.raises(MeshError, match="repeats a vertex"):
@@ -163,7 +158,7 @@ def test_faces_that_repeat_a_vertex_are_left_out(ball: Mesh) -> None:
 
 
 @needs_potpourri3d
-def test_transport_agrees_in_space(peer: Any, ball: Mesh) -> None:
+def test_transport_agrees_in_space(peer, ball):
     """Components differ with the frames, vectors in space do not."""
     V, F = np.array(ball.V), np.array(ball.F)
     found = []
@@ -180,7 +175,7 @@ def test_transport_agrees_in_space(peer: Any, ball: Mesh) -> None:
 
 @needs_potpourri3d
 @pytest.mark.parametrize("strategy", ["VectorHeat", "AffineLocal", "AffineAdaptive"])
-def test_log_maps_agree_in_space(peer: Any, ball: Mesh, strategy: str) -> None:
+def test_log_maps_agree_in_space(peer, ball, strategy):
     """Ours is nearer to the polyhedral map: with all strategies, and in any frame."""
     V, F = np.array(ball.V), np.array(ball.F)
     frames = heat_igl.tangent_frames(ball)
@@ -195,7 +190,7 @@ def test_log_maps_agree_in_space(peer: Any, ball: Mesh, strategy: str) -> None:
     assert errors[0] < min(errors[1], 0.03)
 
 
-def test_affine_log_maps_follow_shortest_paths(ball: Mesh) -> None:
+def test_affine_log_maps_follow_shortest_paths(ball):
     solver = pp3d.MeshVectorHeatSolver(ball.V, ball.F)
     near_exact = heat_igl.log_map(ball, 7)
     for strategy in ("AffineLocal", "AffineAdaptive"):
@@ -206,7 +201,7 @@ def test_affine_log_maps_follow_shortest_paths(ball: Mesh) -> None:
 
 
 @pytest.mark.parametrize("intrinsic", [False, True])
-def test_connection_laplacian_is_positive(intrinsic: bool) -> None:
+def test_connection_laplacian_is_positive(intrinsic):
     ball = shapes.icosphere(2)
     L = pp3d.MeshVectorHeatSolver(ball.V, ball.F, use_intrinsic_delaunay=intrinsic).get_connection_laplacian()
     assert L.format == "csc"
@@ -214,7 +209,7 @@ def test_connection_laplacian_is_positive(intrinsic: bool) -> None:
     assert np.linalg.eigvalsh(L.toarray()).min() > 0
 
 
-def test_scalars_are_extended(ball: Mesh) -> None:
+def test_scalars_are_extended(ball):
     found = pp3d.MeshVectorHeatSolver(ball.V, ball.F).extend_scalar([1, 22], [0.0, 6.0])
     assert (found.min(), found.max()) >= (0.0, 5.9)
     with pytest.raises(ValueError, match="values must be one number for each of the 2 sources"):
@@ -222,7 +217,7 @@ def test_scalars_are_extended(ball: Mesh) -> None:
 
 
 @needs_potpourri3d
-def test_paths_are_no_longer_than_theirs(peer: Any, torus: Mesh) -> None:
+def test_paths_are_no_longer_than_theirs(peer, torus):
     V, F = np.array(torus.V), np.array(torus.F)
     ours, theirs = pp3d.EdgeFlipGeodesicSolver(V, F), peer.EdgeFlipGeodesicSolver(V, F)
     for start, end in pairwise([0, 97, 200, 13, 301]):
@@ -244,7 +239,7 @@ def test_paths_are_no_longer_than_theirs(peer: Any, torus: Mesh) -> None:
 
 
 @needs_potpourri3d
-def test_traced_geodesics_end_where_theirs_do(peer: Any, torus: Mesh) -> None:
+def test_traced_geodesics_end_where_theirs_do(peer, torus):
     V, F = np.array(torus.V), np.array(torus.F)
     ours, theirs = pp3d.GeodesicTracer(V, F), peer.GeodesicTracer(V, F)
     direction = np.array([0.3, 0.5, 0.4])
@@ -260,7 +255,7 @@ def test_traced_geodesics_end_where_theirs_do(peer: Any, torus: Mesh) -> None:
 
 
 @needs_potpourri3d
-def test_isolines_have_the_length_of_theirs(peer: Any, torus: Mesh) -> None:
+def test_isolines_have_the_length_of_theirs(peer, torus):
     V, F, u = np.array(torus.V), np.array(torus.F), np.array(torus.V[:, 2])
     total = 0.0
     for curve in pp3d.marching_triangles(V, F, u, 0.03):
@@ -276,7 +271,7 @@ def test_isolines_have_the_length_of_theirs(peer: Any, torus: Mesh) -> None:
 
 
 @needs_potpourri3d
-def test_matrices_and_areas_are_theirs(peer: Any, torus: Mesh) -> None:
+def test_matrices_and_areas_are_theirs(peer, torus):
     V, F = np.array(torus.V), np.array(torus.F)
     for epsilon in (0.0, 0.01):
         difference = pp3d.cotan_laplacian(V, F, epsilon) - peer.cotan_laplacian(V, F, epsilon)
@@ -299,7 +294,7 @@ def latitude(ball: Mesh) -> np.ndarray:
 
 @needs_potpourri3d
 @pytest.mark.parametrize("constraint", ["ZeroSet", "None", "Multiple"])
-def test_signed_distance_has_their_sign(peer: Any, ball: Mesh, constraint: str) -> None:
+def test_signed_distance_has_their_sign(peer, ball, constraint):
     """The north is on the left of the equator: positive."""
     curve = [(v, []) for v in equator(ball)]
     for module in (pp3d, peer):
@@ -309,7 +304,7 @@ def test_signed_distance_has_their_sign(peer: Any, ball: Mesh, constraint: str) 
 
 
 @needs_potpourri3d
-def test_fast_marching_has_their_sign_and_less_error(peer: Any, ball: Mesh) -> None:
+def test_fast_marching_has_their_sign_and_less_error(peer, ball):
     """The north is on the left of the equator: negative."""
     curve = [(v, []) for v in equator(ball)]
     errors = []
@@ -320,7 +315,7 @@ def test_fast_marching_has_their_sign_and_less_error(peer: Any, ball: Mesh) -> N
 
 
 @needs_potpourri3d
-def test_fast_marching_begins_at_their_values(peer: Any, ball: Mesh) -> None:
+def test_fast_marching_begins_at_their_values(peer, ball):
     """At points of faces, in the middles of edges, at vertices; also below 0."""
     edge = pp3d.edges(ball.V, ball.F)[40]
     same = int(np.flatnonzero((np.sort(peer.edges(np.array(ball.V), np.array(ball.F)), axis=1) == edge).all(1))[0])
@@ -335,7 +330,7 @@ def test_fast_marching_begins_at_their_values(peer: Any, ball: Mesh) -> None:
 
 
 @needs_potpourri3d
-def test_signed_distance_of_polygons_and_points_is_negative_on_the_left(peer: Any, ball: Mesh) -> None:
+def test_signed_distance_of_polygons_and_points_is_negative_on_the_left(peer, ball):
     V, F, curve = np.array(ball.V), ball.F.tolist(), [equator(ball)]
     for module in (pp3d, peer):
         on_polygons = module.PolygonMeshHeatSolver(V, F).compute_signed_distance(curve)
@@ -346,7 +341,7 @@ def test_signed_distance_of_polygons_and_points_is_negative_on_the_left(peer: An
     assert np.abs(turned - latitude(ball)).max() < 0.03
 
 
-def test_curves_through_faces_and_edges_are_one_curve(ball: Mesh) -> None:
+def test_curves_through_faces_and_edges_are_one_curve(ball):
     """The isoline of `marching_triangles` at height 0.3, and the same with its points on edges."""
     V, F = ball.V, ball.F
     (isoline,) = pp3d.marching_triangles(V, F, V[:, 2], 0.3)
@@ -363,7 +358,7 @@ def test_curves_through_faces_and_edges_are_one_curve(ball: Mesh) -> None:
     assert len({float(sign) for sign in np.sign(found * height) if sign}) == 1
 
 
-def test_nodes_without_a_common_face_are_joined(ball: Mesh) -> None:
+def test_nodes_without_a_common_face_are_joined(ball):
     whole = equator(ball)
     solver = pp3d.MeshFastMarchingDistanceSolver(ball.V, ball.F)
     found = solver.compute_distance([[(v, []) for v in (*whole[:-1:4], whole[0])]], sign=True)
@@ -371,7 +366,7 @@ def test_nodes_without_a_common_face_are_joined(ball: Mesh) -> None:
     assert np.allclose(found, solver.compute_distance([[(v, []) for v in whole]], sign=True), atol=0.01)
 
 
-def test_curves_and_points_without_a_sign(ball: Mesh) -> None:
+def test_curves_and_points_without_a_sign(ball):
     curve, pole = [(v, []) for v in equator(ball)], int(ball.V[:, 2].argmin())
     solver = pp3d.MeshSignedHeatSolver(ball.V, ball.F)
     assert np.abs(solver.compute_distance([curve], [False]) - np.abs(latitude(ball))).mean() < 0.01
@@ -381,7 +376,7 @@ def test_curves_and_points_without_a_sign(ball: Mesh) -> None:
     assert np.array_equal(found[north], solver.compute_distance([curve])[north])
 
 
-def test_the_polygon_solver_measures_a_plane_and_carries_vectors_unturned() -> None:
+def test_the_polygon_solver_measures_a_plane_and_carries_vectors_unturned():
     V, F = igl.quad_grid(6, 6)[:2]
     V = np.hstack([V, np.zeros((len(V), 3 - V.shape[1]))])
     solver = pp3d.PolygonMeshHeatSolver(V, F)
@@ -394,7 +389,7 @@ def test_the_polygon_solver_measures_a_plane_and_carries_vectors_unturned() -> N
     assert np.array_equal(solver.extend_scalar([0, 20], [3.0, 3.0]), np.full(len(V), 3.0))
 
 
-def test_the_cloud_solver_measures_a_sphere(ball: Mesh) -> None:
+def test_the_cloud_solver_measures_a_sphere(ball):
     solver = pp3d.PointCloudHeatSolver(ball.V)
     exact = arcs(ball.V, 7)
     assert np.abs(solver.compute_distance(7) - exact).mean() < 0.05
@@ -408,7 +403,7 @@ def test_the_cloud_solver_measures_a_sphere(ball: Mesh) -> None:
     assert np.allclose(np.linalg.norm(carried, axis=1).max(), 2)
 
 
-def test_local_triangulations_are_fans(ball: Mesh) -> None:
+def test_local_triangulations_are_fans(ball):
     """Each row begins with its point, each triangle is in three rows, and none is lost."""
     table = pp3d.PointCloudLocalTriangulation(ball.V).get_local_triangulation()
     assert table.shape == (ball.n_vertices, 6, 3)
@@ -421,7 +416,7 @@ def test_local_triangulations_are_fans(ball: Mesh) -> None:
 
 
 @pytest.mark.parametrize(("kind", "rows"), [("per-vertex", 4), ("per-face", 2), ("per-corner", 6)])
-def test_texture_coordinates_are_written(tmp_path: Path, kind: str, rows: int) -> None:
+def test_texture_coordinates_are_written(tmp_path, kind, rows):
     """Every corner names the row of coordinates that is of the vertex, the face or the corner."""
     V, F = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
     coordinates = np.arange(2.0 * rows).reshape(-1, 2) / 7
@@ -441,7 +436,7 @@ def test_texture_coordinates_are_written(tmp_path: Path, kind: str, rows: int) -
         pp3d.write_mesh(V, F, tmp_path / "a.ply", coordinates, kind)
 
 
-def test_files_are_read_back_as_written(tmp_path: Path, torus: Mesh) -> None:
+def test_files_are_read_back_as_written(tmp_path, torus):
     pp3d.write_mesh(torus.V, torus.F, str(tmp_path / "a.obj"))
     V, F = pp3d.read_mesh(str(tmp_path / "a.obj"))
     assert np.array_equal(V, torus.V)
@@ -467,8 +462,8 @@ def two_parts() -> Mesh:
 
 
 @pytest.fixture(params=[bumpy, two_parts, lambda: shapes.torus(14, 9)], ids=["bumpy", "two parts", "torus"])
-def mesh(request: pytest.FixtureRequest) -> Mesh:
-    made: Mesh = request.param()
+def mesh(request):
+    made = request.param()
     return made
 
 
@@ -494,14 +489,14 @@ def indices(*values: int) -> np.ndarray:
         (indices(2), None),
     ],
 )
-def test_gdist_distances(mesh: Mesh, arguments: tuple[Any, ...]) -> None:
+def test_gdist_distances(mesh, arguments):
     theirs = pytest.importorskip("gdist").compute_gdist(*arrays(mesh), *arguments)
     ours = gdist.compute_gdist(*arrays(mesh), *arguments)
     assert ours.dtype == np.float64
     np.testing.assert_allclose(ours, theirs, atol=1e-12)
 
 
-def test_gdist_counts_from_one_and_stops_at_the_largest_distance(mesh: Mesh) -> None:
+def test_gdist_counts_from_one_and_stops_at_the_largest_distance(mesh):
     V, F = arrays(mesh)
     whole = gdist.compute_gdist(V, F, [5])
     np.testing.assert_array_equal(gdist.compute_gdist(V, F + 1, [5], is_one_indexed=True), whole)
@@ -512,7 +507,7 @@ def test_gdist_counts_from_one_and_stops_at_the_largest_distance(mesh: Mesh) -> 
 
 
 @pytest.mark.parametrize("radius", [0.7, None])
-def test_gdist_matrices(mesh: Mesh, radius: float | None) -> None:
+def test_gdist_matrices(mesh, radius):
     peer = pytest.importorskip("gdist")
     limit = () if radius is None else (radius,)
     ours, theirs = (module.local_gdist_matrix(*arrays(mesh), *limit) for module in (gdist, peer))
@@ -534,7 +529,7 @@ def test_gdist_matrices(mesh: Mesh, radius: float | None) -> None:
 
 
 @pytest.mark.parametrize("arguments", [(), ([3],), ([20, 3, 20],), ([3, 20], [7, 1, 3, 7]), (None, [9])])
-def test_pygeodesic_distances(mesh: Mesh, arguments: tuple[Any, ...]) -> None:
+def test_pygeodesic_distances(mesh, arguments):
     peer = pytest.importorskip("pygeodesic.geodesic")
     theirs, their_best = peer.PyGeodesicAlgorithmExact(*arrays(mesh)).geodesicDistances(*arguments)
     ours, best = pygeodesic.PyGeodesicAlgorithmExact(*arrays(mesh)).geodesicDistances(*arguments)
@@ -548,14 +543,14 @@ def test_pygeodesic_distances(mesh: Mesh, arguments: tuple[Any, ...]) -> None:
     np.testing.assert_allclose(each[best, np.arange(len(best))], ours, atol=1e-12)
 
 
-def test_pygeodesic_stops_at_the_largest_distance() -> None:
+def test_pygeodesic_stops_at_the_largest_distance():
     algorithm = pygeodesic.PyGeodesicAlgorithmExact(*arrays(shapes.strip(5, 1)))
     distance, _ = algorithm.geodesicDistances([0], None, 2.5)
     np.testing.assert_allclose(distance, [0, 1, 2, np.inf, np.inf, np.inf, 1, 2**0.5, 5**0.5, np.inf, np.inf, np.inf])
     assert algorithm.geodesicDistances([0], [5, 1], 2.5)[0].tolist() == [np.inf, 1.0]
 
 
-def test_pygeodesic_path(mesh: Mesh) -> None:
+def test_pygeodesic_path(mesh):
     peer = pytest.importorskip("pygeodesic.geodesic").PyGeodesicAlgorithmExact(*arrays(mesh))
     algorithm = pygeodesic.PyGeodesicAlgorithmExact(*arrays(mesh))
     for source, target in pairwise([0, 7, 22, 13, 2]):
@@ -567,7 +562,7 @@ def test_pygeodesic_path(mesh: Mesh) -> None:
     assert algorithm.geodesicDistance(3, 3)[1].tolist() == mesh.V[[3]].tolist()
 
 
-def test_pygeodesic_raises_instead_of_printing() -> None:
+def test_pygeodesic_raises_instead_of_printing():
     V, F = arrays(two_parts())
     algorithm = pygeodesic.PyGeodesicAlgorithmExact(V, F)
     with pytest.raises(SourceError, match=r"targetIndex\[0\] = 50 is no vertex"):
@@ -580,7 +575,7 @@ def test_pygeodesic_raises_instead_of_printing() -> None:
         pygeodesic.PyGeodesicAlgorithmExact(V, F[:, :2])
 
 
-def test_pygeodesic_reads_its_files(tmp_path: Any) -> None:
+def test_pygeodesic_reads_its_files(tmp_path):
     V, F = arrays(shapes.grid(2))
     path = tmp_path / "mesh.txt"
     lines = [f"{len(V)} {len(F)}", *(" ".join(map(repr, row)) for row in [*V.tolist(), *F.tolist()])]

@@ -4,8 +4,6 @@ A cell is an assertion, or a refusal that says what to do instead. Tests of sing
 this table does not hold: their algorithms, options and hard cases.
 """
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -67,13 +65,13 @@ def assert_close(found: np.ndarray, expected: np.ndarray, name: str, method: str
 
 @pytest.mark.parametrize("method", ["windows", "exact"])
 @pytest.mark.parametrize("name", WITHOUT_WINDOWS)
-def test_a_refusal_names_the_method_the_reason_and_the_remedy(name: str, method: str) -> None:
+def test_a_refusal_names_the_method_the_reason_and_the_remedy(name, method):
     with pytest.raises(MeshError, match=rf"method='{method}' needs triangles that fit together, .*method='auto'"):
         domain(name).solver(method)
 
 
 @table()
-def test_zero_at_sources_and_positive_elsewhere(name: str, method: str) -> None:
+def test_zero_at_sources_and_positive_elsewhere(name, method):
     for source in sources(name):
         d = distance(name, method, source)
         assert d.dtype == np.float64
@@ -84,7 +82,7 @@ def test_zero_at_sources_and_positive_elsewhere(name: str, method: str) -> None:
 
 
 @table()
-def test_infinity_in_other_components(name: str, method: str) -> None:
+def test_infinity_in_other_components(name, method):
     one, both = domain(name), domain(name).doubled()
     solver, n = both.solver(method), one.n
     d = solver.distance(3)
@@ -94,7 +92,7 @@ def test_infinity_in_other_components(name: str, method: str) -> None:
 
 
 @table()
-def test_near_the_truth(name: str, method: str) -> None:
+def test_near_the_truth(name, method):
     """Closed forms, and pygeodesic where there is none."""
     at = domain(name)
     is_of_sphere = name in ("polygons", *POINTS)  # which differ from it themselves
@@ -109,14 +107,14 @@ def test_near_the_truth(name: str, method: str) -> None:
 
 
 @table([*BOUNDED, *((name, "heat") for name in BODIES if " on " not in name)])
-def test_not_shorter_than_a_straight_line(name: str, method: str) -> None:
+def test_not_shorter_than_a_straight_line(name, method):
     for source in sources(name):
         straight = domain(name).straight(source)
         assert (distance(name, method, source) >= straight - 1e-9 * straight.max()).all()
 
 
 @table([(name, method) for name, method in BOUNDED if name not in POINTS])
-def test_not_longer_than_a_path_along_edges(name: str, method: str) -> None:
+def test_not_longer_than_a_path_along_edges(name, method):
     """Heat is moved inside this bound in a few passes, which leave at most half a percent of the largest distance."""
     most = 5e-3 if method == "heat" else 1e-9
     for source in sources(name):
@@ -125,13 +123,13 @@ def test_not_longer_than_a_path_along_edges(name: str, method: str) -> None:
 
 
 @table()
-def test_distance_does_not_depend_on_the_order_of_vertices_and_cells(name: str, method: str) -> None:
+def test_distance_does_not_depend_on_the_order_of_vertices_and_cells(name, method):
     other, label = domain(name).renumbered(np.random.default_rng(1))
     assert_close(other.solver(method).distance(int(label[3]))[label], distance(name, method, 3), name, method)
 
 
 @table()
-def test_distance_does_not_depend_on_the_place(name: str, method: str) -> None:
+def test_distance_does_not_depend_on_the_place(name, method):
     at = domain(name)
     found = at.moved(TURN, shift=[1e6, -2e6, 5e5]).solver(method).distance(3)  # leaves nine digits of the coordinates
     before = distance(name, method, 3)
@@ -141,13 +139,13 @@ def test_distance_does_not_depend_on_the_place(name: str, method: str) -> None:
 
 @table()
 @pytest.mark.parametrize("scale", [1e-30, 1e30])
-def test_distance_has_the_unit_of_the_mesh(name: str, method: str, scale: float) -> None:
+def test_distance_has_the_unit_of_the_mesh(name, method, scale):
     scaled = domain(name).moved(np.eye(3), scale=scale)
     assert_close(scaled.solver(method).distance(3) / scale, distance(name, method, 3), name, method)
 
 
 @table([(name, method) for name, method in CELLS if name not in ("polygons", *POINTS)])
-def test_a_vertex_in_each_flat_simplex_changes_nothing(name: str, method: str) -> None:
+def test_a_vertex_in_each_flat_simplex_changes_nothing(name, method):
     """Exact distance stays, the others are as near to it as before."""
     fine, before = domain(name).subdivided(), distance(name, method, 3)
     found = fine.solver(method).distance(3)[: domain(name).n]
@@ -158,7 +156,7 @@ def test_a_vertex_in_each_flat_simplex_changes_nothing(name: str, method: str) -
 
 
 @table()
-def test_distance_is_symmetric_and_keeps_the_triangle_inequality(name: str, method: str) -> None:
+def test_distance_is_symmetric_and_keeps_the_triangle_inequality(name, method):
     at = sources(name)
     each = np.array([distance(name, method, source) for source in at])
     between = each[:, at]
@@ -169,7 +167,7 @@ def test_distance_is_symmetric_and_keeps_the_triangle_inequality(name: str, meth
 
 
 @table()
-def test_the_same_bits_in_batches_in_threads_and_pickled(name: str, method: str) -> None:
+def test_the_same_bits_in_batches_in_threads_and_pickled(name, method):
     """Heat solves a batch in other blocks, and agrees to rounding."""
     prepared, at = solver(name, method), sources(name)
     alone = np.array([distance(name, method, source) for source in at])
@@ -182,7 +180,7 @@ def test_the_same_bits_in_batches_in_threads_and_pickled(name: str, method: str)
 
 
 @table()
-def test_several_sources_are_the_nearest_of_each(name: str, method: str) -> None:
+def test_several_sources_are_the_nearest_of_each(name, method):
     prepared, at = solver(name, method), sources(name)
     alone = np.array([distance(name, method, source) for source in at])
     offsets = 0.1 * np.arange(3) * alone.max()
@@ -203,7 +201,7 @@ def test_several_sources_are_the_nearest_of_each(name: str, method: str) -> None
 
 
 @table()
-def test_a_cutoff_and_targets_leave_the_values(name: str, method: str) -> None:
+def test_a_cutoff_and_targets_leave_the_values(name, method):
     prepared, whole = solver(name, method), distance(name, method, 3)
     cutoff = float(np.median(whole))
     near = np.where(whole <= cutoff, whole, np.inf)
@@ -220,7 +218,7 @@ def test_a_cutoff_and_targets_leave_the_values(name: str, method: str) -> None:
 
 
 @table()
-def test_vertices_move(name: str, method: str) -> None:
+def test_vertices_move(name, method):
     at, prepared = domain(name), solver(name, method)
     moved = at.moved(np.diag([1.0, 1.3, 0.8]))
     if at.field is not None and at.kind == "simplices":
@@ -236,7 +234,7 @@ def test_vertices_move(name: str, method: str) -> None:
 
 
 @table()
-def test_a_solver_keeps_its_own(name: str, method: str) -> None:
+def test_a_solver_keeps_its_own(name, method):
     """What a caller does to an answer, or to the arrays that a solver was made of, changes no later answer."""
     at = domain(name)
     given = replace(at, V=at.V.copy(), field=None if at.field is None else at.field.copy())

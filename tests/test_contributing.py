@@ -1,7 +1,5 @@
 """The examples of CONTRIBUTING.md are all that has to be written: each is applied to a copy of the package."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -27,7 +25,7 @@ def changed(text: str, diff: str) -> str:
 @pytest.mark.parametrize(
     ("count", "example", "check"), [each[1:] for each in EXAMPLES], ids=[kind for kind, *_ in EXAMPLES]
 )
-def test_an_example_works_and_touches_so_many_files(count: str, example: str, check: str, tmp_path: Path) -> None:
+def test_an_example_works_and_touches_so_many_files(count, example, check, tmp_path):
     shutil.copytree(
         ROOT / "heat_igl", tmp_path / "heat_igl", copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__")
     )
@@ -45,7 +43,7 @@ def test_an_example_works_and_touches_so_many_files(count: str, example: str, ch
     assert done.returncode == 0, done.stderr
 
 
-def test_all_four_kinds_have_an_example() -> None:
+def test_all_four_kinds_have_an_example():
     assert {kind: int(count) for kind, count, *_ in EXAMPLES} == {
         "A kind of domain": 1,
         "A linear solver": 2,

@@ -1,7 +1,5 @@
 """Meshes cut along curves: the surface stays, curves become edges, and the pieces lie on either side."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import flat_perturbed

@@ -1,7 +1,5 @@
 """Derivatives of distance: against central differences, identities and closed forms; one-sided cases; bad input."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 
@@ -43,7 +41,7 @@ def differences(
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_paths_against_central_differences(name: str) -> None:
+def test_paths_against_central_differences(name):
     mesh, rng = MESHES[name](), np.random.default_rng(1)
     solver, sources = GeodesicSolver(mesh, method="exact"), [5, mesh.n_vertices // 2]
     distance, pull_back = solver.distance_vjp(sources)
@@ -67,7 +65,7 @@ def test_paths_against_central_differences(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["sphere", "grid", "moebius"])
-def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str) -> None:
+def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name):
     mesh, rng = MESHES[name](), np.random.default_rng(4)
     distance, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(5)
     g = rng.standard_normal(mesh.n_vertices)
@@ -79,7 +77,7 @@ def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name: str) 
     assert (dV * mesh.V).sum() == pytest.approx((g * distance).sum(), abs=1e-10 * scale)
 
 
-def test_scaling_gives_the_distance_where_faces_have_a_vertex_twice() -> None:
+def test_scaling_gives_the_distance_where_faces_have_a_vertex_twice():
     """Double pyramids with far tips: their intrinsic Delaunay triangles fold around edges from a vertex to itself."""
     rng, n_folded = np.random.default_rng(3), 0
     for _ in range(20):
@@ -102,7 +100,7 @@ def test_scaling_gives_the_distance_where_faces_have_a_vertex_twice() -> None:
     assert n_folded > 15
 
 
-def test_on_a_flat_convex_mesh_the_ends_move_along_the_line() -> None:
+def test_on_a_flat_convex_mesh_the_ends_move_along_the_line():
     flat = perturbed(shapes.grid(20))
     mesh = Mesh(flat.V * [1, 1, 0], flat.F)
     distance, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(110)
@@ -116,7 +114,7 @@ def test_on_a_flat_convex_mesh_the_ends_move_along_the_line() -> None:
         np.testing.assert_allclose(dV, expected, atol=1e-9)
 
 
-def test_a_bend_moves_with_its_vertex() -> None:
+def test_a_bend_moves_with_its_vertex():
     square = shapes.grid(12)
     centre = square.V[square.F].mean(axis=1)
     mesh = Mesh(square.V, square.F[~((centre[:, 0] > 0.5) & (centre[:, 1] > 0.5))])
@@ -130,7 +128,7 @@ def test_a_bend_moves_with_its_vertex() -> None:
     np.testing.assert_allclose(dV[start], -to_bend, atol=1e-9)
 
 
-def test_by_edge_lengths_without_positions() -> None:
+def test_by_edge_lengths_without_positions():
     mesh, rng = MESHES["sphere"](), np.random.default_rng(6)
     corners = mesh.V[mesh.F]
     lengths = np.stack([np.linalg.norm(corners[:, (c + 1) % 3] - corners[:, (c + 2) % 3], axis=1) for c in range(3)], 1)
@@ -148,7 +146,7 @@ def test_by_edge_lengths_without_positions() -> None:
         pull_back(g)
 
 
-def test_points_in_faces_as_sources() -> None:
+def test_points_in_faces_as_sources():
     mesh, rng = moved(shapes.torus(50, 25), 0.3), np.random.default_rng(8)
     faces, barycentric = rng.integers(mesh.n_faces, size=4), rng.dirichlet([2, 2, 2], 4)
     solver = GeodesicSolver(mesh, method="exact")
@@ -156,7 +154,7 @@ def test_points_in_faces_as_sources() -> None:
     carried = triangulation.locate(faces, barycentric)[1]
     assert (carried != barycentric).any(), "no point lies beside a flipped edge"
 
-    def at(coordinates: np.ndarray) -> SurfacePoints:
+    def at(coordinates):
         return SurfacePoints(faces, coordinates)
 
     _, pull_back = solver.distance_vjp(at(barycentric))
@@ -178,7 +176,7 @@ def test_points_in_faces_as_sources() -> None:
     assert both == pytest.approx((pull_back(g) * direction).sum() + by_points, rel=1e-9)
 
 
-def test_one_distance_changes_at_rate_1_with_its_source_point() -> None:
+def test_one_distance_changes_at_rate_1_with_its_source_point():
     mesh = MESHES["sphere"]()
     _, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(SurfacePoints([17], [[0.2, 0.3, 0.5]]))
     for vertex in (0, 100, 300):
@@ -186,7 +184,7 @@ def test_one_distance_changes_at_rate_1_with_its_source_point() -> None:
         assert np.linalg.norm(by_point) == pytest.approx(1, rel=1e-9)
 
 
-def test_sources_that_start_later() -> None:
+def test_sources_that_start_later():
     mesh, rng = MESHES["grid"](), np.random.default_rng(9)
     solver, sources = GeodesicSolver(mesh, method="exact"), OffsetSources([3, 200], [0.1, 0.3])
     _, pull_back = solver.distance_vjp(sources)
@@ -197,7 +195,7 @@ def test_sources_that_start_later() -> None:
     assert (pull_back(g) * direction).sum() == pytest.approx((g * expected).sum(), rel=1e-5)
 
 
-def test_unreachable_vertices_have_no_derivative() -> None:
+def test_unreachable_vertices_have_no_derivative():
     one = MESHES["grid"]()
     n = one.n_vertices
     mesh = twice(one, 3.0)
@@ -210,7 +208,7 @@ def test_unreachable_vertices_have_no_derivative() -> None:
     assert np.abs(dV[:n]).max() > 0.1
 
 
-def test_a_step_down_the_gradient_recovers_a_source() -> None:
+def test_a_step_down_the_gradient_recovers_a_source():
     """Gauss-Newton on the squares of what distances to landmarks miss, with the products of both directions."""
     mesh = MESHES["sphere"]()
     solver = GeodesicSolver(mesh, method="exact")
@@ -234,7 +232,7 @@ BAD_GRADIENTS = [
 
 
 @pytest.mark.parametrize(("g", "message"), BAD_GRADIENTS, ids=["length", "dimensions", "nan"])
-def test_gradients_that_cannot_be_used(g: np.ndarray, message: str) -> None:
+def test_gradients_that_cannot_be_used(g, message):
     mesh = MESHES["grid"]()
     _, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(0)
     with pytest.raises(ValueError, match=message):
@@ -242,7 +240,7 @@ def test_gradients_that_cannot_be_used(g: np.ndarray, message: str) -> None:
     assert pull_back(np.ones((2, mesh.n_vertices))).shape == (2, mesh.n_vertices, 3)
 
 
-def test_velocities_that_cannot_be_used() -> None:
+def test_velocities_that_cannot_be_used():
     mesh = MESHES["grid"]()
     _, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(0)
     with pytest.raises(ValueError, match=r"dV must be \(289, 3\) finite numbers"):
@@ -253,7 +251,7 @@ def test_velocities_that_cannot_be_used() -> None:
     assert of_point.push_forward(mesh.V, np.zeros((1, 3))).shape == (289,)
 
 
-def test_what_has_no_derivative_is_refused() -> None:
+def test_what_has_no_derivative_is_refused():
     mesh, curve = MESHES["grid"](), heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]])
     with pytest.raises(ValueError, match="a curve is among the sources: place points on it"):
         GeodesicSolver(mesh).distance_vjp(curve)
@@ -280,7 +278,7 @@ def solver_in(mesh: Mesh, kind: str, values: np.ndarray) -> GeodesicSolver:
 
 
 @pytest.mark.parametrize("kind", ["speed", "in space", "in planes"])
-def test_speeds_and_metrics(kind: str) -> None:
+def test_speeds_and_metrics(kind):
     mesh, rng = MESHES["grid"](), np.random.default_rng(5)
     values = metric_of(mesh, kind)
     solver = solver_in(mesh, kind, values)
@@ -311,7 +309,7 @@ def test_speeds_and_metrics(kind: str) -> None:
     assert (pull_back.push_forward(direction) * g).sum() == pytest.approx((pull_back(g) * direction).sum(), rel=1e-10)
 
 
-def test_what_has_no_metric_to_change() -> None:
+def test_what_has_no_metric_to_change():
     mesh = MESHES["grid"]()
     _, pull_back = GeodesicSolver(mesh).distance_vjp(0)
     with pytest.raises(ValueError, match=r"no metric to change: make it on speed_operators"):
@@ -320,7 +318,7 @@ def test_what_has_no_metric_to_change() -> None:
         pull_back.by_metric(np.ones(mesh.n_vertices))
 
 
-def test_faces_that_are_there_twice_count_once() -> None:
+def test_faces_that_are_there_twice_count_once():
     mesh = MESHES["grid"]()
     doubled = Mesh(mesh.V, np.concatenate([mesh.F, mesh.F[40:60, [1, 2, 0]], mesh.F[7:9, [1, 0, 2]]]))
     g, direction = np.random.default_rng(6).standard_normal((2, mesh.n_vertices, 1)) * [1, 0.5, 0.3]

@@ -1,7 +1,5 @@
 """Directions of shortest paths, and the logarithmic map."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed

@@ -1,7 +1,5 @@
 """The documentation: every block of every page, every entry of the gallery and every docstring runs by itself."""
 
-from __future__ import annotations
-
 import ast
 import doctest
 import importlib
@@ -46,7 +44,7 @@ def blocks() -> Iterator[pytest.param]:
 
 
 @pytest.fixture(autouse=True)
-def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _folder(tmp_path, monkeypatch):
     """The files that the pages name, in the directory that the blocks run in."""
     monkeypatch.chdir(tmp_path)
     surface = shapes.torus(40, 24)
@@ -63,7 +61,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("block", list(blocks()))
-def test_a_block_runs_as_it_is_copied(block: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_block_runs_as_it_is_copied(block, monkeypatch):
     require(block)
     if "polyscope" in block:  # without a display
         import polyscope
@@ -72,7 +70,7 @@ def test_a_block_runs_as_it_is_copied(block: str, monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(polyscope, "init", lambda: initialize("openGL_mock"))
     if importlib.util.find_spec("matplotlib"):
         monkeypatch.setattr("heat_igl.drawing.figure.DPI", 40)
-    names: dict[str, Any] = {"__name__": "__main__"}
+    names = {"__name__": "__main__"}
     exec(compile(block, "block", "exec"), names)
     for name in ("phi", "d", "distance"):  # what the pages call a distance
         if isinstance(names.get(name), np.ndarray):
@@ -91,14 +89,14 @@ class Scene:
 
 
 @pytest.mark.slow
-def test_every_entry_of_the_gallery_runs_as_it_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_entry_of_the_gallery_runs_as_it_is_shown(monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr("heat_igl.drawing.plots.lay_out", Scene)
     monkeypatch.syspath_prepend(ROOT / "docs")
     gallery = importlib.import_module("gallery")
     for entry in gallery.ENTRIES:
         before = Scene.n_drawn
-        names: dict[str, Any] = {"__name__": "__main__"}
+        names = {"__name__": "__main__"}
         exec(compile(gallery._body(entry), entry.__name__, "exec"), names)
         is_page = "page(" in gallery._body(entry)
         assert is_page or Scene.n_drawn == before + 1, entry.__name__
@@ -119,22 +117,22 @@ def examples() -> Iterator[pytest.param]:
 
 
 @pytest.mark.parametrize("text", list(examples()))
-def test_an_example_runs_by_itself(text: str) -> None:
+def test_an_example_runs_by_itself(text):
     require("".join(f">>> {example.source}" for example in PARSER.get_examples(text)))
     assert "+SKIP" not in text
-    said: list[str] = []
+    said = []
     # Names have to be imported by the example, so that it also runs where a reader pastes it.
     doctest.DocTestRunner(verbose=False).run(PARSER.get_doctest(text, {}, "example", None, None), out=said.append)
     assert "".join(said) == ""
 
 
 @pytest.mark.parametrize("name", heat_igl.__all__)
-def test_every_public_name_has_an_example(name: str) -> None:
+def test_every_public_name_has_an_example(name):
     section = (inspect.getdoc(getattr(heat_igl, name)) or "").partition("\nExamples\n--------\n")[2]
     assert any(part.want for part in PARSER.get_examples(section)), f"{name} has no example that shows a result"
 
 
-def test_the_drawn_strip_is_flat_and_true_to_length(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_drawn_strip_is_flat_and_true_to_length(monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parents[1] / "docs")
     figures = importlib.import_module("drawings")
     mesh = shapes.torus(14, 22, tube=0.5)

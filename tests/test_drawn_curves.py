@@ -1,7 +1,5 @@
 """Forms that people guess: curves through clicked places, their length and points, and meshes for other libraries."""
 
-from __future__ import annotations
-
 import sys
 from types import ModuleType, SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Exact distance by windows: closed forms, other people's exact solver, graphs of Steiner points, identities."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import (
@@ -350,6 +348,23 @@ def test_compiled_flips_are_those_of_the_triangulation():
     assert flipped.n_flips > 100
     np.testing.assert_allclose(np.sort(edges.length), np.sort(flipped.l.ravel()), rtol=1e-12)
     np.testing.assert_array_equal(edges.length[edges.twin[edges.twin >= 0]], edges.length[edges.twin >= 0])
+
+
+def test_triangulations_in_which_faces_are_there_twice():
+    """Windows would go on in both copies and multiply: this would not end."""
+    mesh, rng = shapes.torus(9, 14), np.random.default_rng(0)
+    twice = Mesh(mesh.V, np.concatenate([mesh.F, mesh.F[:, [1, 2, 0]], mesh.F[::2]]))
+    once, often = delaunay(mesh), delaunay(twice)
+    faces, places = rng.integers(mesh.n_faces, size=9), rng.dirichlet(np.ones(3), 9)
+    first, second = SurfacePoints(faces, places), SurfacePoints(faces + mesh.n_faces, places[:, [1, 2, 0]])
+    for given in ({"sources": np.array([7])}, {"points": first}):
+        expected = once.solve(**given, targets=first)
+        for targets in (first, second):
+            found = often.solve(**given, targets=targets)
+            np.testing.assert_allclose(found.distance, expected.distance, rtol=1e-13)
+            np.testing.assert_allclose(found.target_distance, expected.target_distance, atol=1e-13)
+            assert found.n_windows <= 2 * expected.n_windows
+    np.testing.assert_allclose(often.solve(points=second).distance, expected.distance, rtol=1e-13)
 
 
 def test_straight_past_a_flat_vertex_next_to_the_source():

@@ -1,7 +1,5 @@
 """Windows cover what they enter: no vertex of a nearly flat surface is missed, whatever rounding does to its angles."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Exact distance from curves, every point of which is a source: closed forms, dense points, and paths to curves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import flat_perturbed

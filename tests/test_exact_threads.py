@@ -1,7 +1,5 @@
 """One exact search on two threads: the same bits, whatever the surface and the sources."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import perturbed

@@ -1,7 +1,5 @@
 """GeodesicSolver, geodesic_distance and the plan: which engine answers, for every kind of source, cutoff and target."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import igl
@@ -57,7 +55,7 @@ def in_the_plane() -> dict[str, tuple[Any, np.ndarray]]:
 
 @pytest.mark.parametrize("name", in_the_plane())
 @pytest.mark.parametrize("method", ["windows", "sweep", "heat", "exact"])
-def test_distance_in_the_plane(name: str, method: Any) -> None:
+def test_distance_in_the_plane(name, method):
     sources, truth = in_the_plane()[name]
     found = geodesic_distance(SQUARE, sources, method=method)
     assert found.dtype == np.float64
@@ -66,7 +64,7 @@ def test_distance_in_the_plane(name: str, method: Any) -> None:
 
 
 @pytest.mark.parametrize("method", ["windows", "sweep", "heat", "exact"])
-def test_sources_that_no_face_uses(method: Any) -> None:
+def test_sources_that_no_face_uses(method):
     n = SQUARE.n_vertices
     mesh = Mesh(np.concatenate([SQUARE.V, [[9, 9, 9]]]), SQUARE.F)
     alone = geodesic_distance(mesh, n, method=method)
@@ -78,7 +76,7 @@ def test_sources_that_no_face_uses(method: Any) -> None:
 
 
 @pytest.mark.parametrize("sources", [5, [5, 300], OffsetSources([5, 300], [0.1, 0.0])], ids=["one", "two", "late"])
-def test_a_cutoff_looks_at_what_is_near_alone(sources: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cutoff_looks_at_what_is_near_alone(sources, monkeypatch):
     """On the part within the cutoff distances are those on the whole mesh, also beyond its narrow places."""
     mesh = shapes.torus(60, 40)
     exact = geodesic_distance(mesh, sources, method="exact")
@@ -92,7 +90,7 @@ def test_a_cutoff_looks_at_what_is_near_alone(sources: Any, monkeypatch: pytest.
     assert sizes[0] < 0.02 * mesh.n_faces
 
 
-def test_targets_alone() -> None:
+def test_targets_alone():
     mesh = shapes.torus(30, 20)
     places = SurfacePoints([7, 300, 7], [[0.2, 0.5, 0.3], [0, 1, 0], [0.5, 0.5, 0]])
     curve = edge_curve(mesh, mesh.F[0, :2])
@@ -122,12 +120,12 @@ def test_targets_alone() -> None:
         ({"tolerance": -1}, ValueError, "tolerance must be at least 0 and less than 1, not -1"),
     ],
 )
-def test_what_cannot_be_asked(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
+def test_what_cannot_be_asked(arguments, error, message):
     with pytest.raises(error, match=message):
         geodesic_distance(**{"mesh": TORUS, "sources": 0, **arguments})
 
 
-def test_faces_that_are_there_twice_count_once() -> None:
+def test_faces_that_are_there_twice_count_once():
     twice = Mesh(TORUS.V, np.concatenate([TORUS.F, TORUS.F[100:400, [1, 2, 0]]]))
     for method in ("windows", "sweep", "exact"):
         expected = geodesic_distance(TORUS, 5, method=method)
@@ -144,7 +142,7 @@ def test_faces_that_are_there_twice_count_once() -> None:
     np.testing.assert_allclose(back[1], geodesic_distance(TORUS, 5, method="exact", targets=here), rtol=1e-12)
 
 
-def test_a_mesh_that_everybody_has(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_that_everybody_has(monkeypatch):
     mesh = heat_igl.sample_mesh()
     assert mesh.n_vertices > 2500
     assert not mesh.is_tetrahedral
@@ -158,7 +156,7 @@ def test_a_mesh_that_everybody_has(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("options", [{"t": 1e300}, {"t_coef": 1e20}])
-def test_steps_that_leave_heat_level_are_refused(options: dict[str, float]) -> None:
+def test_steps_that_leave_heat_level_are_refused(options):
     """M - t L is singular in double precision then."""
     with pytest.raises(ValueError, match=f"{next(iter(options))} = 1e.* is too large: heat spreads over"):
         HeatMethodSolver(TORUS, **options)

@@ -1,7 +1,5 @@
 """Geodesics by class: curves straightened, paths and loops through waypoints, loops around handles."""
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -408,7 +406,7 @@ def test_meshes_without_paths_are_told_apart():
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_loops_that_begin_on_an_edge_are_straightened(axis: int) -> None:
+def test_loops_that_begin_on_an_edge_are_straightened(axis):
     """Isolines begin on edges, so the last crossing is on the side on which the loop begins."""
     torus = shapes.torus(16, 10)
     for level in (0.0, 0.05, 0.1, 0.3):

@@ -1,7 +1,5 @@
 """What leaves an engine: no answer that something cheap contradicts, and a word where heat is inaccurate."""
 
-from __future__ import annotations
-
 import pickle
 import warnings
 from collections.abc import Callable
@@ -13,13 +11,13 @@ from conftest import mean_error
 
 import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, shapes
-from heat_igl.heat.checking import Comparison, Comparisons
+from heat_igl.heat.checking import Comparisons
 from heat_igl.kernels.sweep import sweeping
 from heat_igl.kernels.windows import windows
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES
 from heat_igl.validation.zoo.registry import joined
 from heat_igl.windows import Engine, ExactSurface, GuardedEngine, Invariants, WindowEngine, from_vertex
@@ -50,7 +48,7 @@ BREAKS: dict[str, Callable[[FloatArray], object]] = {
 
 
 @pytest.mark.parametrize("what", BREAKS)
-def test_every_break_is_seen(what: str) -> None:
+def test_every_break_is_seen(what):
     mesh, distance = two_squares()
     sources = source_set(SOURCE, mesh.n_vertices, mesh.F)
     assert invariants(mesh).contradiction(distance, sources) is None
@@ -60,7 +58,7 @@ def test_every_break_is_seen(what: str) -> None:
     assert what in found
 
 
-def test_a_cutoff_ends_an_answer_and_not_before() -> None:
+def test_a_cutoff_ends_an_answer_and_not_before():
     mesh, distance = two_squares()
     sources = source_set(SOURCE, mesh.n_vertices, mesh.F)
     distance[distance > 0.5] = np.inf
@@ -68,7 +66,7 @@ def test_a_cutoff_ends_an_answer_and_not_before() -> None:
     assert "inf at vertex" in str(invariants(mesh).contradiction(distance, sources, cutoff=0.6))
 
 
-def test_points_curves_and_offsets_keep_the_bounds() -> None:
+def test_points_curves_and_offsets_keep_the_bounds():
     mesh, _ = two_squares()
     solver, kept = GeodesicSolver(mesh, method="exact"), invariants(mesh)
     point = SurfacePoints([100, 300], [[0.2, 0.3, 0.5], [0.6, 0.2, 0.2]])
@@ -81,7 +79,7 @@ def test_points_curves_and_offsets_keep_the_bounds() -> None:
     assert "where a source gives" in str(kept.contradiction(solver.distance(point) + 0.05, sources))
 
 
-def test_tetrahedra_and_edge_lengths_have_edges_too() -> None:
+def test_tetrahedra_and_edge_lengths_have_edges_too():
     box = shapes.box(4)
     distance = np.linalg.norm(box.V - box.V[0], axis=1)
     sources = source_set(0, box.n_vertices, None)
@@ -117,7 +115,7 @@ class Broken(Engine):
         return self._wrong.copy(), np.zeros(len(self._wrong), np.int64)
 
 
-def test_another_engine_answers_for_a_broken_one_and_none_is_an_error() -> None:
+def test_another_engine_answers_for_a_broken_one_and_none_is_an_error():
     mesh, distance = two_squares()
     sources = source_set(SOURCE, mesh.n_vertices, mesh.F)
     broken, right = Broken(distance, np.inf), Broken(distance, distance[FAR])
@@ -131,17 +129,17 @@ def test_another_engine_answers_for_a_broken_one_and_none_is_an_error() -> None:
 
 
 @pytest.mark.parametrize("factor", [0.7, 1.6, np.inf])
-def test_windows_that_are_wrong_do_not_leave_the_solver(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+def test_windows_that_are_wrong_do_not_leave_the_solver(monkeypatch, factor):
     mesh, distance = two_squares()
     solve = WindowEngine.distance
 
-    def wrong(self: WindowEngine, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
+    def wrong(self, sources, cutoff=np.inf, threads=1):
         found = solve(self, sources, cutoff, threads)
         found[FAR] *= factor
         return found
 
     monkeypatch.setattr(WindowEngine, "distance", wrong)
-    ask: list[Callable[[], FloatArray]] = [
+    ask = [
         lambda: GeodesicSolver(mesh, tolerance=0).distance(SOURCE),
         lambda: GeodesicSolver(mesh, method="exact").distances([SOURCE])[0],
         lambda: heat_igl.geodesic_distance(mesh, SOURCE, method="exact"),
@@ -169,11 +167,11 @@ WRONG: dict[str, Callable[[FloatArray], object]] = {
 
 @pytest.mark.parametrize("wrong", WRONG)
 @pytest.mark.parametrize("query", LOCAL)
-def test_local_answers_that_are_wrong_are_found_again(monkeypatch: pytest.MonkeyPatch, query: str, wrong: str) -> None:
+def test_local_answers_that_are_wrong_are_found_again(monkeypatch, query, wrong):
     mesh, _ = two_squares()
     right, search = LOCAL[query](mesh), windows.search_each
 
-    def step(*arguments: Any) -> int:
+    def step(*arguments):
         done = search(*arguments)
         WRONG[wrong](arguments[8][: arguments[9][0]])
         return done
@@ -185,15 +183,11 @@ def test_local_answers_that_are_wrong_are_found_again(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("factor", [0.7, 1.6, np.inf])
-def test_windows_within_a_tolerance_that_are_wrong_give_way_to_exact_ones(
-    monkeypatch: pytest.MonkeyPatch, factor: float
-) -> None:
+def test_windows_within_a_tolerance_that_are_wrong_give_way_to_exact_ones(monkeypatch, factor):
     mesh, distance = two_squares()
     solve = ExactSurface.distance
 
-    def wrong(
-        self: ExactSurface, sources: IntArray, offsets: None, cutoff: float, threads: int, accuracy: float
-    ) -> FloatArray:
+    def wrong(self, sources, offsets, cutoff, threads, accuracy):
         found = solve(self, sources, offsets, cutoff, threads, accuracy)
         found[FAR] *= factor if accuracy > 0 else 1
         return found
@@ -203,7 +197,7 @@ def test_windows_within_a_tolerance_that_are_wrong_give_way_to_exact_ones(
 
 
 @pytest.mark.parametrize("factor", [0.5, np.nan, np.inf])
-def test_wrong_distances_of_targets_are_found_again(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+def test_wrong_distances_of_targets_are_found_again(monkeypatch, factor):
     mesh, distance = two_squares()
     point = SurfacePoints([300], [[0.2, 0.3, 0.5]])
     to_targets = WindowEngine.to_targets
@@ -218,11 +212,11 @@ def test_wrong_distances_of_targets_are_found_again(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("wrong", "everywhere"), [(np.inf, False), (np.nan, False), (0.1, False), (1.5, False), (0.5, True), (1.5, True)]
 )
-def test_a_sweep_that_is_wrong_is_named(monkeypatch: pytest.MonkeyPatch, wrong: float, everywhere: bool) -> None:
+def test_a_sweep_that_is_wrong_is_named(monkeypatch, wrong, everywhere):
     mesh, solver = shapes.icosphere(4), GeodesicSolver(shapes.icosphere(4), method="sweep")
     right, sweep = solver.distance(0), sweeping.sweep
 
-    def step(spokes: object, distance: FloatArray, *arguments: object) -> object:
+    def step(spokes, distance, *arguments):
         visits = sweep(spokes, distance, *arguments)
         distance[slice(None) if everywhere else 1000] *= wrong
         return visits
@@ -249,14 +243,12 @@ PATHS: dict[str, tuple[type, str, Callable[[Mesh], FloatArray]]] = {
 
 @pytest.mark.parametrize("factor", [0.5, 1.6, np.inf, np.nan])
 @pytest.mark.parametrize("what", PATHS)
-def test_paths_that_are_wrong_are_found_again_or_an_error(
-    monkeypatch: pytest.MonkeyPatch, what: str, factor: float
-) -> None:
+def test_paths_that_are_wrong_are_found_again_or_an_error(monkeypatch, what, factor):
     mesh = shapes.grid(19)
     engine, name, ask = PATHS[what]
     right, search = ask(mesh), getattr(engine, name)
 
-    def wrong(*arguments: Any) -> Any:
+    def wrong(*arguments):
         found = search(*arguments)
         (found[0] if isinstance(found, tuple) else found)[FAR] *= factor
         return found
@@ -271,11 +263,11 @@ def test_paths_that_are_wrong_are_found_again_or_an_error(
         np.testing.assert_allclose(found, right, rtol=0.01)
 
 
-def test_the_log_map_of_a_vertex_that_is_wrong_is_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_log_map_of_a_vertex_that_is_wrong_is_found_again(monkeypatch):
     mesh = shapes.grid(19)
     right, searched = heat_igl.log_map(mesh, SOURCE), from_vertex.search
 
-    def wrong(*arguments: Any, **options: Any) -> Any:
+    def wrong(*arguments, **options):
         found = searched(*arguments, **options)
         found.found.distance[7] *= 0.5
         return found
@@ -285,10 +277,10 @@ def test_the_log_map_of_a_vertex_that_is_wrong_is_found_again(monkeypatch: pytes
 
 
 @pytest.mark.parametrize("wrong", WRONG)
-def test_local_log_maps_that_are_wrong_are_an_error(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
+def test_local_log_maps_that_are_wrong_are_an_error(monkeypatch, wrong):
     mesh, search = shapes.grid(19), windows.search_each
 
-    def step(*arguments: Any) -> int:
+    def step(*arguments):
         done = search(*arguments)
         WRONG[wrong](arguments[8][: arguments[9][0]])
         return done
@@ -299,15 +291,13 @@ def test_local_log_maps_that_are_wrong_are_an_error(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("wrong", [0.1, 1.5, np.inf, np.nan])
-def test_bodies_and_metrics_stay_between_lines_and_edges(monkeypatch: pytest.MonkeyPatch, wrong: float) -> None:
+def test_bodies_and_metrics_stay_between_lines_and_edges(monkeypatch, wrong):
     box, grid = shapes.box(5), shapes.grid(9)
     metric = heat_igl.metric_operators(grid, np.eye(3) * np.exp(grid.V[:, 0])[:, None, None] * np.array([4.0, 1, 1]))
     for engine, domain, mesh in ((LineEngine, box, box), (HopfLaxEngine, metric, grid)):
         lower = engine._lower
 
-        def step(
-            self: Any, vertices: IntArray, offset: FloatArray, distance: FloatArray, label: IntArray, lower: Any = lower
-        ) -> None:
+        def step(self, vertices, offset, distance, label, lower=lower):
             lower(self, vertices, offset, distance, label)
             distance[distance > 0] *= wrong
 
@@ -339,9 +329,7 @@ HEATED: dict[str, Callable[[], Any]] = {
 @pytest.mark.parametrize("domain", HEATED)
 @pytest.mark.parametrize("factor", [0.3, 1.6, np.nan])
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
-def test_heat_that_is_wrong_is_told_on_every_domain(
-    monkeypatch: pytest.MonkeyPatch, domain: str, factor: float
-) -> None:
+def test_heat_that_is_wrong_is_told_on_every_domain(monkeypatch, domain, factor):
     solver, solve = HeatMethodSolver(HEATED[domain]()), PoissonProblem.solve
     monkeypatch.setattr(PoissonProblem, "solve", lambda self, b: factor * solve(self, b))
     if np.isnan(factor):
@@ -352,7 +340,7 @@ def test_heat_that_is_wrong_is_told_on_every_domain(
             solver.distance(SOURCE)
 
 
-def test_heat_is_held_to_the_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_heat_is_held_to_the_bounds(monkeypatch):
     """Steps 2 and 3 that are wrong by a half: the answer is warned about, and as good as the bounds make it."""
     mesh = shapes.icosphere(3)
     straight = np.linalg.norm(mesh.V - mesh.V[SOURCE], axis=1)
@@ -367,7 +355,7 @@ def test_heat_is_held_to_the_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("kind", ["helix", "spiral ramp", "handles", "spiky sphere", "random tetrahedra", "CAD plate"])
-def test_heat_says_when_it_is_wrong(kind: str) -> None:
+def test_heat_says_when_it_is_wrong(kind):
     """Kinds on which heat was off by more than 5 % in silence; more members are in scripts/accuracy.py."""
     for seed in range(3):
         mesh = FAMILIES[kind](seed)
@@ -384,12 +372,12 @@ def test_heat_says_when_it_is_wrong(kind: str) -> None:
 
 
 @pytest.fixture
-def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+def counted(monkeypatch):
     """The vertices whose answers were compared."""
-    asked: list[int] = []
+    asked = []
     compare = Comparisons.compare
 
-    def counting(self: Comparisons, distance: FloatArray, sources: SourceSet, is_doubtful: bool) -> Comparison | None:
+    def counting(self, distance, sources, is_doubtful):
         found = compare(self, distance, sources, is_doubtful)
         if found is not None:
             asked.append(int(sources.vertices[0]) if len(sources.vertices) else -1)
@@ -399,7 +387,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return asked
 
 
-def test_three_near_answers_of_a_kind_are_enough(counted: list[int]) -> None:
+def test_three_near_answers_of_a_kind_are_enough(counted):
     mesh = shapes.icosphere(3)
     solver = HeatMethodSolver(mesh)
     assert solver.diagnostics.compared is None
@@ -417,7 +405,7 @@ def test_three_near_answers_of_a_kind_are_enough(counted: list[int]) -> None:
     assert len(counted) == 7
 
 
-def test_a_bad_answer_after_good_ones_is_told() -> None:
+def test_a_bad_answer_after_good_ones_is_told():
     """On the ramp heat is off by 1.7 % from the first vertex and by 5.3 % from the last."""
     solver = HeatMethodSolver(FAMILIES["spiral ramp"](1101))
     solver.distances([218, 313, 504])
@@ -426,7 +414,7 @@ def test_a_bad_answer_after_good_ones_is_told() -> None:
 
 
 @pytest.mark.parametrize("sources", [7, [0, 300], SurfacePoints([5, 400], [[0.2, 0.3, 0.5], [0.6, 0.2, 0.2]])])
-def test_large_triangles_are_compared_on_added_vertices(sources: object) -> None:
+def test_large_triangles_are_compared_on_added_vertices(sources):
     """A sweep over the two fans of 300 triangles would be wrong, and the windows on them are of the order of 300^2."""
     angle = np.arange(300) * np.pi / 150
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
@@ -442,7 +430,7 @@ def test_large_triangles_are_compared_on_added_vertices(sources: object) -> None
     assert compared.mean == pytest.approx(off, abs=0.003)
 
 
-def test_components_are_compared_by_themselves() -> None:
+def test_components_are_compared_by_themselves():
     ball, maze = shapes.icosphere(3), FAMILIES["maze"](1004)
     solver = HeatMethodSolver(joined(ball, maze))
     solver.distances(list(range(20)))
@@ -450,12 +438,12 @@ def test_components_are_compared_by_themselves() -> None:
         solver.distances([ball.n_vertices + vertex for vertex in range(0, maze.n_vertices, 50)])
 
 
-def test_a_single_vertex_that_is_far_off_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_single_vertex_that_is_far_off_is_told(monkeypatch):
     """Bounds let the distance of a vertex be as wrong as an edge is long."""
     mesh = shapes.grid(2)
     solve = PoissonProblem.solve
 
-    def wrong(self: PoissonProblem, b: FloatArray) -> FloatArray:
+    def wrong(self, b):
         phi = solve(self, b)
         phi[8] = 10.0
         return phi
@@ -466,7 +454,7 @@ def test_a_single_vertex_that_is_far_off_is_told(monkeypatch: pytest.MonkeyPatch
         HeatMethodSolver(mesh).distance(0)
 
 
-def test_each_answer_is_compared_where_heat_is_bad_and_told_once_in_a_batch(counted: list[int]) -> None:
+def test_each_answer_is_compared_where_heat_is_bad_and_told_once_in_a_batch(counted):
     mesh = FAMILIES["handles"](3)
     solver = HeatMethodSolver(mesh)
     for source in (0, 3):

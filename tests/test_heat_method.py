@@ -1,7 +1,5 @@
 """HeatMethodSolver: the three steps together, options, range, parity with libigl, and rates of convergence."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import igl

@@ -1,13 +1,11 @@
 """Pages: complete in themselves, drawn as the colour bar says, turned and asked in a real browser."""
 
-from __future__ import annotations
-
 import html
 import io
 import re
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +39,7 @@ def sphere() -> tuple[heat_igl.Mesh, int, int, np.ndarray]:
 # ---- the file
 
 
-def test_the_file_is_complete_and_loads_nothing() -> None:
+def test_the_file_is_complete_and_loads_nothing():
     mesh, x = square()
     text = page(mesh, x).html
     assert not re.findall(r"https?:|//cdn|@import|\bimport\s*\(|\bfetch\s*\(|XMLHttpRequest", text)
@@ -49,7 +47,7 @@ def test_the_file_is_complete_and_loads_nothing() -> None:
     assert "default-src 'none'" in text
 
 
-def test_titles_and_labels_cannot_become_markup() -> None:
+def test_titles_and_labels_cannot_become_markup():
     mesh, x = square(3)
     text = page(mesh, x, title="</title><i>&", label="</script><!--<script>", method="<b>").html
     assert "<title>&lt;/title&gt;&lt;i&gt;&amp;</title>" in text
@@ -57,7 +55,7 @@ def test_titles_and_labels_cannot_become_markup() -> None:
     assert "<b>" not in text
 
 
-def test_a_notebook_gets_the_page_in_a_frame() -> None:
+def test_a_notebook_gets_the_page_in_a_frame():
     mesh, x = square(3)
     shown = page(mesh, x, title='"quoted"')
     frame = re.fullmatch(
@@ -136,7 +134,7 @@ class Browser:
 
 
 @pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def chromium(tmp_path_factory):
     webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
     binary, driver = shutil.which("chromium") or shutil.which("google-chrome"), shutil.which("chromedriver")
     if binary is None or driver is None:
@@ -160,7 +158,7 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 @pytest.fixture
-def browser(chromium: Browser) -> Iterator[Browser]:
+def browser(chromium):
     """The browser; what a page wrote to the console fails the test."""
     yield chromium
     assert chromium.driver.get_log("browser") == []
@@ -184,7 +182,7 @@ def colour_at(image: np.ndarray, at: np.ndarray) -> np.ndarray:
     return image[int(at[1]), int(at[0])]
 
 
-def test_colours_are_those_of_the_colour_bar(browser: Browser) -> None:
+def test_colours_are_those_of_the_colour_bar(browser):
     mesh, x = square()
     browser.open(page(mesh, x, style="plain"))
     image = browser.image()
@@ -198,12 +196,12 @@ def test_colours_are_those_of_the_colour_bar(browser: Browser) -> None:
     assert browser.text("label") == "distance, in the mesh's unit"
 
 
-def test_isolines_and_stripes_lie_at_the_levels(browser: Browser) -> None:
+def test_isolines_and_stripes_lie_at_the_levels(browser):
     """Distance x on a square seen face on: dark columns at multiples of the spacing and nowhere else."""
     mesh, x = square()
     rows = {}
     for style in ("plain", "lines", "stripes"):
-        browser.open(page(mesh, x, style=style, spacing=0.25))  # type: ignore[arg-type]
+        browser.open(page(mesh, x, style=style, spacing=0.25))
         image = browser.image()
         rows[style] = image[image.shape[0] // 2]
     left, right = browser.on_canvas(0)[0], browser.on_canvas(20)[0]
@@ -220,7 +218,7 @@ def test_isolines_and_stripes_lie_at_the_levels(browser: Browser) -> None:
     np.testing.assert_allclose(stripe[odd & (away > 2)], expected[odd & (away > 2)], atol=0.02)
 
 
-def test_what_is_not_reached_is_grey(browser: Browser) -> None:
+def test_what_is_not_reached_is_grey(browser):
     mesh, x = square()
     both = twice(mesh, np.array([1.5, 0, 0]))
     browser.open(page(both, np.concatenate([x, np.full_like(x, np.inf)])))
@@ -233,7 +231,7 @@ def test_what_is_not_reached_is_grey(browser: Browser) -> None:
     np.testing.assert_allclose(colour_at(browser.image(), browser.on_canvas(middle)), UNREACHABLE, atol=0.02)
 
 
-def test_a_source_inside_a_face_is_marked_there_until_a_click(browser: Browser) -> None:
+def test_a_source_inside_a_face_is_marked_there_until_a_click(browser):
     mesh = heat_igl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     inside = heat_igl.SurfacePoints([0], [[0.5, 0.25, 0.25]])
     browser.open(page(mesh, [0.35, 0.8, 0.8], sources=inside))
@@ -245,7 +243,7 @@ def test_a_source_inside_a_face_is_marked_there_until_a_click(browser: Browser) 
     assert np.abs(colour_at(browser.image(), at) - red).max() > 0.2
 
 
-def test_the_page_works_in_the_frame_that_a_notebook_shows(browser: Browser) -> None:
+def test_the_page_works_in_the_frame_that_a_notebook_shows(browser):
     mesh, x = square(4)
     (browser._folder / "notebook.html").write_text(page(mesh, x)._repr_html_(), encoding="utf8")
     browser.driver.get((browser._folder / "notebook.html").as_uri())
@@ -254,7 +252,7 @@ def test_the_page_works_in_the_frame_that_a_notebook_shows(browser: Browser) -> 
     np.testing.assert_allclose(browser.distance(), x, atol=1e-7)
 
 
-def test_a_drag_turns_the_surface_with_the_hand(browser: Browser) -> None:
+def test_a_drag_turns_the_surface_with_the_hand(browser):
     mesh, front, _, distance = sphere()
     browser.open(page(mesh, distance, sources=front, view=(0, 0)))
     before, image = browser.on_canvas(front), browser.image()
@@ -268,7 +266,7 @@ def test_a_drag_turns_the_surface_with_the_hand(browser: Browser) -> None:
     assert browser.sources() == [front]  # a drag is no click
 
 
-def test_the_wheel_zooms_about_the_pointer_and_shift_moves(browser: Browser) -> None:
+def test_the_wheel_zooms_about_the_pointer_and_shift_moves(browser):
     mesh, x = square()
     browser.open(page(mesh, x))
     fixed, other = 5 * 21 + 5, 15 * 21 + 15
@@ -285,7 +283,7 @@ def test_the_wheel_zooms_about_the_pointer_and_shift_moves(browser: Browser) -> 
     np.testing.assert_allclose(browser.on_canvas(other)[:2] - start[:2], [30, 20], atol=5)
 
 
-def test_a_click_moves_the_source_and_the_distance_follows(browser: Browser, bunny: heat_igl.Mesh) -> None:
+def test_a_click_moves_the_source_and_the_distance_follows(browser, bunny):
     browser.open(page(bunny, np.zeros(bunny.n_vertices), method="nothing yet"))
     assert browser.text("method") == "nothing yet"
     image = browser.image()
@@ -307,7 +305,7 @@ def test_a_click_moves_the_source_and_the_distance_follows(browser: Browser, bun
     assert_agree(browser.distance(), sweep.distance(both))
     browser.mouse("mouseMoved", browser.on_canvas(source) + np.array([0, -40, 0]), buttons=0)
     browser.wait(lambda: f"vertex {both[1]} " not in browser.text("readout"))
-    vertex, value = re.fullmatch(r"vertex (\d+) at \(.*\): (\S+)", browser.text("readout")).groups()  # type: ignore[union-attr]
+    vertex, value = re.fullmatch(r"vertex (\d+) at \(.*\): (\S+)", browser.text("readout")).groups()
     assert float(value) == pytest.approx(browser.distance()[int(vertex)], rel=1e-5)
 
     browser.driver.find_element("id", "reset").click()
@@ -315,7 +313,7 @@ def test_a_click_moves_the_source_and_the_distance_follows(browser: Browser, bun
     assert browser.distance().max() == 0
 
 
-def test_the_distance_in_the_page_is_exact_where_it_is_flat(browser: Browser) -> None:
+def test_the_distance_in_the_page_is_exact_where_it_is_flat(browser):
     mesh = shapes.grid(20)
     browser.open(page(mesh, np.zeros(mesh.n_vertices)))
     browser.run("window.heatIgl.setSources([45])")
@@ -324,7 +322,7 @@ def test_the_distance_in_the_page_is_exact_where_it_is_flat(browser: Browser) ->
 
 
 @pytest.mark.parametrize("name", ["voxel blob", "sphere with slivers", "dust"])
-def test_bad_meshes_are_measured_too(browser: Browser, name: str) -> None:
+def test_bad_meshes_are_measured_too(browser, name):
     """More than two faces at an edge, slivers, pieces."""
     mesh = zoo(name)
     browser.open(page(mesh, np.zeros(mesh.n_vertices)))
@@ -336,7 +334,7 @@ def test_bad_meshes_are_measured_too(browser: Browser, name: str) -> None:
     assert np.abs(found[away] / exact[away] - 1).mean() < 0.02
 
 
-def test_what_is_behind_is_not_picked(browser: Browser) -> None:
+def test_what_is_behind_is_not_picked(browser):
     mesh, front, back, distance = sphere()
     browser.open(page(mesh, distance, view=(0, 0)))
     np.testing.assert_allclose(browser.on_canvas(front)[:2], browser.on_canvas(back)[:2], atol=1e-3)
@@ -346,7 +344,7 @@ def test_what_is_behind_is_not_picked(browser: Browser) -> None:
     assert browser.sources() == [front]
 
 
-def test_fingers_pick_and_zoom(browser: Browser) -> None:
+def test_fingers_pick_and_zoom(browser):
     mesh, front, _, distance = sphere()
     browser.open(page(mesh, distance, view=(0, 0)))
     at = browser.on_canvas(front)
@@ -363,7 +361,7 @@ def test_fingers_pick_and_zoom(browser: Browser) -> None:
     assert browser.on_canvas(top)[1] - browser.on_canvas(front)[1] == pytest.approx(2 * before, rel=0.1)
 
 
-def test_a_click_on_tetrahedra_reads_only(browser: Browser) -> None:
+def test_a_click_on_tetrahedra_reads_only(browser):
     box = shapes.box(3)
     distance = np.linalg.norm(box.V - box.V[0], axis=1)
     browser.open(page(box, distance, sources=0))
@@ -397,7 +395,7 @@ def halves(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return image[:, :middle], image[:, middle : 2 * middle]
 
 
-def test_two_fields_stand_side_by_side(browser: Browser) -> None:
+def test_two_fields_stand_side_by_side(browser):
     """The same picture for the same numbers; a click in the right half is one on the same surface."""
     mesh, x = square()
     browser.open(page(mesh, x, fields={"exact": x, "half": x / 2}, beside="exact", style="plain"))
@@ -421,7 +419,7 @@ def test_two_fields_stand_side_by_side(browser: Browser) -> None:
     assert browser.on_canvas(vertex)[0] > at[0]
 
 
-def test_a_field_that_does_not_follow_a_click_keeps_its_source(browser: Browser) -> None:
+def test_a_field_that_does_not_follow_a_click_keeps_its_source(browser):
     """After a click, each half marks the place at which the field that it shows is least."""
     mesh, front, _, distance = sphere()
     browser.open(page(mesh, distance, sources=front, fields={"exact": distance}, beside="exact", view=(0, 0)))
@@ -442,7 +440,7 @@ def test_a_field_that_does_not_follow_a_click_keeps_its_source(browser: Browser)
     assert not browser.run("return document.getElementById('scale2').checkVisibility()")
 
 
-def test_a_signed_field_is_white_at_0(browser: Browser) -> None:
+def test_a_signed_field_is_white_at_0(browser):
     mesh, x = square()
     signed = x - 0.25
     browser.open(page(mesh, x, fields={"signed": signed}, beside="signed", style="plain"))
@@ -462,7 +460,7 @@ def test_a_signed_field_is_white_at_0(browser: Browser) -> None:
     )
     dark = (right[row] - lined[row]).max(axis=1)
 
-    def ink(level: float) -> float:
+    def ink(level):
         at = left + (level + 0.25) * (end - left)
         return float(dark[int(at) - 4 : int(at) + 5].sum())
 
@@ -470,7 +468,7 @@ def test_a_signed_field_is_white_at_0(browser: Browser) -> None:
     assert ink(0.125) < 0.1
 
 
-def test_the_log_map_in_the_page_is_that_of_python(browser: Browser, bunny: heat_igl.Mesh) -> None:
+def test_the_log_map_in_the_page_is_that_of_python(browser, bunny):
     """Up to the first axis: frames begin at another edge."""
     browser.open(page(bunny, np.zeros(bunny.n_vertices)))
     for source in (100, 2000):
@@ -485,7 +483,7 @@ def test_the_log_map_in_the_page_is_that_of_python(browser: Browser, bunny: heat
         assert np.degrees(np.percentile(angle, 90)) < 5
 
 
-def test_the_log_map_of_a_plane_is_a_checkerboard(browser: Browser) -> None:
+def test_the_log_map_of_a_plane_is_a_checkerboard(browser):
     """Squares of the spacing: colours change along both axes, and not within a square."""
     mesh = shapes.grid(16)
     source = 8 * 17 + 8
@@ -513,7 +511,7 @@ def test_the_log_map_of_a_plane_is_a_checkerboard(browser: Browser) -> None:
         np.testing.assert_allclose(found_there, expected, atol=0.04)
 
 
-def test_needles_point_along_the_gradient(browser: Browser) -> None:
+def test_needles_point_along_the_gradient(browser):
     """Of a linear function on a sphere: along the part of the slope in the plane of a triangle, upwards."""
     mesh, front, _, distance = sphere()
     browser.open(page(mesh, distance, sources=front, view=(0, 0), style="plain"))
@@ -542,7 +540,7 @@ def test_needles_point_along_the_gradient(browser: Browser) -> None:
     np.testing.assert_allclose(browser.image(), bare, atol=0.01)
 
 
-def test_points_are_drawn_as_discs(browser: Browser) -> None:
+def test_points_are_drawn_as_discs(browser):
     """A cloud begins with discs, which cover the surface and have the colours of their points."""
     mesh, front, _, distance = sphere()
     cloud = heat_igl.PointCloud(mesh.V)
@@ -560,7 +558,7 @@ def test_points_are_drawn_as_discs(browser: Browser) -> None:
     assert_agree(browser.distance(), heat_igl.GeodesicSolver(cloud.triangles, method="sweep").distance(source))
 
 
-def test_a_saved_scene_opens_as_it_was(browser: Browser) -> None:
+def test_a_saved_scene_opens_as_it_was(browser):
     mesh, front, _, distance = sphere()
     shown = page(mesh, distance, sources=front, fields={"height </script>": mesh.V[:, 1]}, method="as given")
     browser.open(shown)
@@ -583,7 +581,7 @@ def test_a_saved_scene_opens_as_it_was(browser: Browser) -> None:
     assert browser.text("method") == "as given"
 
 
-def test_save_downloads_the_scene(browser: Browser, tmp_path: Path) -> None:
+def test_save_downloads_the_scene(browser, tmp_path):
     mesh, x = square(5)
     browser.open(page(mesh, x, title="A square: 5 x 5"))
     browser.driver.execute_cdp_cmd("Page.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
@@ -593,7 +591,7 @@ def test_save_downloads_the_scene(browser: Browser, tmp_path: Path) -> None:
     assert (tmp_path / "A-square-5-x-5-scene.html").read_text(encoding="utf8") == saved
 
 
-def test_a_page_that_fails_says_so_in_the_console(browser: Browser) -> None:
+def test_a_page_that_fails_says_so_in_the_console(browser):
     """The fixture's check for errors finds them."""
     mesh, x = square(3)
     broken = page(mesh, x).html.replace(
@@ -601,6 +599,6 @@ def test_a_page_that_fails_says_so_in_the_console(browser: Browser) -> None:
     )
     Page(broken).save(browser._folder / "broken.html")
     browser.driver.get((browser._folder / "broken.html").as_uri())
-    found: list[Any] = []
+    found = []
     browser.wait(lambda: bool(found.extend(browser.driver.get_log("browser")) or found))
     assert "SEVERE" in {entry["level"] for entry in found}

@@ -1,7 +1,5 @@
 """Images and rasters as domains: every pixel there, connected as it should be, distances around obstacles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

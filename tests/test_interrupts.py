@@ -1,7 +1,5 @@
 """Ctrl-C: long calls end at once, with what the handler raised, and solvers go on as before."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys
@@ -70,7 +68,7 @@ def test_loops_of_an_abandoned_pool_end():
     workers = pool(1)
     begun = threading.Event()
 
-    def search() -> list[np.ndarray]:
+    def search():
         begun.set()
         return [solver.distance(0) for _ in range(200)]
 

@@ -1,7 +1,5 @@
 """Triangles known by edge lengths: flips, refinement, covers and tangent frames."""
 
-from __future__ import annotations
-
 import igl
 import numpy as np
 import pytest
@@ -297,12 +295,12 @@ def stretched(scale: float = 12.0) -> Mesh:
 
 
 @pytest.fixture(scope="module")
-def coarse() -> IntrinsicTriangulation:
+def coarse():
     return intrinsic_delaunay(intrinsic_triangulation(stretched()))
 
 
 @pytest.fixture(scope="module")
-def fine(coarse: IntrinsicTriangulation) -> IntrinsicTriangulation:
+def fine(coarse):
     return delaunay_refinement(coarse, 5000)
 
 
@@ -310,13 +308,13 @@ def cone_angles(triangulation: IntrinsicTriangulation) -> FloatArray:
     return np.bincount(triangulation.F.ravel(), corner_angles(triangulation.l).ravel(), triangulation.n)
 
 
-def test_no_angle_is_small(coarse: IntrinsicTriangulation, fine: IntrinsicTriangulation) -> None:
+def test_no_angle_is_small(coarse, fine):
     assert np.degrees(corner_angles(coarse.l)).min() < 15
     assert np.degrees(corner_angles(fine.l)).min() >= 25 - 1e-9
     assert coarse.n < fine.n < 5000
 
 
-def test_the_surface_stays_the_same(coarse: IntrinsicTriangulation, fine: IntrinsicTriangulation) -> None:
+def test_the_surface_stays_the_same(coarse, fine):
     assert fine.areas.sum() == pytest.approx(coarse.areas.sum(), rel=1e-11)
     assert np.abs(cone_angles(fine)[: coarse.n] - cone_angles(coarse)).max() < 1e-9
     assert np.abs(cone_angles(fine)[coarse.n :] - 2 * np.pi).max() < 1e-9
@@ -324,14 +322,14 @@ def test_the_surface_stays_the_same(coarse: IntrinsicTriangulation, fine: Intrin
     assert_closed_and_oriented(fine)
 
 
-def test_edges_are_delaunay(fine: IntrinsicTriangulation) -> None:
+def test_edges_are_delaunay(fine):
     opposite = corner_angles(fine.l).ravel()
     assert (opposite + opposite[fine.twin]).max() < np.pi + 1e-6
     assert delaunay_refinement(fine, 10**6) is fine
 
 
-def test_radii_and_units(coarse: IntrinsicTriangulation) -> None:
-    def largest(triangulation: IntrinsicTriangulation) -> float:
+def test_radii_and_units(coarse):
+    def largest(triangulation):
         return float((triangulation.l.prod(axis=1) / (4 * triangulation.areas)).max())
 
     bound = 0.2 * largest(coarse)
@@ -342,23 +340,23 @@ def test_radii_and_units(coarse: IntrinsicTriangulation) -> None:
     assert np.array_equal(small.F, again.F)
 
 
-def test_growth_is_bounded(coarse: IntrinsicTriangulation) -> None:
+def test_growth_is_bounded(coarse):
     assert delaunay_refinement(coarse, coarse.n + 7).n == coarse.n + 7
     assert delaunay_refinement(coarse, coarse.n) is coarse
 
 
-def test_a_sharp_cone_keeps_its_angle() -> None:
+def test_a_sharp_cone_keeps_its_angle():
     tetrahedra = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.9, 0], [0.5, 0.3, 20]])
     mesh = Mesh(tetrahedra, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     assert delaunay_refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)), 10**4).n < 200
 
 
-def test_a_boundary_is_refused() -> None:
+def test_a_boundary_is_refused():
     with pytest.raises(ValueError, match="take the tufted cover"):
         delaunay_refinement(intrinsic_triangulation(shapes.grid(3)), 100)
 
 
-def test_closed_cover_is_the_tufted_cover() -> None:
+def test_closed_cover_is_the_tufted_cover():
     for mesh in (shapes.grid(4), shapes.icosphere(1), shapes.cylinder(5, 7)):
         found, expected = closed_cover(intrinsic_triangulation(mesh)), tufted_cover(mesh)
         assert np.array_equal(found.F, expected.F)
@@ -383,7 +381,7 @@ def split(refined: Refined, move: int, faces: IntArray, barycentric: FloatArray)
                 break
 
 
-def test_points_are_carried_move_by_move(coarse: IntrinsicTriangulation) -> None:
+def test_points_are_carried_move_by_move(coarse):
     rng = np.random.default_rng(0)
     fine = delaunay_refinement(coarse, coarse.n + 60)
     refined = fine.history[-1]
@@ -403,7 +401,7 @@ def test_points_are_carried_move_by_move(coarse: IntrinsicTriangulation) -> None
     assert (found_faces >= len(coarse.F)).mean() > 0.1
 
 
-def test_points_keep_their_distance_from_a_vertex(coarse: IntrinsicTriangulation, fine: IntrinsicTriangulation) -> None:
+def test_points_keep_their_distance_from_a_vertex(coarse, fine):
     rng = np.random.default_rng(1)
     faces = rng.integers(len(coarse.F), size=100)
     near = 1e-3
@@ -425,11 +423,11 @@ def test_points_keep_their_distance_from_a_vertex(coarse: IntrinsicTriangulation
 
 
 @pytest.fixture(scope="module")
-def refined() -> HeatMethodSolver:
+def refined():
     return HeatMethodSolver(stretched())
 
 
-def test_answers_are_at_the_vertices_of_the_mesh(refined: HeatMethodSolver) -> None:
+def test_answers_are_at_the_vertices_of_the_mesh(refined):
     mesh = stretched()
     assert refined.operators.n > mesh.n_vertices == refined.n_vertices
     truth = geodesic_distance(mesh, 5)
@@ -440,7 +438,7 @@ def test_answers_are_at_the_vertices_of_the_mesh(refined: HeatMethodSolver) -> N
     assert 0.002 < mean_error(distance, truth) < 0.02
 
 
-def test_sources_in_faces(refined: HeatMethodSolver) -> None:
+def test_sources_in_faces(refined):
     mesh = stretched()
     corner = SurfacePoints([17], [[1.0, 0, 0]])
     assert np.array_equal(refined.distance(corner), refined.distance(int(mesh.F[17, 0])))
@@ -450,14 +448,14 @@ def test_sources_in_faces(refined: HeatMethodSolver) -> None:
 
 
 @pytest.mark.parametrize("boundary", ["neumann", "dirichlet", "average"])
-def test_a_surface_with_a_boundary(boundary: str) -> None:
+def test_a_surface_with_a_boundary(boundary):
     rng = np.random.default_rng(3)
     flat = shapes.grid(6)
     inner = ~flat.boundary
     V = flat.V.copy()
     V[inner, :2] += rng.uniform(-0.03, 0.03, (inner.sum(), 2))
     mesh = Mesh(V * [8, 1, 1], flat.F)
-    refined = HeatMethodSolver(mesh, boundary=boundary, laplacian="intrinsic-delaunay-refined")  # type: ignore[arg-type]
+    refined = HeatMethodSolver(mesh, boundary=boundary, laplacian="intrinsic-delaunay-refined")
     domain = refined.operators
     assert domain.n > mesh.n_vertices
     assert np.array_equal(domain.boundary[: mesh.n_vertices], mesh.boundary)
@@ -471,7 +469,7 @@ def test_a_surface_with_a_boundary(boundary: str) -> None:
         assert mean_error(refined.distance(source), truth) < 0.06
 
 
-def test_paths_are_those_on_the_triangles_of_the_mesh() -> None:
+def test_paths_are_those_on_the_triangles_of_the_mesh():
     mesh = stretched()
     refined = operators(mesh, "intrinsic-delaunay-refined")
     assert refined.n > mesh.n_vertices
@@ -480,7 +478,7 @@ def test_paths_are_those_on_the_triangles_of_the_mesh() -> None:
         np.testing.assert_allclose(found, GeodesicSolver(mesh, method=method).distance(0), rtol=1e-9, atol=1e-12)
 
 
-def test_even_meshes_stay_as_they_are() -> None:
+def test_even_meshes_stay_as_they_are():
     for mesh in (shapes.icosphere(3), shapes.torus(16, 40), shapes.grid(20)):
         default, plain = operators(mesh, "auto"), operators(mesh)
         assert abs(default.L - plain.L).max() == 0
@@ -494,7 +492,7 @@ def beside(one: Mesh, other: Mesh) -> Mesh:
     return Mesh(np.concatenate([one.V, aside]), np.concatenate([one.F, other.F + one.n_vertices]))
 
 
-def test_an_uneven_part_is_refined_beside_an_even_one() -> None:
+def test_an_uneven_part_is_refined_beside_an_even_one():
     sphere, part = shapes.icosphere(4), Mesh(stretched().V / 10, stretched().F)
     mesh = beside(sphere, part)
     refined = HeatMethodSolver(mesh)
@@ -509,13 +507,13 @@ def test_an_uneven_part_is_refined_beside_an_even_one() -> None:
     assert np.abs(near).max() < 1e-9
 
 
-def test_stray_triangles_are_left_alone() -> None:
+def test_stray_triangles_are_left_alone():
     needle = Mesh([[0, 0, 0], [1, 0, 0], [0.5, 1e-3, 0]], [[0, 1, 2]])
     mesh = beside(shapes.icosphere(3), needle)
     assert operators(mesh, "auto").n == mesh.n_vertices
 
 
-def test_obtuse_triangles_at_the_boundary_take_the_cover() -> None:
+def test_obtuse_triangles_at_the_boundary_take_the_cover():
     flat = shapes.grid(20)
     mesh = Mesh(flat.V @ [[1, 0, 0], [3, 1, 0], [0, 0, 1]], flat.F)
     domain = operators(mesh, "auto")
@@ -532,7 +530,7 @@ def test_obtuse_triangles_at_the_boundary_take_the_cover() -> None:
     assert 0.002 < mean_error(found, truth) < 0.03
 
 
-def test_edge_lengths_alone_are_refined_too() -> None:
+def test_edge_lengths_alone_are_refined_too():
     import igl
 
     mesh = stretched()
@@ -629,7 +627,7 @@ NONMANIFOLD = {
 
 
 @pytest.fixture(params=NONMANIFOLD, ids=str)
-def mesh(request) -> Mesh:
+def mesh(request):
     return NONMANIFOLD[request.param]()
 
 

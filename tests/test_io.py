@@ -1,7 +1,5 @@
 """Reading and writing mesh files: what a valid file means, and that nothing is lost on the way."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re
@@ -63,19 +61,19 @@ def same(mesh: Mesh, V: object, F: object) -> bool:
 
 
 @pytest.mark.parametrize("extension", SURFACE_FORMATS)
-def test_surface_comes_back_exactly(tmp_path: Path, extension: str) -> None:
+def test_surface_comes_back_exactly(tmp_path, extension):
     mesh = grid(9)
     write_mesh(tmp_path / f"a{extension}", mesh)
     assert same(read_mesh(tmp_path / f"a{extension}"), mesh.V, mesh.F)
 
 
 @pytest.mark.parametrize("extension", [".mesh", ".msh", VTU])
-def test_tetrahedra_come_back_exactly(tmp_path: Path, extension: str) -> None:
+def test_tetrahedra_come_back_exactly(tmp_path, extension):
     write_mesh(tmp_path / f"a{extension}", solid())
     assert same(read_mesh(tmp_path / f"a{extension}"), solid().V, solid().F)
 
 
-def test_stl_keeps_the_triangles_but_not_the_numbering(tmp_path: Path) -> None:
+def test_stl_keeps_the_triangles_but_not_the_numbering(tmp_path):
     mesh = Mesh(np.concatenate([grid(5).V[::-1], [[9, 9, 9]]]), 24 - grid(5).F)
     write_mesh(tmp_path / "a.stl", mesh)
     back = read_mesh(tmp_path / "a.stl")
@@ -88,14 +86,14 @@ def test_stl_keeps_the_triangles_but_not_the_numbering(tmp_path: Path) -> None:
 @pytest.mark.parametrize("extension", SURFACE_FORMATS)
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(numbers=st.lists(st.floats(-1e50, 1e50, allow_subnormal=True), min_size=6, max_size=6))
-def test_any_coordinate_comes_back_exactly(tmp_path: Path, extension: str, numbers: list[float]) -> None:
+def test_any_coordinate_comes_back_exactly(tmp_path, extension, numbers):
     V = np.array([[0, 0, 0], [1, 0, 0], numbers[:3], numbers[3:]])
     write_mesh(tmp_path / f"a{extension}", Mesh(V, F4))
     assert same(read_mesh(tmp_path / f"a{extension}"), V, F4)
 
 
 @pytest.mark.parametrize("extension", [".ply", VTU])
-def test_attributes_come_back_bit_for_bit(tmp_path: Path, extension: str) -> None:
+def test_attributes_come_back_bit_for_bit(tmp_path, extension):
     mesh = grid(4)
     distance = np.linspace(0, np.pi, 16)
     distance[[3, 7]] = np.inf
@@ -116,7 +114,7 @@ def test_attributes_come_back_bit_for_bit(tmp_path: Path, extension: str) -> Non
 
 
 @needs_meshio
-def test_vtu_attributes_on_tetrahedra(tmp_path: Path) -> None:
+def test_vtu_attributes_on_tetrahedra(tmp_path):
     write_mesh(tmp_path / "a.vtu", solid(), distance=[0, 1, 2, np.inf, 4])
     assert read_attributes(tmp_path / "a.vtu")["distance"].tolist() == [0, 1, 2, np.inf, 4]
 
@@ -152,11 +150,11 @@ FACES = "3 0 1 2\n3 0 1 3\n"
         "OFF\n4 2 0\n" + VERTICES.replace("1", "+1.0E+00") + FACES,
     ],
 )
-def test_variants_of_off_are_read_alike(tmp_path: Path, content: str) -> None:
+def test_variants_of_off_are_read_alike(tmp_path, content):
     assert same(read_mesh(save(tmp_path / "a.off", content)), V4, F4)
 
 
-def test_polygons_become_fans(tmp_path: Path) -> None:
+def test_polygons_become_fans(tmp_path):
     angle = np.arange(6) * np.pi / 3
     points = "".join(f"{x!r} {y!r} 0\n" for x, y in zip(np.cos(angle).tolist(), np.sin(angle).tolist(), strict=True))
     expected = [[0, 1, 2], [5, 0, 1], [5, 1, 2], [3, 4, 5], [3, 5, 1]]
@@ -176,7 +174,7 @@ def test_polygons_become_fans(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("face", ["4 0 1 2 1", "4 0 1 0 2", "5 0 1 2 3 1"])
-def test_polygon_that_repeats_a_vertex(tmp_path: Path, face: str) -> None:
+def test_polygon_that_repeats_a_vertex(tmp_path, face):
     path = save(tmp_path / "a.off", "OFF\n4 2 0\n" + VERTICES + "3 0 1 2\n" + face + "\n")
     with pytest.raises(MeshError, match=rf"a.off, line 8 \({face}\): a face repeats a vertex \(1 of 2 faces do\)"):
         read_mesh(path)
@@ -207,11 +205,11 @@ OBJ_VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
         ("  " + OBJ_VERTICES + "\tf 1 2 3\nf 1 2 4\n").replace("\n", " \r\n"),
     ],
 )
-def test_variants_of_obj_are_read_alike(tmp_path: Path, content: str) -> None:
+def test_variants_of_obj_are_read_alike(tmp_path, content):
     assert same(read_mesh(save(tmp_path / "a.obj", content)), V4, F4)
 
 
-def test_obj_line_numbers_count_comments_and_continuations(tmp_path: Path) -> None:
+def test_obj_line_numbers_count_comments_and_continuations(tmp_path):
     path = save(tmp_path / "a.obj", "# one\n\n" + OBJ_VERTICES + "f 1 \\\n 2 3\n# nine\nf 1 2 44/5\n")
     with pytest.raises(
         MeshError, match=r"a.obj, line 10 \(f 1 2 44/5\): there is no vertex 44, the file has 4 vertices"
@@ -239,7 +237,7 @@ PLY_TYPES = {
 @pytest.mark.parametrize("order", ["<", ">", ""])
 @pytest.mark.parametrize("kind", PLY_TYPES)
 @pytest.mark.parametrize("mixed", [False, True])
-def test_ply_types_orders_and_further_elements(tmp_path: Path, order: str, kind: str, mixed: bool) -> None:
+def test_ply_types_orders_and_further_elements(tmp_path, order, kind, mixed):
     """A camera before the vertices, a list and other types among their properties, and edges at the end."""
     name = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}[order]
     index = kind if kind not in ("float", "double") else "int"
@@ -250,12 +248,12 @@ def test_ply_types_orders_and_further_elements(tmp_path: Path, order: str, kind:
     header += f"element face 2\nproperty uchar flag\nproperty list {index} {index} vertex_index\nproperty double area\n"
     header += "element edge 1\nproperty int a\nproperty int b\nend_header\n"
 
-    def pack(types: str, *values: float) -> bytes:
+    def pack(types, *values):
         if order:
             return struct.pack(order + types, *values)
         return (" ".join(repr(value) for value in values) + " ").encode()
 
-    def end() -> bytes:
+    def end():
         return b"" if order else b"\n"
 
     body = pack("fH2d", 60, 2, 0.5, 0.25) + end()
@@ -282,15 +280,13 @@ def test_ply_types_orders_and_further_elements(tmp_path: Path, order: str, kind:
 
 @needs_meshio
 @pytest.mark.parametrize("failure", ["exit", "print", "exception"])
-def test_every_failure_of_meshio_is_a_mesh_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], failure: str
-) -> None:
+def test_every_failure_of_meshio_is_a_mesh_error(tmp_path, monkeypatch, capfd, failure):
     import meshio
 
     write_mesh(tmp_path / "a.vtu", grid(2))
     real = meshio.vtu.read
 
-    def failing(path: str) -> object:
+    def failing(path):
         if failure == "exception":
             raise ZeroDivisionError("inside")
         print("something is wrong", file=sys.stderr)
@@ -308,7 +304,7 @@ def test_every_failure_of_meshio_is_a_mesh_error(
 
 
 @needs_meshio
-def test_vtu_polygons_and_quadrilaterals(tmp_path: Path) -> None:
+def test_vtu_polygons_and_quadrilaterals(tmp_path):
     import meshio
 
     meshio.vtu.write(str(tmp_path / "a.vtu"), meshio.Mesh(V4, [("quad", [[0, 1, 3, 2]]), ("line", [[0, 1]])]))
@@ -319,7 +315,7 @@ def test_vtu_polygons_and_quadrilaterals(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("extension", "lost"), [(".off", 2), (".ply", 2), (".obj", 1), (".obj", 2), (".obj", 4)])
-def test_a_last_face_that_may_be_cut_is_a_warning(tmp_path: Path, extension: str, lost: int) -> None:
+def test_a_last_face_that_may_be_cut_is_a_warning(tmp_path, extension, lost):
     """Of "4 8 9 10 11", the beginning "4 8 9 10 1" is a face as well, and in OBJ, so is "9 10 11"."""
     vertices = "".join(f"{i} {i * i} 0\n" for i in range(12))
     header = "ply\nformat ascii 1.0\nelement vertex 12\nproperty float x\nproperty float y\nproperty float z\n"
@@ -338,7 +334,7 @@ def test_a_last_face_that_may_be_cut_is_a_warning(tmp_path: Path, extension: str
 
 
 @pytest.mark.parametrize("extension", SURFACE_FORMATS)
-def test_no_file_is_cut_without_a_word(tmp_path: Path, extension: str) -> None:
+def test_no_file_is_cut_without_a_word(tmp_path, extension):
     """On a closed surface, the vertices of the last faces belong to other faces, too."""
     write_mesh(tmp_path / f"whole{extension}", heat_igl.shapes.torus(12, 9))
     whole = (tmp_path / f"whole{extension}").read_bytes()
@@ -349,7 +345,7 @@ def test_no_file_is_cut_without_a_word(tmp_path: Path, extension: str) -> None:
             heat_igl.as_mesh(path)
 
 
-def test_an_obj_file_that_lost_faces_is_a_warning_and_one_without_any_an_error(tmp_path: Path) -> None:
+def test_an_obj_file_that_lost_faces_is_a_warning_and_one_without_any_an_error(tmp_path):
     write_mesh(tmp_path / "a.obj", grid(9))
     lines = (tmp_path / "a.obj").read_text().splitlines(keepends=True)
     with pytest.warns(AccuracyWarning, match=r"b.obj: no face uses \d+ of the 81 vertices, .*cut short"):
@@ -367,18 +363,16 @@ def test_an_obj_file_that_lost_faces_is_a_warning_and_one_without_any_an_error(t
 @pytest.mark.parametrize("stage", ["writer", "replace"])
 @pytest.mark.parametrize("before", [b"precious", None])
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt("stopped")])
-def test_failed_write_leaves_everything_as_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, before: bytes | None, error: BaseException
-) -> None:
+def test_failed_write_leaves_everything_as_it_was(tmp_path, monkeypatch, stage, before, error):
     path = tmp_path / "a.off"
     if before is not None:
         path.write_bytes(before)
 
-    def half(temporary: Path, *_: object) -> None:
+    def half(temporary, *_):
         temporary.write_bytes(b"OFF\n4")
         raise error
 
-    def no_replace(*_: object) -> None:
+    def no_replace(*_):
         raise error
 
     if stage == "writer":
@@ -399,7 +393,7 @@ def test_failed_write_leaves_everything_as_it_was(
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_refused_attribute_leaves_the_old_file(tmp_path: Path) -> None:
+def test_refused_attribute_leaves_the_old_file(tmp_path):
     path = save(tmp_path / "a.ply", "precious")
     with pytest.raises(MeshError, match=r"distance must have shape \(4,\)"):
         write_mesh(path, grid(2), distance=[1, 2, 3])
@@ -410,7 +404,7 @@ def test_refused_attribute_leaves_the_old_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="permissions and links of POSIX")
-def test_links_and_permissions_are_kept(tmp_path: Path) -> None:
+def test_links_and_permissions_are_kept(tmp_path):
     (tmp_path / "real").mkdir()
     target = save(tmp_path / "real" / "b.off", "old")
     target.chmod(0o640)
@@ -440,7 +434,7 @@ REAL = {
 
 @pytest.mark.filterwarnings("ignore:.*no face uses")
 @pytest.mark.parametrize("name", REAL)
-def test_real_meshes_are_read_whole_and_written_back(tmp_path: Path, name: str) -> None:
+def test_real_meshes_are_read_whole_and_written_back(tmp_path, name):
     mesh = read_mesh(wheel_path(name))
     assert (mesh.n_vertices, mesh.n_faces) == REAL[name]
     for extension in (".off", ".obj", ".ply"):
@@ -448,7 +442,7 @@ def test_real_meshes_are_read_whole_and_written_back(tmp_path: Path, name: str) 
         assert same(read_mesh(tmp_path / f"a{extension}"), mesh.V, mesh.F)
 
 
-def test_real_attributes() -> None:
+def test_real_attributes():
     bone = read_attributes(wheel_path("bone.ply"))
     assert {name: values.dtype.str for name, values in bone.items()} == {
         "flags": "<i4", "red": "|u1", "green": "|u1", "blue": "|u1", "alpha": "|u1",

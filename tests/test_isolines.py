@@ -1,7 +1,5 @@
 """Isolines: where they run, what they enclose, and the files that they are written to."""
 
-from __future__ import annotations
-
 import re
 from xml.etree import ElementTree
 
@@ -267,7 +265,7 @@ def test_dxf_comes_back_with_layers(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".vtp", ".csv"])
-def test_lines_for_other_programs_are_as_long_as_the_curves(tmp_path, suffix) -> None:
+def test_lines_for_other_programs_are_as_long_as_the_curves(tmp_path, suffix):
     mesh = shapes.icosphere(2)
     loops, path = heat_igl.isolines(mesh, mesh.V[:, 2], [0.1, 0.3]), heat_igl.shortest_path(mesh, 0, 50)
     write_curves(tmp_path / f"a{suffix}", mesh, {"levels": loops, "path": path})

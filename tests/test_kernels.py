@@ -1,7 +1,5 @@
 """Compiled kernels on their own: against numpy and scipy, on random input, in every build that this processor runs."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -83,7 +81,7 @@ def imported(folder: Path) -> str:
     return subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False).stderr
 
 
-def test_kernels_that_are_not_those_of_the_sources_are_refused(tmp_path: Path) -> None:
+def test_kernels_that_are_not_those_of_the_sources_are_refused(tmp_path):
     """None compiled: Python would run the sources, which are valid Python. Or compiled from earlier sources."""
     folder = tmp_path / "heat_igl" / "kernels"
     folder.mkdir(parents=True)

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import itertools
 import pickle
 from concurrent.futures import ThreadPoolExecutor
@@ -23,12 +21,12 @@ from heat_igl.validation.zoo import SHAPES
 
 
 @pytest.fixture(params=["scipy", "multifrontal"])
-def backend(request) -> str:
+def backend(request):
     return request.param
 
 
 @pytest.fixture(scope="module")
-def heat_matrix() -> sp.csc_matrix:
+def heat_matrix():
     domain = operators(shapes.icosphere(4))
     return (domain.M - domain.mean_edge_length**2 * domain.L).tocsc()
 
@@ -208,7 +206,7 @@ def test_threads_divide_the_processors(monkeypatch):
     monkeypatch.setattr("os.sched_getaffinity", lambda _: set(range(8)), raising=False)
     monkeypatch.setattr("os.cpu_count", lambda: 8)
 
-    def inside() -> tuple[int, int]:
+    def inside():
         with threads.pool(3) as workers:
             return threads.n_threads(), workers.submit(threads.n_threads).result()
 
@@ -243,7 +241,7 @@ def test_factors_of_a_small_mesh_are_made_on_the_thread_that_drops_them(monkeypa
     assert len(made) == 2
 
 
-def test_an_order_with_much_fill_is_not_taken() -> None:
+def test_an_order_with_much_fill_is_not_taken():
     """On triangles that grow away from two fine rings nested dissection leaves ten times the entries of SuperLU."""
     graded = next(shape for shape in SHAPES if shape.name == "capped cylinder 512").make()
     assert analyse(operators(graded, "auto").L).backend == "multifrontal"
@@ -266,7 +264,7 @@ def test_estimate_bounds_what_the_factors_hold():
 
 
 @pytest.mark.parametrize("n_per_vertex", [1, 2])
-def test_the_memory_of_two_factors_is_known_before(n_per_vertex: int) -> None:
+def test_the_memory_of_two_factors_is_known_before(n_per_vertex):
     """One row per vertex, as in diffusion of scalars, and two, as in that of tangent vectors."""
     A = sp.kron(-operators(shapes.torus(200, 200)).L, np.eye(n_per_vertex) + 0.1).tocsc()
     A += sp.identity(A.shape[0], format="csc")
@@ -279,7 +277,7 @@ def test_the_memory_of_two_factors_is_known_before(n_per_vertex: int) -> None:
     assert 0.7 < peak.bytes / analysis.two_factors_bytes < 1.05
 
 
-def test_factors_that_do_not_fit_are_an_error_before_they_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_factors_that_do_not_fit_are_an_error_before_they_are_made(monkeypatch):
     mesh = shapes.icosphere(4)
     analysis = analyse(operators(mesh).L)
     assert isinstance(analysis, MultifrontalAnalysis)

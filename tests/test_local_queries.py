@@ -1,7 +1,5 @@
 """Local queries and log maps: equal to the full search, ended where asked, cleared after each."""
 
-from __future__ import annotations
-
 import re
 import time
 from itertools import pairwise
@@ -181,7 +179,7 @@ def test_a_search_clears_what_it_wrote(monkeypatch):
     mesh, kept = bumpy(), []
     original = local_searches.Workspace
 
-    class Kept(original):  # type: ignore[misc, valid-type]
+    class Kept(original):
         def __init__(self, *arguments):
             super().__init__(*arguments)
             kept.append(self)

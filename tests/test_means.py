@@ -1,7 +1,5 @@
 """Means and medians on surfaces, and geodesic Bezier curves, against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import flat_perturbed

@@ -1,7 +1,5 @@
 """Meshes, their checks, and points and polylines on them: small shapes whose numbers can be worked out by hand."""
 
-from __future__ import annotations
-
 import itertools
 import pickle
 
@@ -59,11 +57,11 @@ def two_tetrahedra() -> Mesh:
 
 @pytest.mark.parametrize("V_type", [list, np.float32, np.float64, np.int64, np.uint8, ">f8", "fortran"])
 @pytest.mark.parametrize("F_type", [list, np.int8, np.int32, np.int64, np.uint64, ">i4", "fortran"])
-def test_any_kind_of_array_becomes_the_same_mesh(V_type: object, F_type: object) -> None:
-    def converted(array: np.ndarray, kind: object) -> object:
+def test_any_kind_of_array_becomes_the_same_mesh(V_type, F_type):
+    def converted(array, kind):
         if kind is list:
             return array.tolist()
-        return np.asfortranarray(array) if kind == "fortran" else array.astype(kind)  # type: ignore[call-overload]
+        return np.asfortranarray(array) if kind == "fortran" else array.astype(kind)
 
     mesh = Mesh(converted(TETRAHEDRON_V, V_type), converted(TETRAHEDRON_F, F_type))
     for array, dtype, expected in ((mesh.V, np.float64, TETRAHEDRON_V), (mesh.F, np.int64, TETRAHEDRON_F)):
@@ -72,7 +70,7 @@ def test_any_kind_of_array_becomes_the_same_mesh(V_type: object, F_type: object)
         assert np.array_equal(array, expected)
 
 
-def test_mesh_keeps_a_copy_that_nobody_can_write_to() -> None:
+def test_mesh_keeps_a_copy_that_nobody_can_write_to():
     V, F = TETRAHEDRON_V.copy(), TETRAHEDRON_F.copy()
     mesh = Mesh(V, F)
     V[0], F[0] = 7, 1
@@ -83,11 +81,11 @@ def test_mesh_keeps_a_copy_that_nobody_can_write_to() -> None:
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
     with pytest.raises(AttributeError, match="cannot assign to field 'V'"):
-        mesh.V = V  # type: ignore[misc]
+        mesh.V = V
 
 
 @pytest.mark.parametrize("mesh", [sheet(2, 3), two_tetrahedra()], ids=["surface", "solid"])
-def test_a_pickled_mesh_comes_back_with_the_same_bits(mesh: Mesh) -> None:
+def test_a_pickled_mesh_comes_back_with_the_same_bits(mesh):
     _ = mesh.edges
     back = pickle.loads(pickle.dumps(mesh))
     assert back.V.tobytes() == mesh.V.tobytes()
@@ -95,7 +93,7 @@ def test_a_pickled_mesh_comes_back_with_the_same_bits(mesh: Mesh) -> None:
     assert not back.V.flags.writeable
 
 
-def test_measures_do_not_depend_on_orientation() -> None:
+def test_measures_do_not_depend_on_orientation():
     mesh = Mesh(TETRAHEDRON_V, TETRAHEDRON_F)
     assert mesh.measures == pytest.approx([0.5, 0.5, 3**0.5 / 2, 0.5], rel=1e-15)
     assert Mesh(TETRAHEDRON_V, TETRAHEDRON_F[:, ::-1]).measures == pytest.approx(mesh.measures, rel=1e-15)
@@ -104,14 +102,14 @@ def test_measures_do_not_depend_on_orientation() -> None:
     assert flipped.measures == pytest.approx([1 / 6, 1 / 3], rel=1e-15)
 
 
-def test_edge_lengths_belong_to_edges() -> None:
+def test_edge_lengths_belong_to_edges():
     mesh = two_tetrahedra()
     assert mesh.edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [1, 4], [2, 3], [2, 4], [3, 4]]
     root = 2**0.5
     assert mesh.edge_lengths == pytest.approx([1, 1, 1, root, root, root, root, root, root], rel=1e-15)
 
 
-def test_components_boundary_and_referenced() -> None:
+def test_components_boundary_and_referenced():
     a, b = sheet(3, 1), sheet(4, 4, wrap="torus")
     V = np.concatenate([a.V, [[9, 9, 9]], b.V])
     mesh = Mesh(V, np.concatenate([a.F, b.F + a.n_vertices + 1]))
@@ -125,7 +123,7 @@ def test_components_boundary_and_referenced() -> None:
     assert two_tetrahedra().boundary.all()
 
 
-def test_longest_distance() -> None:
+def test_longest_distance():
     strip = Mesh([[i, j, 0] for i in range(101) for j in range(2)], sheet(100, 1).F)
     assert strip.longest_distance == pytest.approx(99 + 2**0.5, rel=1e-14)
     # Also when the search starts in the middle of the strip.
@@ -153,7 +151,7 @@ def test_longest_distance() -> None:
     ],
     ids=["sphere", "disk", "cylinder", "moebius", "torus", "tetrahedron", "two tetrahedra"],
 )
-def test_report_counts_boundary_loops_and_the_euler_characteristic(mesh: Mesh, euler: int, loops: int) -> None:
+def test_report_counts_boundary_loops_and_the_euler_characteristic(mesh, euler, loops):
     report = mesh.report()
     assert (report.euler_characteristic, report.n_boundary_loops, report.n_components) == (euler, loops, 1)
     assert (report.n_vertices, report.n_faces, report.n_edges) == (mesh.n_vertices, mesh.n_faces, len(mesh.edges))
@@ -161,7 +159,7 @@ def test_report_counts_boundary_loops_and_the_euler_characteristic(mesh: Mesh, e
         assert len(getattr(report, name)) == 0
 
 
-def test_report_lists_what_is_wrong() -> None:
+def test_report_lists_what_is_wrong():
     flat = sheet(2, 2).V
     V = np.concatenate([flat, [[5, 5, 5], [0.5, 0.0, 0.05], [0, 0, 9]]])
     V[10] = (V[0] + V[3]) / 2  # on the edge between vertices 0 and 3
@@ -181,12 +179,12 @@ def test_report_lists_what_is_wrong() -> None:
 
 @pytest.mark.parametrize(("height", "degenerate"), [(0, [0]), (1e-13, [0]), (1e-9, [])])
 @pytest.mark.parametrize("scale", [1e-20, 1, 1e20])
-def test_degenerate_means_flat_to_rounding(height: float, degenerate: list[int], scale: float) -> None:
+def test_degenerate_means_flat_to_rounding(height, degenerate, scale):
     V = scale * np.array([[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0, 1, 0]])
     assert Mesh(V, [[0, 1, 2], [0, 1, 3]]).report().degenerate_faces.tolist() == degenerate
 
 
-def test_report_measures_lengths_angles_and_range() -> None:
+def test_report_measures_lengths_angles_and_range():
     strip = Mesh([[i, j, 0] for i in range(11) for j in range(2)], sheet(10, 1).F)
     report = strip.report()
     lengths = np.array([1.0] * 20 + [1.0] * 11 + [2**0.5] * 10)
@@ -201,7 +199,7 @@ def test_report_measures_lengths_angles_and_range() -> None:
     assert two_tetrahedra().report().is_intrinsic_delaunay is None
 
 
-def test_report_of_a_scaled_mesh_is_scaled() -> None:
+def test_report_of_a_scaled_mesh_is_scaled():
     mesh = sheet(4, 3)
     small, large = Mesh(mesh.V * 1e-8, mesh.F).report(), Mesh(mesh.V * 1e8, mesh.F).report()
     assert large.mean_edge == pytest.approx(1e16 * small.mean_edge, rel=1e-12)
@@ -227,10 +225,10 @@ FACES = st.integers(4, 9).flatmap(
 
 @settings(max_examples=100, deadline=None)
 @given(FACES)
-def test_edges_facets_and_components_against_sets(given_faces: tuple[int, list[list[int]]]) -> None:
+def test_edges_facets_and_components_against_sets(given_faces):
     n, faces = given_faces
     F = np.array(faces, np.int64)
-    holders: dict[tuple[int, ...], int] = {}
+    holders = {}
     for face in faces:
         for pair in itertools.combinations(sorted(face), 2):
             holders[pair] = holders.get(pair, 0) + 1
@@ -248,21 +246,21 @@ def test_edges_facets_and_components_against_sets(given_faces: tuple[int, list[l
         joined = set().union(*(group for group in groups if group & set(face)))
         groups = [group for group in groups if not group & set(face)] + [joined]
     assert len(np.unique(label)) == len(groups)
-    seen: set[frozenset[int]] = set()
-    repeated = [i for i, face in enumerate(faces) if frozenset(face) in seen or seen.add(frozenset(face))]  # type: ignore[func-returns-value]
+    seen = set()
+    repeated = [i for i, face in enumerate(faces) if frozenset(face) in seen or seen.add(frozenset(face))]
     assert connectivity.duplicate_faces(F, n).tolist() == repeated
 
 
 @settings(max_examples=150, deadline=None)
 @given(FACES)
-def test_nonmanifold_vertices_against_links(given_faces: tuple[int, list[list[int]]]) -> None:
+def test_nonmanifold_vertices_against_links(given_faces):
     """A vertex is manifold when its faces hang together around it and each edge at it has at most two faces."""
     n, faces = given_faces
     bad = []
     for v in range(n):
         link = [set(face) - {v} for face in faces if v in face]
         crowded = any(sum(w in edge for edge in link) > 2 for w in range(n))
-        pieces: list[set[int]] = []
+        pieces = []
         for edge in link:
             touching = [piece for piece in pieces if piece & edge]
             pieces = [piece for piece in pieces if not piece & edge] + [edge.union(*touching)]
@@ -275,7 +273,7 @@ def test_nonmanifold_vertices_against_links(given_faces: tuple[int, list[list[in
 @pytest.mark.parametrize("n", [4, 10**6])
 @pytest.mark.parametrize("columns", [1, 2, 3])
 @pytest.mark.parametrize("count", [0, 1, 200])
-def test_unique_rows_are_those_of_numpy(n: int, columns: int, count: int) -> None:
+def test_unique_rows_are_those_of_numpy(n, columns, count):
     rows = np.random.default_rng(31).integers(0, 4, (count, columns)) * (n // 4)
     first, inverse, counts = connectivity.unique_rows(rows, n)
     expected, expected_first, expected_counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
@@ -285,7 +283,7 @@ def test_unique_rows_are_those_of_numpy(n: int, columns: int, count: int) -> Non
     assert np.array_equal(rows[first][inverse], rows)
 
 
-def test_longest_path_with_loops_and_repeated_edges() -> None:
+def test_longest_path_with_loops_and_repeated_edges():
     """A path of three edges and one of two; the repeated edge counts once, with its shorter length."""
     edges = np.array([[1, 0], [1, 2], [2, 1], [3, 2], [2, 2], [4, 5], [6, 5]])
     lengths = np.array([1.0, 9, 2, 3, 50, 2, 3.5])
@@ -295,14 +293,14 @@ def test_longest_path_with_loops_and_repeated_edges() -> None:
     assert connectivity.longest_paths(alone, np.array([0, 1, 2, 3, 4, 4, 4])).max() == 5.5
 
 
-def test_facets_of_tetrahedra_are_opposite_their_corner() -> None:
+def test_facets_of_tetrahedra_are_opposite_their_corner():
     found = connectivity.facets(two_tetrahedra().F, 5)
     assert found.vertices[found.n_faces == 2].tolist() == [[1, 2, 3]]
     assert found.vertices[found.of_face[0]].tolist() == [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
     assert len(found.vertices) == 7
 
 
-def test_distance_along_edges_of_length_zero() -> None:
+def test_distance_along_edges_of_length_zero():
     """Two vertices in one place are at distance 0 from each other, however the edge between them is stored."""
     mesh = Mesh([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 2, 0], [5, 5, 5]], [[0, 1, 2], [1, 0, 3]])
     assert connectivity.edge_distance(mesh.edge_graph, np.array([0])).tolist() == [0, 0, 1, 2, np.inf]
@@ -312,7 +310,7 @@ def test_distance_along_edges_of_length_zero() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 300])
-def test_groups_hold_what_has_their_label(count: int) -> None:
+def test_groups_hold_what_has_their_label(count):
     labels = np.random.default_rng(5).integers(0, 40, count) // 2 * 2  # odd labels have no members
     groups = grouping.group_by_label(labels, 40)
     for v in range(40):
@@ -324,7 +322,7 @@ def test_groups_hold_what_has_their_label(count: int) -> None:
     assert np.array_equal(renamed.members, 100 + groups.members)
 
 
-def test_places_within_runs_and_the_next_in_each_run() -> None:
+def test_places_within_runs_and_the_next_in_each_run():
     counts = np.array([2, 0, 3, 1])
     run, within = grouping.enumerate_runs(counts)
     assert list(zip(run.tolist(), within.tolist(), strict=True)) == [(0, 0), (0, 1), (2, 0), (2, 1), (2, 2), (3, 0)]
@@ -348,7 +346,7 @@ CORNERS = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)], float)
 
 @pytest.mark.parametrize("bend", [0, 0.1, 0.5, 2])
 @pytest.mark.parametrize("n", [2, 6, 40])
-def test_a_sheet_of_quadrilaterals_is_not_taken_for_tetrahedra(bend: float, n: int) -> None:
+def test_a_sheet_of_quadrilaterals_is_not_taken_for_tetrahedra(bend, n):
     V, F = quads(bend, n)
     with pytest.raises(MeshError, match=r"F has 4 columns, which stands for tetrahedra, but F\[\d+\] = .* is a quadri"):
         Mesh(V, F)
@@ -358,7 +356,7 @@ def test_a_sheet_of_quadrilaterals_is_not_taken_for_tetrahedra(bend: float, n: i
 @pytest.mark.parametrize(
     "F", [CUBE, CUBE[:2], CUBE[:1], CUBE[:3], [*CUBE, CUBE[0]]], ids=["closed", "apart", "single", "open", "twice"]
 )
-def test_a_cube_of_quadrilaterals_is_not_taken_for_tetrahedra(F: list[list[int]]) -> None:
+def test_a_cube_of_quadrilaterals_is_not_taken_for_tetrahedra(F):
     with pytest.raises(MeshError, match=r"F\[0\] = \[0, 2, 3, 1\] is a quadrilateral: pass PolygonMesh\(V, F\)"):
         Mesh(CORNERS, F)
 
@@ -371,7 +369,7 @@ def scattered(n: int, seed: int) -> Mesh:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_scattered_tetrahedra(seed: int) -> None:
+def test_scattered_tetrahedra(seed):
     mesh = scattered(8 + 40 * seed, seed)
     rng = np.random.default_rng(seed)
     corners = rng.permuted(mesh.F, axis=1)
@@ -381,12 +379,12 @@ def test_scattered_tetrahedra(seed: int) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 2, 9])
-def test_boxes_of_tetrahedra_are_not_taken_for_quadrilaterals(n: int) -> None:
+def test_boxes_of_tetrahedra_are_not_taken_for_quadrilaterals(n):
     assert shapes.box(n).n_faces == 6 * n**3
     assert shapes.box(n, (1, 1, 1e-3)).n_faces == 6 * n**3
 
 
-def test_tetrahedra_without_neighbours() -> None:
+def test_tetrahedra_without_neighbours():
     corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     thin = corner * [1, 1, 1e-3]
     for V in (corner, thin):
@@ -402,14 +400,14 @@ def test_tetrahedra_without_neighbours() -> None:
     assert Mesh(V, [[0, 1, 2, 3], [0, 1, 4, 2]]).report().degenerate_faces.tolist() == [1]
 
 
-def test_tetrahedra_of_which_one_hangs_on_an_edge() -> None:
+def test_tetrahedra_of_which_one_hangs_on_an_edge():
     V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [0, -1, 0], [0, 0, -1]]
     F = [[0, 1, 2, 3], [1, 2, 3, 4], [0, 1, 5, 6]]
     for thickness in (1, 1e-2):
         assert Mesh(np.array(V) * [1, 1, thickness], F).n_faces == 3
 
 
-def test_half_a_million_quadrilaterals_are_told_from_tetrahedra() -> None:
+def test_half_a_million_quadrilaterals_are_told_from_tetrahedra():
     """Half a million quadrilaterals and nearly as many tetrahedra: a quadratic check would not end."""
     V, F = quads(0.2, 700)
     with pytest.raises(MeshError, match="is a quadrilateral"):

@@ -1,7 +1,5 @@
 """Metrics that change from place to place: maps of space whose image is convex, bounds, activation times."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from surfaces import nearest_vertex
@@ -185,7 +183,7 @@ def test_planes_of_triangles_are_turned_into_each_other():
     along_x = np.where(on_the_right[:, None], [np.cos(1.0), 0, np.sin(1.0)], [1.0, 0, 0])
     fibres = along_x + np.array([0, 0.5, 0])
 
-    def turning(directions: FloatArray) -> float:
+    def turning(directions):
         g = fibre_metric(directions, 1.0, 20.0)[:, None]
         return HopfLaxEngine(MetricSimplices.in_metric(folded, g)).resolution[0]
 
@@ -257,7 +255,7 @@ def test_derivatives_against_central_differences(name):
     mesh, g = differentiable(name, rng)
     start, step = np.array([0.1, 0.12]), 1e-6
 
-    def answer(dV: float | FloatArray = 0.0, dg: float | FloatArray = 0.0, later: float | FloatArray = 0.0) -> tuple:
+    def answer(dV=0.0, dg=0.0, later=0.0):
         domain = metric_operators(mesh.with_vertices(mesh.V + dV), g + dg)
         return GeodesicSolver(domain).distance_vjp(OffsetSources([7, 100], start + later))
 
@@ -266,7 +264,7 @@ def test_derivatives_against_central_differences(name):
     assert len(pull_back.inexact) <= 1
     random = rng.standard_normal(len(phi))
 
-    def differences(**direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def differences(**direction):
         ((name, by),) = direction.items()
         two = [answer(**{name: s * step * by})[0] for s in (1, -1)]
         smooth = np.abs(two[0] + two[1] - 2 * phi) < 1e-3 * step

@@ -1,7 +1,5 @@
 """An anisotropic metric per face: linear maps of the plane, first fundamental forms, refraction."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

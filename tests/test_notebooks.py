@@ -1,7 +1,5 @@
 """The notebooks run unedited, from a fresh kernel, and are stored without their results."""
 
-from __future__ import annotations
-
 import ast
 import json
 import re
@@ -38,7 +36,7 @@ def code(cell: dict[str, Any]) -> str:
     return "".join(line for line in cell["source"] if not line.startswith("%"))
 
 
-def test_notebooks_are_numbered() -> None:
+def test_notebooks_are_numbered():
     numbers = [path.name[:2] for path in NOTEBOOKS]
     assert len(numbers) > 7
     assert len(set(numbers)) == len(numbers)
@@ -47,7 +45,7 @@ def test_notebooks_are_numbered() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_runs(path: Path, tmp_path: Path) -> None:
+def test_notebook_runs(path, tmp_path):
     environment = {
         **{name: value for name, value in ENVIRONMENT.items() if name not in NO_DISPLAY},
         **dict.fromkeys(("http_proxy", "https_proxy"), "http://127.0.0.1:9"),  # nothing listens there
@@ -67,7 +65,7 @@ def test_notebook_runs(path: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_is_stored_without_results(path: Path) -> None:
+def test_notebook_is_stored_without_results(path):
     for cell in cells(path):
         if cell["cell_type"] == "code":
             assert cell["outputs"] == []
@@ -75,7 +73,7 @@ def test_notebook_is_stored_without_results(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_uses_public_names_only(path: Path) -> None:
+def test_notebook_uses_public_names_only(path):
     for cell in cells(path):
         if cell["cell_type"] != "code":
             continue
@@ -88,10 +86,10 @@ def test_notebook_uses_public_names_only(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_opens_in_colab_and_installs_the_package_there(path: Path) -> None:
+def test_notebook_opens_in_colab_and_installs_the_package_there(path):
     opening, install = cells(path)[:2]
     assert f"/github/heat-igl/heat_igl/blob/main/notebooks/{path.name})" in "".join(opening["source"])
-    said: list[str] = []
+    said = []
     shell = type("Shell", (), {"run_line_magic": lambda _, *line: said.append(" ".join(line))})
     # Where the package is installed, as here, the cell does nothing.
     for spec in (object(), None):

@@ -1,7 +1,5 @@
 """Meshes of other libraries: recognized by attributes, the same mesh back, one clear error for everything else."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -53,7 +51,7 @@ TRIANGLES = {
 
 
 @pytest.mark.parametrize("given", TRIANGLES.values(), ids=TRIANGLES)
-def test_triangles_come_as_they_are(given: Any) -> None:
+def test_triangles_come_as_they_are(given):
     mesh = as_mesh(given)
     assert isinstance(mesh, Mesh)
     np.testing.assert_array_equal(mesh.V, V)
@@ -64,7 +62,7 @@ def test_triangles_come_as_they_are(given: Any) -> None:
     ("name", "remedy"),
     [("Scene", r"pass \.to_mesh\(\)"), ("MultiBlock", r"pass \.combine"), ("SurfaceImage", "mesh.parts")],
 )
-def test_what_holds_several_meshes_is_refused_by_name(name: str, remedy: str) -> None:
+def test_what_holds_several_meshes_is_refused_by_name(name, remedy):
     with pytest.raises(MeshError, match=rf"mesh is .*{name}.*: .*{remedy}"):
         as_mesh(type(name, (), {})())
     with pytest.raises(MeshError, match=r"strips of triangles: pass mesh.triangulate\(\)"):
@@ -81,7 +79,7 @@ POLYGONS = {
 
 
 @pytest.mark.parametrize("given", POLYGONS.values(), ids=POLYGONS)
-def test_polygons_stay_polygons(given: Any) -> None:
+def test_polygons_stay_polygons(given):
     mesh = as_mesh(given)
     assert isinstance(mesh, PolygonMesh)
     expected = TWO_QUADS if mesh.degree[0] == 4 else TRIANGLE_AND_QUAD
@@ -90,7 +88,7 @@ def test_polygons_stay_polygons(given: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", ["tetra", 10])
-def test_tetrahedra_come_without_the_triangles_around_them(kind: Any) -> None:
+def test_tetrahedra_come_without_the_triangles_around_them(kind):
     cells = {"triangle": TETRAHEDRA[:, :3], kind: TETRAHEDRA}
     mesh = as_mesh(SimpleNamespace(points=CORNERS, cells_dict=cells))
     assert isinstance(mesh, Mesh)
@@ -98,9 +96,8 @@ def test_tetrahedra_come_without_the_triangles_around_them(kind: Any) -> None:
 
 
 @pytest.mark.parametrize("library", ["trimesh", "pyvista", "meshio", "pymeshlab", "vedo", "nibabel"])
-def test_meshes_of_the_libraries_themselves(library: str) -> None:
+def test_meshes_of_the_libraries_themselves(library):
     module = pytest.importorskip(library)
-    made: Any
     if library == "trimesh":
         made = module.Trimesh(V, F, process=False)
     elif library == "pyvista":
@@ -136,7 +133,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("given", "message"), WRONG.values(), ids=WRONG)
-def test_what_is_not_understood_is_one_error(given: Any, message: str) -> None:
+def test_what_is_not_understood_is_one_error(given, message):
     with pytest.raises(MeshError, match=message):
         as_mesh(given)
 
@@ -152,7 +149,7 @@ class Tensor:
     def __init__(self, array: np.ndarray) -> None:
         self._array = array
 
-    def cpu(self) -> Tensor:
+    def cpu(self):
         return self
 
     def numpy(self) -> np.ndarray:
@@ -175,7 +172,7 @@ CLOUDS = {
 
 
 @pytest.mark.parametrize(("given", "has_normals"), CLOUDS.values(), ids=CLOUDS)
-def test_points_become_a_cloud(given: Any, has_normals: bool) -> None:
+def test_points_become_a_cloud(given, has_normals):
     cloud = as_mesh(given)
     assert isinstance(cloud, heat_igl.PointCloud)
     np.testing.assert_array_equal(cloud.P, V)
@@ -186,9 +183,8 @@ def test_points_become_a_cloud(given: Any, has_normals: bool) -> None:
 
 
 @pytest.mark.parametrize("library", ["trimesh", "pyvista", "meshio", "open3d"])
-def test_points_of_the_libraries_themselves(library: str) -> None:
+def test_points_of_the_libraries_themselves(library):
     module = pytest.importorskip(library)
-    made: Any
     if library == "trimesh":
         made = module.PointCloud(V)
     elif library == "pyvista":
@@ -200,7 +196,7 @@ def test_points_of_the_libraries_themselves(library: str) -> None:
     np.testing.assert_allclose(as_mesh(made).P, V, atol=1e-7)
 
 
-def test_cells_of_other_kinds_are_refused() -> None:
+def test_cells_of_other_kinds_are_refused():
     """Beside tetrahedra, hexahedra that are left out would be a hole."""
     for kind, name in (("hexahedron", "hexahedron"), (12, "12 of VTK"), ("tetra10", "tetra10")):
         cells = {"tetra": TETRAHEDRA, kind: np.zeros((5, 8), int)}
@@ -212,14 +208,14 @@ def test_cells_of_other_kinds_are_refused() -> None:
         as_mesh(SimpleNamespace(points=CORNERS, cells_dict={"line": F[:, :2]}))
 
 
-def test_operators_and_solvers_are_refused_by_name() -> None:
+def test_operators_and_solvers_are_refused_by_name():
     with pytest.raises(MeshError, match=r"Operators: GeodesicSolver and HeatMethodSolver take operators"):
         as_mesh(heat_igl.speed_operators(SPHERE, np.ones(len(F))))
     with pytest.raises(MeshError, match=r"HeatMethodSolver: a solver is asked itself"):
         as_mesh(heat_igl.HeatMethodSolver(SPHERE))
 
 
-def test_grids_of_pyvista_name_the_way_to_cells() -> None:
+def test_grids_of_pyvista_name_the_way_to_cells():
     class StructuredGrid:
         """As that of pyvista, whose cells are not stored."""
 
@@ -227,7 +223,7 @@ def test_grids_of_pyvista_name_the_way_to_cells() -> None:
         as_mesh(StructuredGrid())
 
 
-def test_faces_beside_a_mesh_are_refused() -> None:
+def test_faces_beside_a_mesh_are_refused():
     np.testing.assert_array_equal(as_mesh(V, F).F, F)
     with pytest.raises(MeshError, match="F is given beside a Mesh"):
         as_mesh(SPHERE, F)

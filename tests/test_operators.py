@@ -1,7 +1,5 @@
 """Identities that hold to rounding, on every kind of domain."""
 
-from __future__ import annotations
-
 import igl
 import numpy as np
 import pytest
@@ -49,7 +47,7 @@ def with_speeds(mesh: Mesh) -> Operators:
 
 
 @pytest.fixture(params=DOMAINS, ids=str)
-def domain(request) -> Operators:
+def domain(request):
     return DOMAINS[request.param]()
 
 

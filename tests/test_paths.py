@@ -1,7 +1,5 @@
 """Shortest paths: as long as exact distances, on the faces, between all kinds of places and sources."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed, zoo

@@ -1,7 +1,5 @@
 """Pictures: every pixel shows the nearest triangle and the right distance, lines lie where they should."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from heat_igl.drawing.surface_image import LINE
 
 
 @pytest.fixture(autouse=True)
-def _small(monkeypatch: pytest.MonkeyPatch) -> None:
+def _small(monkeypatch):
     """The same picture with fewer pixels."""
     monkeypatch.setattr(figure, "DPI", 160)
 
@@ -39,7 +37,7 @@ def flat_grid(n: int = 20) -> tuple[heat_igl.Mesh, np.ndarray]:
     return heat_igl.Mesh(V, mesh.F), V[:, 0]
 
 
-def test_each_pixel_shows_the_nearest_triangle_and_interpolates_exactly() -> None:
+def test_each_pixel_shows_the_nearest_triangle_and_interpolates_exactly():
     rng = np.random.default_rng(0)
     points = rng.uniform(0, 40, (60, 3))
     F = np.arange(60).reshape(20, 3)
@@ -61,7 +59,7 @@ def test_each_pixel_shows_the_nearest_triangle_and_interpolates_exactly() -> Non
     np.testing.assert_allclose(where[:, 0] + 40 * where[:, 1], pixels.place, atol=1e-6)
 
 
-def test_neighbouring_triangles_leave_no_gap() -> None:
+def test_neighbouring_triangles_leave_no_gap():
     mesh, _ = flat_grid(8)
     points = mesh.V @ camera.rotation(30, 40).T * [80, 80, 1] + [40, 40, 0]
     pixels = raster.rasterize(points, mesh.F, 150, 150)
@@ -72,7 +70,7 @@ def test_neighbouring_triangles_leave_no_gap() -> None:
 
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (90, 0), (33, -70), (0, 90)])
-def test_rotations_keep_shapes_and_handedness(azimuth: float, elevation: float) -> None:
+def test_rotations_keep_shapes_and_handedness(azimuth, elevation):
     turn = camera.rotation(azimuth, elevation)
     np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(turn) == pytest.approx(1)
@@ -80,7 +78,7 @@ def test_rotations_keep_shapes_and_handedness(azimuth: float, elevation: float) 
     assert turn[2, 1] == pytest.approx(np.sin(viewer[1]))
 
 
-def test_isolines_lie_at_the_levels_and_have_the_width_asked_for() -> None:
+def test_isolines_lie_at_the_levels_and_have_the_width_asked_for():
     """Distance x, on a square seen face on: dark columns at multiples of the spacing and nowhere else."""
     mesh, x = flat_grid()
     image, plain = (surface_image(plot(mesh, x, spacing=spacing)) for spacing in (0.3, 100.0))
@@ -95,7 +93,7 @@ def test_isolines_lie_at_the_levels_and_have_the_width_asked_for() -> None:
     assert ink == pytest.approx(3 * line, rel=0.3)
 
 
-def test_colours_follow_the_colour_bar() -> None:
+def test_colours_follow_the_colour_bar():
     mesh, x = flat_grid()
     drawn = plot(mesh, x, spacing=10.0 / 3)  # no line on the way
     image = surface_image(drawn)
@@ -110,9 +108,9 @@ def test_colours_follow_the_colour_bar() -> None:
     assert luminance[0] - luminance[-1] > 0.5
 
 
-def test_stripes_are_light_in_every_second_interval() -> None:
+def test_stripes_are_light_in_every_second_interval():
     mesh, x = flat_grid()
-    image, plain = (surface_image(plot(mesh, x, spacing=0.25, style=style)) for style in ("stripes", "plain"))  # type: ignore[arg-type]
+    image, plain = (surface_image(plot(mesh, x, spacing=0.25, style=style)) for style in ("stripes", "plain"))
     middle = image.shape[0] // 2
     columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
     level = (np.arange(len(columns)) + 0.5) / len(columns) / 0.25
@@ -124,7 +122,7 @@ def test_stripes_are_light_in_every_second_interval() -> None:
     assert "stripes of 0.25" in legend_texts(plot(mesh, x, spacing=0.25, style="stripes"))
 
 
-def test_stripes_too_narrow_to_be_seen_become_an_even_tone() -> None:
+def test_stripes_too_narrow_to_be_seen_become_an_even_tone():
     values = np.random.default_rng(0).uniform(0, 1, 500)
     share = shading.stripe_coverage(values, np.full(500, 10.0), 0.01)
     np.testing.assert_allclose(share, 0.5, atol=1e-3)
@@ -134,7 +132,7 @@ def test_stripes_too_narrow_to_be_seen_become_an_even_tone() -> None:
     np.testing.assert_allclose(shading.stripe_coverage(values, np.full(500, 0.15), 0.2), slow, atol=2e-3)
 
 
-def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not() -> None:
+def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not():
     """Two parallel squares, a straight line across each: the far one is hidden as far as the near one reaches."""
     V = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 1], [2, 0, 1], [0, 2, 1]], float)
     mesh = heat_igl.Mesh(V, [[0, 1, 2], [3, 4, 5]])
@@ -144,7 +142,7 @@ def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not() ->
     drawn = plot(mesh, V[:, 0], curves=[far, near], view=(0, 0))
     axes = drawn.figure.axes[0]
     columns = surface_image(drawn).shape[1]
-    spans: dict[str, list[np.ndarray]] = {"dotted": [], "solid": []}
+    spans = {"dotted": [], "solid": []}
     for lines in axes.collections:
         kind = "solid" if lines.get_linestyle()[0][1] is None else "dotted"
         spans[kind] += [segment[:, 0] for segment in lines.get_segments()]
@@ -158,7 +156,7 @@ def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not() ->
     assert "curves" in legend_texts(drawn)
 
 
-def test_errors_of_both_signs_are_white_in_the_middle() -> None:
+def test_errors_of_both_signs_are_white_in_the_middle():
     mesh, x = flat_grid()
     drawn = plot_field(mesh, x - 0.25, label="error, %")
     assert drawn.figure.axes[1].get_ylim() == (-0.75, 0.75)
@@ -174,7 +172,7 @@ def test_errors_of_both_signs_are_white_in_the_middle() -> None:
     np.testing.assert_allclose(row[-1], bar.cmap(1.0)[:3], atol=0.02)
 
 
-def test_isolines_of_a_field_are_also_at_zero_and_below() -> None:
+def test_isolines_of_a_field_are_also_at_zero_and_below():
     mesh, x = flat_grid()
     image, plain = (
         surface_image(plot_field(mesh, x - 0.5, label="height", spacing=spacing, colormap="viridis"))
@@ -188,7 +186,7 @@ def test_isolines_of_a_field_are_also_at_zero_and_below() -> None:
     np.testing.assert_allclose(levels, [-0.4, -0.2, 0, 0.2, 0.4], atol=0.005)
 
 
-def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told() -> None:
+def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told():
     mesh, x = flat_grid()
     assert plot_field(mesh, x, label="heat").figure.axes[1].get_ylim() == (0, 1)
     drawn = plot_field(mesh, x, label="heat", limits=(0, 0.5))
@@ -203,7 +201,7 @@ def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told() -> None:
         plot_field(mesh, np.where(np.arange(441) == 2, np.nan, x), label="heat")
 
 
-def test_unreachable_is_grey_and_the_legend_says_so() -> None:
+def test_unreachable_is_grey_and_the_legend_says_so():
     mesh, x = flat_grid()
     both = twice(mesh, np.array([1.5, 0, 0]))
     drawn = plot(both, np.concatenate([x, np.full_like(x, np.inf)]), sources=[0])
@@ -216,7 +214,7 @@ def test_unreachable_is_grey_and_the_legend_says_so() -> None:
     assert "unreachable" not in legend_texts(plot(mesh, x))
 
 
-def test_sources_in_front_are_dots_and_those_behind_are_rings() -> None:
+def test_sources_in_front_are_dots_and_those_behind_are_rings():
     sphere = shapes.icosphere(3)
     front, back = int(np.argmax(sphere.V[:, 2])), int(np.argmin(sphere.V[:, 2]))
     distance = np.minimum(*(arcs(sphere.V, s) for s in (front, back)))
@@ -229,7 +227,7 @@ def test_sources_in_front_are_dots_and_those_behind_are_rings() -> None:
     assert len(hidden.get_facecolors()) == 0
 
 
-def test_sources_in_faces_and_on_curves_are_marked_where_they_are() -> None:
+def test_sources_in_faces_and_on_curves_are_marked_where_they_are():
     mesh = heat_igl.Mesh([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]])
     inside = heat_igl.SurfacePoints([0], [[0.5, 0.25, 0.25]])
     along = heat_igl.SurfaceCurve([0], [[0.75, 0, 0.25]], [[0, 0.75, 0.25]])
@@ -244,7 +242,7 @@ def test_sources_in_faces_and_on_curves_are_marked_where_they_are() -> None:
     assert legend_texts(drawn)[:2] == ["source", "source curve"]
 
 
-def test_the_default_view_shows_the_source() -> None:
+def test_the_default_view_shows_the_source():
     sphere = shapes.icosphere(3)
     for axis in (0, 2):
         for source in (int(np.argmax(sphere.V[:, axis])), int(np.argmin(sphere.V[:, axis]))):
@@ -253,7 +251,7 @@ def test_the_default_view_shows_the_source() -> None:
 
 
 @pytest.mark.parametrize("axes", [[0, 1, 2], [2, 0, 1], [1, 2, 0]])
-def test_a_flat_mesh_is_seen_face_on(axes: list[int]) -> None:
+def test_a_flat_mesh_is_seen_face_on(axes):
     mesh, x = flat_grid()
     image = surface_image(plot(heat_igl.Mesh(mesh.V[:, axes], mesh.F), x))
     rows, columns = np.nonzero(image[..., 3] > 0.5)
@@ -261,7 +259,7 @@ def test_a_flat_mesh_is_seen_face_on(axes: list[int]) -> None:
 
 
 @pytest.mark.parametrize(("scale", "offset"), [(1e-8, 0.0), (1e8, 0.0), (1.0, 1e6)])
-def test_scale_and_place_do_not_change_the_picture(scale: float, offset: float) -> None:
+def test_scale_and_place_do_not_change_the_picture(scale, offset):
     mesh = shapes.icosphere(2)
     distance = arcs(mesh.V, 0)
     moved = heat_igl.Mesh(mesh.V * scale + offset, mesh.F)
@@ -271,7 +269,7 @@ def test_scale_and_place_do_not_change_the_picture(scale: float, offset: float) 
     assert np.abs(a - b).mean() < 1e-4
 
 
-def test_nothing_overlaps_and_nothing_is_cut_off() -> None:
+def test_nothing_overlaps_and_nothing_is_cut_off():
     mesh, x = flat_grid()
     for values in (x * 1e-9, x * 12345.0):
         drawn = plot(mesh, values, sources=[0, 441 - 1])
@@ -292,7 +290,7 @@ def test_nothing_overlaps_and_nothing_is_cut_off() -> None:
             assert not any(box.shrunk(0.99, 0.97).overlaps(other) for other in boxes[i + 1 :])
 
 
-def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_path: Path) -> None:
+def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_path):
     mesh, x = flat_grid(4)
     drawn = plot(mesh, x)
     for suffix, start in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
@@ -304,7 +302,7 @@ def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_pat
     assert drawn._repr_png_().startswith(b"\x89PNG")
 
 
-def test_what_cannot_be_drawn_is_rejected_by_name() -> None:
+def test_what_cannot_be_drawn_is_rejected_by_name():
     mesh, x = flat_grid(4)
     plot(mesh, x)
     with pytest.raises(ValueError, match=r"distance must have shape \(25,\)"):
@@ -318,7 +316,7 @@ def test_what_cannot_be_drawn_is_rejected_by_name() -> None:
 # --- labels -----------------------------------------------------------------------------------------------------------
 
 
-def test_labels_have_one_colour_each_and_neighbours_others() -> None:
+def test_labels_have_one_colour_each_and_neighbours_others():
     mesh = shapes.grid(12)
     cells = heat_igl.voronoi_cells(heat_igl.HeatMethodSolver(mesh), [0, 12, 84, 100, 168])
     numbers = shading.colour_numbers(cells.labels, mesh.edges, 10)
@@ -335,7 +333,7 @@ def test_labels_have_one_colour_each_and_neighbours_others() -> None:
     assert counts[np.argsort(counts)][-len(set(numbers)) :].sum() > 0.95 * len(inside)
 
 
-def test_between_two_labels_is_no_third() -> None:
+def test_between_two_labels_is_no_third():
     """A square of two triangles; each corner of a triangle has a third of it."""
     mesh = shapes.grid(1)
     diagonal = [v for v in range(4) if (v == mesh.F).sum() == 2]
@@ -347,7 +345,7 @@ def test_between_two_labels_is_no_third() -> None:
     assert np.allclose(counts / len(inside), [1 / 6, 1 / 3, 1 / 2], atol=0.03)
 
 
-def test_borders_of_cells_are_where_distances_are_equal() -> None:
+def test_borders_of_cells_are_where_distances_are_equal():
     """In the plane the border of two cells is the bisector of the sites, which crosses the triangles here."""
     mesh, _ = flat_grid(12)
     away = np.linalg.norm(mesh.V[:, None] - mesh.V[[30, 120]], axis=2)
@@ -371,7 +369,7 @@ def test_borders_of_cells_are_where_distances_are_equal() -> None:
         plot_labels(mesh, away.argmin(axis=1), distance=[1.0])
 
 
-def test_vertices_without_a_label_are_grey() -> None:
+def test_vertices_without_a_label_are_grey():
     mesh = shapes.grid(4)
     image = surface_image(plot_labels(mesh, np.full(25, -1) + (mesh.V[:, 0] > mesh.V[:, 0].mean())))
     grey = np.ptp(image[..., :3], axis=2) < 1e-6
@@ -391,7 +389,7 @@ def drawn_lines(path: Path) -> dict[str, list[np.ndarray]]:
 
 
 @pytest.mark.parametrize("hidden", ["dotted", "omitted"])
-def test_lines_behind_the_surface_are_hidden(tmp_path: Path, hidden: str) -> None:
+def test_lines_behind_the_surface_are_hidden(tmp_path, hidden):
     """Circles of latitude on a sphere, seen at right angles to the axis: the near half of each is visible."""
     sphere = shapes.icosphere(4)
     mesh = heat_igl.Mesh(10 * sphere.V + 3, sphere.F)
@@ -409,7 +407,7 @@ def test_lines_behind_the_surface_are_hidden(tmp_path: Path, hidden: str) -> Non
     assert ("stroke-dasharray" in path.read_text()) == (hidden == "dotted")
 
 
-def test_a_line_drawing_goes_to_svg(tmp_path: Path) -> None:
+def test_a_line_drawing_goes_to_svg(tmp_path):
     mesh = shapes.icosphere(1)
     with pytest.raises(ValueError, match=r"a\.png: line drawings go to \.svg files"):
         write_line_drawing(tmp_path / "a.png", mesh, [])

@@ -1,7 +1,5 @@
 """Point clouds: their triangles, and the distance on them against closed forms."""
 
-from __future__ import annotations
-
 import json
 import re
 
@@ -51,7 +49,7 @@ def plane(n: int, seed: int = 0) -> np.ndarray:
 # The triangles.
 
 
-def test_a_sphere_is_closed_and_a_disc_is_a_disc() -> None:
+def test_a_sphere_is_closed_and_a_disc_is_a_disc():
     closed = PointCloud(sphere(2000)).report()
     assert (closed.euler_characteristic, closed.n_boundary_loops, closed.n_components) == (2, 0, 1)
     P = plane(2000)
@@ -60,24 +58,24 @@ def test_a_sphere_is_closed_and_a_disc_is_a_disc() -> None:
     assert len(closed.nonmanifold_edges) == len(disc.nonmanifold_edges) == 0
 
 
-def test_triangles_of_a_plane_are_its_delaunay_triangles_inside() -> None:
+def test_triangles_of_a_plane_are_its_delaunay_triangles_inside():
     from scipy.spatial import Delaunay
 
     P = plane(1500)
     middle = (np.abs(P[:, :2] - 0.5) < 0.35).all(axis=1)
 
-    def inside(F: np.ndarray) -> set[tuple[int, ...]]:
+    def inside(F):
         return {tuple(sorted(row)) for row in F.tolist() if middle[row].all()}
 
     assert inside(PointCloud(P).F) == inside(Delaunay(P[:, :2]).simplices)
 
 
-def test_nothing_depends_on_where_how_large_or_in_which_order() -> None:
+def test_nothing_depends_on_where_how_large_or_in_which_order():
     P = sphere(500)
     turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
     order = np.random.default_rng(2).permutation(len(P))
 
-    def triangles(P: np.ndarray) -> set[tuple[int, ...]]:
+    def triangles(P):
         return {tuple(sorted(row)) for row in PointCloud(P).F.tolist()}
 
     expected = triangles(P)
@@ -98,13 +96,13 @@ def test_nothing_depends_on_where_how_large_or_in_which_order() -> None:
 
 
 @pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.003), ({"method": "exact"}, 0.002)])
-def test_distance_on_a_sphere(options: dict[str, str], most: float) -> None:
+def test_distance_on_a_sphere(options, most):
     P = sphere(4000)
     distances = SolverChoice.of(**options).on(PointCloud(P)).distances([0, 1, 2])
     assert mean_error(distances, np.stack([arcs(P, i) for i in range(3)])) < most
 
 
-def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
+def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary():
     P = plane(3000)
     cloud = PointCloud(P)
     truth = np.linalg.norm(P - P[0], axis=1)
@@ -113,7 +111,7 @@ def test_heat_on_the_cover_is_better_than_on_slivers_at_the_boundary() -> None:
     assert mean_error(of_cloud, truth) < mean_error(of_mesh, truth)
 
 
-def test_even_points_are_solved_on_as_their_mesh_is() -> None:
+def test_even_points_are_solved_on_as_their_mesh_is():
     """Random points take a larger time step than the vertices of a mesh."""
     mesh = shapes.icosphere(4)
     of_cloud, of_mesh = HeatMethodSolver(PointCloud(mesh.V)), HeatMethodSolver(mesh)
@@ -125,7 +123,7 @@ def test_even_points_are_solved_on_as_their_mesh_is() -> None:
     assert solver.t == pytest.approx(solver.operators.mean_edge_length**2, rel=1e-9)
 
 
-def test_noise_is_taken_away_and_clean_points_stay() -> None:
+def test_noise_is_taken_away_and_clean_points_stay():
     P = sphere(20_000)
     noisy = P + 0.01 * np.random.default_rng(1).standard_normal(P.shape)
     radius = np.linalg.norm(without_noise(point_tree(noisy)).P, axis=1)
@@ -140,7 +138,7 @@ def test_noise_is_taken_away_and_clean_points_stay() -> None:
     assert without_noise(detailed) is detailed
 
 
-def test_noise_of_many_spacings_is_taken_away() -> None:
+def test_noise_of_many_spacings_is_taken_away():
     """Where all neighbours lie within the noise, some of the points show the surface."""
     P, noise = plane(10_000), 0.05
     with pytest.warns(AccuracyWarning, match="noise of the points is 0.05 across the surface, .* 17 % off in the mean"):
@@ -152,7 +150,7 @@ def test_noise_of_many_spacings_is_taken_away() -> None:
 # What scans bring along.
 
 
-def test_noise_is_smoothed_over_no_more_neighbours_than_are_flat() -> None:
+def test_noise_is_smoothed_over_no_more_neighbours_than_are_flat():
     """Thirty of 500 points of a torus bend around its tube; with much noise nothing tells these apart."""
     mesh = shapes.torus(120, 300)
     rng = np.random.default_rng(1)
@@ -166,7 +164,7 @@ def test_noise_is_smoothed_over_no_more_neighbours_than_are_flat() -> None:
 
 
 @pytest.mark.parametrize("n", [500, 3000])
-def test_noise_that_makes_distance_wrong_by_more_than_a_twentieth_is_said(n: int) -> None:
+def test_noise_that_makes_distance_wrong_by_more_than_a_twentieth_is_said(n):
     """What the warning says is the mean error, with as much noise along the surface as across it."""
     P, noise = sphere(n), np.random.default_rng(5).standard_normal((n, 3))
     PointCloud(P + 0.03 * noise).report()
@@ -179,7 +177,7 @@ def test_noise_that_makes_distance_wrong_by_more_than_a_twentieth_is_said(n: int
     )
 
 
-def test_one_point_in_a_hundred_is_an_outlier() -> None:
+def test_one_point_in_a_hundred_is_an_outlier():
     P = sphere(3000)
     strays = np.random.default_rng(3).uniform(-2, 2, (30, 3))
     cloud = PointCloud(np.concatenate([P, strays]))
@@ -191,7 +189,7 @@ def test_one_point_in_a_hundred_is_an_outlier() -> None:
     assert mean_error(found[:3000], arcs(P, 0)) < 0.003
 
 
-def test_density_that_grows_a_hundredfold() -> None:
+def test_density_that_grows_a_hundredfold():
     x, y = np.random.default_rng(0).random((2, 20_000))
     for across in ((100**x - 1) / 99, np.where(x < 0.5, x / 50, 2 * x - 1)):
         P = np.stack([across, y, np.zeros(len(x))], axis=1)
@@ -199,7 +197,7 @@ def test_density_that_grows_a_hundredfold() -> None:
         assert mean_error(found, np.linalg.norm(P - P[0], axis=1)) < 0.005
 
 
-def test_rows_ten_times_as_far_apart_as_their_points() -> None:
+def test_rows_ten_times_as_far_apart_as_their_points():
     x, y = np.meshgrid(np.linspace(0, 1, 200), np.linspace(0, 1, 20))
     P = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
     P[:, 0] += np.random.default_rng(0).normal(0, 1e-3, len(P))
@@ -208,7 +206,7 @@ def test_rows_ten_times_as_far_apart_as_their_points() -> None:
 
 
 @pytest.mark.parametrize("n", [4, 5, 8, 12, 20])
-def test_few_points_in_a_plane(n: int) -> None:
+def test_few_points_in_a_plane(n):
     """Distance is no shorter than a straight line, and equal to it if the way stays inside, as from most points."""
     P = plane(n, seed=n)
     cloud = PointCloud(P)
@@ -221,7 +219,7 @@ def test_few_points_in_a_plane(n: int) -> None:
 
 
 @pytest.mark.parametrize("shape", ["sphere", "Moebius strip"])
-def test_every_answer_at_a_copy_is_that_at_its_original(shape: str) -> None:
+def test_every_answer_at_a_copy_is_that_at_its_original(shape):
     """Places in faces are the same for every solver, and for the cloud without copies: faces hold originals alone."""
     distinct = sphere(300) if shape == "sphere" else surfaces.moebius_strip(40, 8).V
     of = np.concatenate([np.arange(len(distinct)), np.arange(40), np.arange(10)])
@@ -255,7 +253,7 @@ def two_sheets(n: int, gap: float) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([lower, upper]), np.repeat([[0, 0, -1.0], [0, 0, 1.0]], n, axis=0)
 
 
-def test_normals_keep_sheets_apart_that_nearly_touch() -> None:
+def test_normals_keep_sheets_apart_that_nearly_touch():
     P, normals = two_sheets(2000, 0.002)
     cloud = PointCloud(P, normals)
     assert (cloud.components[:2000] == cloud.components[0]).all()
@@ -265,7 +263,7 @@ def test_normals_keep_sheets_apart_that_nearly_touch() -> None:
     assert np.isfinite(distance[:2000]).all()
 
 
-def test_normals_that_are_none_of_the_surface_are_left_out() -> None:
+def test_normals_that_are_none_of_the_surface_are_left_out():
     P, normals = sphere(2000), sphere(2000, seed=1)
     with pytest.warns(AccuracyWarning, match="normals point to both sides .* pass normals=None") as caught:
         F = PointCloud(P, normals).F
@@ -275,7 +273,7 @@ def test_normals_that_are_none_of_the_surface_are_left_out() -> None:
 
 
 @pytest.mark.parametrize("turned", ["one in a hundred", "two in five", "a cap", "more than half"])
-def test_normals_that_point_to_the_other_side_are_turned(turned: str) -> None:
+def test_normals_that_point_to_the_other_side_are_turned(turned):
     """Single points, as estimates from neighbours are, and whole patches, which would be sheets of their own."""
     P, at_random = sphere(2000), np.random.default_rng(2).random(2000)
     masks = {"one in a hundred": at_random < 0.01, "two in five": at_random < 0.4}
@@ -288,7 +286,7 @@ def test_normals_that_point_to_the_other_side_are_turned(turned: str) -> None:
     assert volume * (1 if is_turned.mean() < 0.5 else -1) == pytest.approx(4 / 3 * np.pi, rel=0.02)
 
 
-def test_normals_of_a_surface_with_one_side_do_not_cut_it() -> None:
+def test_normals_of_a_surface_with_one_side_do_not_cut_it():
     """Along some line across a Moebius strip its normals change over, whatever they are."""
     u, v = np.random.default_rng(0).random((2, 2000)) * [[2 * np.pi], [0.8]] - [[0], [0.4]]
     along, across = np.array([-np.sin(u), np.cos(u), 0 * u]), np.array([np.cos(u), np.sin(u), 0 * u])
@@ -303,7 +301,7 @@ def test_normals_of_a_surface_with_one_side_do_not_cut_it() -> None:
 
 
 @pytest.mark.parametrize("thickness", [1.0, 1e-3])
-def test_normals_of_both_sides_of_a_thin_shell_are_oriented(thickness: float) -> None:
+def test_normals_of_both_sides_of_a_thin_shell_are_oriented(thickness):
     """Of two neighbours in three, or of every second one, the normals are opposite, and yet they do not contradict."""
     P = sphere(4000)
     outside = np.arange(4000) < 2000
@@ -313,7 +311,7 @@ def test_normals_of_both_sides_of_a_thin_shell_are_oriented(thickness: float) ->
 
 
 @pytest.mark.parametrize("gap", [0.5, 1.2])
-def test_two_sheets_nearer_than_the_spacing_are_said_to_be_one(gap: float) -> None:
+def test_two_sheets_nearer_than_the_spacing_are_said_to_be_one(gap):
     P, normals = two_sheets(1500, gap / np.sqrt(1500))
     with pytest.warns(AccuracyWarning, match=r"two sheets 0.0\d+ apart, .* pass PointCloud\(P, normals\)"):
         assert PointCloud(P).report().n_components == 1
@@ -322,7 +320,7 @@ def test_two_sheets_nearer_than_the_spacing_are_said_to_be_one(gap: float) -> No
     assert noisy.report().noise == pytest.approx(0.4 / np.sqrt(1500), rel=0.1)
 
 
-def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined() -> None:
+def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined():
     P = plane(400)
     found = PointCloud(np.concatenate([P, P[:3], [[0.5, 0.5, 2]]])).report()
     assert (found.n_copies, found.noise, found.doubtful_points.tolist()) == (3, 0, [])
@@ -337,7 +335,7 @@ def test_a_report_names_border_copies_and_points_where_sheets_may_be_joined() ->
     assert len(doubtful) > 5
 
 
-def test_borders_at_which_a_thin_part_is_torn_are_doubtful() -> None:
+def test_borders_at_which_a_thin_part_is_torn_are_doubtful():
     """Of a plate two and a half spacings thick, whose rim is closed in some places and open in others."""
     P, _ = two_sheets(1500, 2.5 / np.sqrt(1500))
     with pytest.warns(AccuracyWarning, match="or end at another sheet"):
@@ -377,12 +375,12 @@ BAD = {
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD.values(), ids=BAD.keys())
-def test_bad_arguments(arguments: tuple[np.ndarray, ...], message: str) -> None:
+def test_bad_arguments(arguments, message):
     with pytest.raises(MeshError, match=message):
         PointCloud(*arguments)
 
 
-def test_four_points_are_enough_and_arrays_are_read_only() -> None:
+def test_four_points_are_enough_and_arrays_are_read_only():
     cloud = PointCloud([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], 5 * np.ones((4, 3)))
     assert cloud.n_vertices == 4
     np.testing.assert_allclose(np.linalg.norm(cloud.normals, axis=1), 1)
@@ -394,7 +392,7 @@ def test_four_points_are_enough_and_arrays_are_read_only() -> None:
     )
 
 
-def test_points_without_triangles_are_an_error() -> None:
+def test_points_without_triangles_are_an_error():
     # Neighbours of opposite normals only: no point has two neighbours on its own sheet.
     P = plane(4)
     normals = np.array([[0, 0, 1.0], [0, 0, -1], [0, 0, 1], [0, 0, -1]])
@@ -424,7 +422,7 @@ def written(folder, kind: str, P: np.ndarray, N: np.ndarray):
 
 
 @pytest.mark.parametrize("kind", ["ply", "obj", "xyz", "npy"])
-def test_formats(tmp_path, kind: str) -> None:
+def test_formats(tmp_path, kind):
     P = sphere(40).astype(np.float32).astype(np.float64)
     cloud = read_point_cloud(written(tmp_path, kind, P, P))
     np.testing.assert_array_equal(cloud.P, P)
@@ -434,7 +432,7 @@ def test_formats(tmp_path, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["ply", "xyz", "npy"])
 @pytest.mark.parametrize("missing", [0.0, np.nan])
-def test_missing_normals_of_a_file_leave_all_out(tmp_path, kind: str, missing: float) -> None:
+def test_missing_normals_of_a_file_leave_all_out(tmp_path, kind, missing):
     """As programs write them that find no plane at an outlier."""
     P = sphere(40).astype(np.float32).astype(np.float64)
     path = written(tmp_path, kind, P, with_entry(P, 7, missing))
@@ -448,7 +446,7 @@ def test_missing_normals_of_a_file_leave_all_out(tmp_path, kind: str, missing: f
 
 
 @pytest.mark.parametrize("kind", ["xyz", "npy"])
-def test_colours_are_no_normals(tmp_path, kind: str) -> None:
+def test_colours_are_no_normals(tmp_path, kind):
     P = sphere(40)
     colours = np.random.default_rng(0).integers(0, 256, (40, 3))
     for columns in (colours, colours / 255, np.full((40, 3), 128)):
@@ -458,7 +456,7 @@ def test_colours_are_no_normals(tmp_path, kind: str) -> None:
     np.testing.assert_array_equal(read_point_cloud(written(tmp_path, kind, P, upwards)).normals, upwards)
 
 
-def test_faces_of_a_mesh_are_ignored(tmp_path) -> None:
+def test_faces_of_a_mesh_are_ignored(tmp_path):
     mesh = shapes.icosphere(1)
     for name in ("mesh.ply", "mesh.obj"):
         heat_igl.write_mesh(tmp_path / name, mesh)
@@ -479,13 +477,13 @@ def test_faces_of_a_mesh_are_ignored(tmp_path) -> None:
         ("a.las", "", "unknown extension '.las'; the formats are .ply, .obj, .xyz, .npy"),
     ],
 )
-def test_bad_files(tmp_path, name: str, text: str, message: str) -> None:
+def test_bad_files(tmp_path, name, text, message):
     (tmp_path / name).write_text(text)
     with pytest.raises(MeshError, match=message):
         read_point_cloud(tmp_path / name)
 
 
-def test_attributes_of_points_go_to_ply(tmp_path) -> None:
+def test_attributes_of_points_go_to_ply(tmp_path):
     cloud = PointCloud(sphere(40), sphere(40))
     heat_igl.write_point_cloud(tmp_path / "a.ply", cloud, distance=np.append(np.inf, np.arange(39.0)))
     again = read_point_cloud(tmp_path / "a.ply")
@@ -503,7 +501,7 @@ def test_attributes_of_points_go_to_ply(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["ply", "obj", "xyz", "npy"])
-def test_the_command_line_takes_clouds(tmp_path, kind: str, capsys) -> None:
+def test_the_command_line_takes_clouds(tmp_path, kind, capsys):
     pytest.importorskip("typer")
     P = sphere(40).astype(np.float32).astype(np.float64)
     path, out = written(tmp_path, kind, P, P), tmp_path / "out.npy"
@@ -519,7 +517,7 @@ def test_the_command_line_takes_clouds(tmp_path, kind: str, capsys) -> None:
         assert "--points" in capsys.readouterr().err
 
 
-def test_a_file_with_faces_is_a_mesh(tmp_path, capsys) -> None:
+def test_a_file_with_faces_is_a_mesh(tmp_path, capsys):
     pytest.importorskip("typer")
     for name in ("mesh.ply", "mesh.obj"):
         heat_igl.write_mesh(tmp_path / name, shapes.icosphere(1))
@@ -534,7 +532,7 @@ def test_a_file_with_faces_is_a_mesh(tmp_path, capsys) -> None:
 # Pictures.
 
 
-def test_discs_lie_in_the_tangent_planes_and_continue_the_values() -> None:
+def test_discs_lie_in_the_tangent_planes_and_continue_the_values():
     P = plane(400)
     cloud = PointCloud(P)
     slope = np.array([3.0, -2.0, 0.0])
@@ -557,7 +555,7 @@ def test_discs_lie_in_the_tangent_planes_and_continue_the_values() -> None:
 
 
 @pytest.mark.parametrize(("angle", "width", "n_loops"), [(20, 1.1, 1), (180, 1.1, 1), (180, 3.6, 2)])
-def test_loops_of_outer_edges_are_filled_in_space(angle: float, width: float, n_loops: int) -> None:
+def test_loops_of_outer_edges_are_filled_in_space(angle, width, n_loops):
     """Holes in a fold, where tangent planes show no gap, and where it is flat: the border and wide holes stay."""
     mesh = heat_igl.shapes.grid(40)
     x, y, _ = (mesh.V - mesh.V.mean(axis=0)).T
@@ -571,7 +569,7 @@ def test_loops_of_outer_edges_are_filled_in_space(angle: float, width: float, n_
     assert heat_igl.Mesh(P, filled).report().n_boundary_loops == n_loops
 
 
-def test_the_border_of_a_small_piece_is_no_gap() -> None:
+def test_the_border_of_a_small_piece_is_no_gap():
     ball = heat_igl.shapes.icosphere(2)
     F = ball.F[(ball.V[:, 2] > 0.5)[ball.F].all(axis=1)].astype(np.int32)
     n = ball.n_vertices
@@ -584,7 +582,7 @@ def is_a_surface(F: np.ndarray, n: int) -> bool:
 
 
 @pytest.mark.parametrize(("around_tube", "around_hole"), [(12, 24), (18, 18), (30, 30), (50, 50), (24, 60)])
-def test_points_of_a_regular_torus_make_a_closed_surface(around_tube: int, around_hole: int) -> None:
+def test_points_of_a_regular_torus_make_a_closed_surface(around_tube, around_hole):
     """Four points of each cell lie on a circle, and three points of a meridian on a line in a tangent plane."""
     mesh = shapes.torus(around_tube, around_hole)
     cloud = PointCloud(mesh.V)
@@ -601,7 +599,7 @@ def test_points_of_a_regular_torus_make_a_closed_surface(around_tube: int, aroun
     np.testing.assert_allclose(np.linalg.norm(found.gradient[1:], axis=1), 1, atol=1e-6)
 
 
-def test_of_several_fans_at_a_vertex_the_largest_stays() -> None:
+def test_of_several_fans_at_a_vertex_the_largest_stays():
     F = shapes.grid(6).F.astype(np.int32)
     n = int(F.max()) + 1
     at = n // 2
@@ -618,7 +616,7 @@ def test_of_several_fans_at_a_vertex_the_largest_stays() -> None:
     assert (heat_igl.Mesh(np.eye(n, 3), kept).components == 0).all()
 
 
-def test_fans_stay_that_are_the_only_connection() -> None:
+def test_fans_stay_that_are_the_only_connection():
     F = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 5, 6], [0, 6, 7]], np.int32)
     is_pinched = pinched_vertices(F, np.zeros(8, bool))
     assert is_pinched.tolist() == [True] + 7 * [False]
@@ -628,7 +626,7 @@ def test_fans_stay_that_are_the_only_connection() -> None:
 # Neighbours.
 
 
-def test_points_come_before_their_nearest() -> None:
+def test_points_come_before_their_nearest():
     """Even if squares of distances underflow, so that others are as near as the point itself."""
     P = np.random.default_rng(0).standard_normal((300, 3))
     P[1:40] = P[0] * (1 + 1e-15 * np.arange(1, 40)[:, None])
@@ -644,7 +642,7 @@ def test_points_come_before_their_nearest() -> None:
 
 
 @pytest.mark.parametrize(("n", "k"), [(5, 5), (9, 3), (2000, 1), (2000, 31), (2000, 400)])
-def test_nearest_points_of_places_in_any_order(n: int, k: int) -> None:
+def test_nearest_points_of_places_in_any_order(n, k):
     """Places jump across the cloud, lie far away from it, and come twice."""
     rng = np.random.default_rng(n + k)
     tree = point_tree(rng.standard_normal((n, 3)) * 10.0 ** rng.integers(-3, 1, (n, 1)))
@@ -657,7 +655,7 @@ def test_nearest_points_of_places_in_any_order(n: int, k: int) -> None:
     np.testing.assert_allclose(distance[::2], np.sort(far, axis=1)[:, k - 1], rtol=1e-12)
 
 
-def test_principal_axes() -> None:
+def test_principal_axes():
     """They are numpy's eigenvectors."""
     P = np.random.default_rng(0).uniform(-1, 1, (41, 3)) * [1, 0.8, 0.2]
     index = np.argsort(np.linalg.norm(P - P[0], axis=1)).astype(np.int32)[None]
@@ -676,7 +674,7 @@ def test_principal_axes() -> None:
 
 @pytest.mark.filterwarnings("ignore:the points do not tell their surface")  # at the borders of both
 @pytest.mark.parametrize("gap", [2.0, 3.0, 5.0])
-def test_sheets_without_normals_stay_apart(gap: float) -> None:
+def test_sheets_without_normals_stay_apart(gap):
     """In spacings; in the neighbourhoods of 30 points there are points of both sheets."""
     n = 1500
     P, _ = two_sheets(n, gap / np.sqrt(n))
@@ -689,7 +687,7 @@ def test_sheets_without_normals_stay_apart(gap: float) -> None:
     assert not joins.any()
 
 
-def test_the_two_sides_of_a_thin_disc() -> None:
+def test_the_two_sides_of_a_thin_disc():
     """Its rim joins them: the distance to the point opposite the centre is that over the rim."""
     rng, n, thickness = np.random.default_rng(3), 3000, 0.12
     radius, angle = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
@@ -719,7 +717,7 @@ def moebius_strip(m: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(ends), np.concatenate([np.stack([a, c, b], 1), np.stack([c, d, b], 1)]).astype(np.int32)
 
 
-def test_triangles_that_contradict_are_left_out_if_they_are_few_and_on_a_fold() -> None:
+def test_triangles_that_contradict_are_left_out_if_they_are_few_and_on_a_fold():
     P, F = moebius_strip(1000)
     creased = P.copy()
     creased[[0, 1000], 2] += 0.1  # across the strip: the two sides of this rung nearly lie on each other
@@ -732,7 +730,7 @@ def test_triangles_that_contradict_are_left_out_if_they_are_few_and_on_a_fold() 
         np.testing.assert_array_equal(np.sort(oriented(*flat, None)[0], axis=1), np.sort(flat[1], axis=1))
 
 
-def test_neighbours_across_a_right_angle_stay() -> None:
+def test_neighbours_across_a_right_angle_stay():
     P = plane(2000)
     folded = np.where(P[:, :1] < 0.5, P, np.stack([0 * P[:, 0] + 0.5, P[:, 1], P[:, 0] - 0.5], axis=1))
     index, _ = point_tree(folded).neighbours
@@ -740,7 +738,7 @@ def test_neighbours_across_a_right_angle_stay() -> None:
     assert (kept[:, :8] >= 0).mean() > 0.99
 
 
-def test_the_star_of_a_point_on_an_edge_is_that_of_the_unfolded_points() -> None:
+def test_the_star_of_a_point_on_an_edge_is_that_of_the_unfolded_points():
     from scipy.spatial import KDTree
 
     flat = plane(600)
@@ -757,7 +755,7 @@ def test_the_star_of_a_point_on_an_edge_is_that_of_the_unfolded_points() -> None
     index = KDTree(flat).query(flat, 31)[1].astype(np.int32)
     largest = np.full(600, 0.1)
 
-    def stars(P: np.ndarray, axes: np.ndarray) -> set[tuple[int, ...]]:
+    def stars(P, axes):
         corners = delaunay_stars(P, axes, index, largest, np.full(600, -2.0), 0, 40)[0]
         return {tuple(row) for row in np.sort(corners, axis=1).tolist()}
 
@@ -766,7 +764,7 @@ def test_the_star_of_a_point_on_an_edge_is_that_of_the_unfolded_points() -> None
     assert len(expected ^ stars(folded, axes)) < 0.3 * len(expected ^ projected)
 
 
-def test_fans_that_meet_in_a_point_are_joined() -> None:
+def test_fans_that_meet_in_a_point_are_joined():
     """Two squares with a corner in common, and the triangle between them where they are nearest."""
     P = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1.5, 1.2, 0.3], [2, 2, 0], [1.2, 2, 0]], float)
     F = np.array([[0, 1, 2], [0, 2, 3], [2, 4, 5], [2, 5, 6]], np.int32)
@@ -775,7 +773,7 @@ def test_fans_that_meet_in_a_point_are_joined() -> None:
     assert np.sort(joined[4:], axis=1).tolist() == [[2, 3, 6]]
 
 
-def test_vectors_on_both_sides_are_those_on_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_vectors_on_both_sides_are_those_on_one(monkeypatch):
     """On a surface that can be oriented, the sides are two parts, and the second must change nothing."""
     cloud = PointCloud(sphere(800))
     given = [[1.0, 0.3], [-0.2, 0.5]]
@@ -794,7 +792,7 @@ def test_vectors_on_both_sides_are_those_on_one(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.filterwarnings("ignore:heat is off")
-def test_vectors_pass_the_line_along_which_a_surface_with_one_side_changes_orientation() -> None:
+def test_vectors_pass_the_line_along_which_a_surface_with_one_side_changes_orientation():
     """From a point on the line where the triangles of a Moebius strip contradict, as on a piece with two sides."""
     turn, side = np.random.default_rng(0).random((2, 3000)) * [[2 * np.pi], [0.8]] - [[0], [0.4]]
     out = 1 + side * np.cos(turn / 2)

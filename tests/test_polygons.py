@@ -1,7 +1,5 @@
 """Polygon meshes: their triangles and virtual vertices, libigl's matrices, and how far off the distances are."""
 
-from __future__ import annotations
-
 import pickle
 
 import igl

@@ -1,7 +1,5 @@
 """The public contract: names, arguments and defaults that stay. Later arguments are by keyword and have defaults."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 
@@ -76,13 +74,13 @@ cluster.distances(meshes, sources, store)
 
 
 @pytest.mark.parametrize("line", CONTRACT)
-def test_a_name_takes_the_arguments_of_the_contract(line: str) -> None:
+def test_a_name_takes_the_arguments_of_the_contract(line):
     name, _, arguments = line.partition("(")
     if name.startswith("cluster"):
         pytest.importorskip("distributed")
-    names: dict[str, object] = {}
+    names = {}
     exec(f"def promised({arguments}: ...", names)
-    promised = inspect.signature(names["promised"]).parameters  # type: ignore[arg-type]
+    promised = inspect.signature(names["promised"]).parameters
     found = inspect.signature(functools.reduce(getattr, name.split("."), heat_igl)).parameters
     for (argument, wanted), (there, has) in zip(promised.items(), found.items(), strict=False):
         if wanted.kind is not wanted.KEYWORD_ONLY:  # in this place
@@ -94,7 +92,7 @@ def test_a_name_takes_the_arguments_of_the_contract(line: str) -> None:
         assert found[argument].kind is found[argument].VAR_KEYWORD or found[argument].default is not inspect._empty
 
 
-def test_results_hold_what_the_contract_says() -> None:
+def test_results_hold_what_the_contract_says():
     mesh = heat_igl.shapes.grid(8)
     n, m = mesh.n_vertices, mesh.n_faces
     assert (mesh.V.shape, mesh.F.shape, mesh.components.shape) == ((n, 3), (m, 3), (n,))

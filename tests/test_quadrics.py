@@ -1,7 +1,5 @@
 """Quadrics through the neighbours of points of a cloud, against least squares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ rng = np.random.default_rng
 
 
 @pytest.mark.parametrize("k", [16, 31, 34, 61])
-def test_a_quadric_is_that_of_weighted_least_squares(k: int) -> None:
+def test_a_quadric_is_that_of_weighted_least_squares(k):
     P = rng(7).random((400, 3)) * [1, 1, 0.1]
     tree = point_tree(P)
     index, _ = tree.nearest(np.arange(400), k)
@@ -32,7 +30,7 @@ def test_a_quadric_is_that_of_weighted_least_squares(k: int) -> None:
         assert deviation[i] == pytest.approx(np.sqrt(squares / max(1 - 6 / (k - 1), 0.5)), rel=1e-6)
 
 
-def test_a_point_of_a_paraboloid_stays_on_it() -> None:
+def test_a_point_of_a_paraboloid_stays_on_it():
     x, y = rng(8).uniform(-1, 1, (2, 20))
     x, y = np.append(x, -x), np.append(y, -y)
     P = np.stack([x, y, 0.3 * x**2 - 0.2 * x * y + 0.1 * y**2], axis=1)

@@ -1,14 +1,11 @@
 """References: the exact solvers against each other, closed forms and independent bounds; the guard around them all."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import igl
 import numpy as np
@@ -65,7 +62,7 @@ def flat_torus(n: int, m: int) -> tuple[Mesh, FloatArray, FloatArray]:
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.filterwarnings("ignore:.*no face uses 1617")  # of the airplane
 @pytest.mark.parametrize("name", ["cow.obj", "airplane.obj", "bone.ply", "cube.obj", "trefoil", "elbow", "dust"])
-def test_exact_solvers_agree(name: str) -> None:
+def test_exact_solvers_agree(name):
     mesh = read_mesh(wheel_path(name)) if "." in name else zoo(name)
     source = source_on_largest_component(mesh, 0)
     truth = reference.exact(mesh, source)
@@ -77,7 +74,7 @@ def test_exact_solvers_agree(name: str) -> None:
 
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_exact_from_several_sources_is_the_minimum_over_them(solver: str) -> None:
+def test_exact_from_several_sources_is_the_minimum_over_them(solver):
     mesh = cow()
     sources = [5, 1200, 2800]
     alone = np.min([reference.exact(mesh, source, solver=solver) for source in sources], axis=0)
@@ -86,7 +83,7 @@ def test_exact_from_several_sources_is_the_minimum_over_them(solver: str) -> Non
     assert (together[sources] == 0).all()
 
 
-def test_exact_is_approached_from_above_by_independent_paths() -> None:
+def test_exact_is_approached_from_above_by_independent_paths():
     # A path that crosses an edge between two of its points is longer than a straight one by a second order in their
     # spacing: twice as many points, a quarter of the excess.
     smooth = shapes.icosphere(2)
@@ -106,14 +103,14 @@ def test_exact_is_approached_from_above_by_independent_paths() -> None:
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("factor", [1e-9, 1e6])
-def test_exact_does_not_depend_on_the_unit(solver: str, factor: float) -> None:
+def test_exact_does_not_depend_on_the_unit(solver, factor):
     mesh = cow()
     truth = reference.exact(mesh, 2470, solver=solver) * factor
     assert relative_error(reference.exact(Mesh(mesh.V * factor, mesh.F), 2470, solver=solver), truth).max() < 1e-9
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_exact_is_inf_beyond_the_component_and_at_unreferenced_vertices() -> None:
+def test_exact_is_inf_beyond_the_component_and_at_unreferenced_vertices():
     one = rectangle(6, 6, 1, 1)
     n = one.n_vertices
     mesh = Mesh(np.vstack([[[9.0, 9, 9]], one.V, one.V + np.array([3, 0, 0])]), np.vstack([one.F + 1, one.F + 1 + n]))
@@ -137,7 +134,7 @@ def bow() -> Mesh:
     return Mesh([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
 
 
-def test_other_exact_solvers_refuse_small_examples_of_the_same() -> None:
+def test_other_exact_solvers_refuse_small_examples_of_the_same():
     with pytest.raises(ReferenceSolverError, match=r"1 edges .* more than two triangles \(first: \[0, 1\]\)"):
         reference.exact(fin(), 0, solver="igl")
     with pytest.raises(ReferenceSolverError, match=r"at 1 vertices .* touch in a point \(first: 0\)"):
@@ -145,7 +142,7 @@ def test_other_exact_solvers_refuse_small_examples_of_the_same() -> None:
     assert np.isfinite(reference.exact(Mesh(fin().V, fin().F[:2]), 0, solver="igl")[:4]).all()
 
 
-def test_exact_takes_small_examples_of_the_same() -> None:
+def test_exact_takes_small_examples_of_the_same():
     # Unfolded, two pages are a square: from the tip of one to that of the other is straight across the edge.
     np.testing.assert_allclose(reference.exact(fin(), 2), [1, np.sqrt(2), 0, 2, 2], rtol=1e-14)
     np.testing.assert_allclose(reference.exact(bow(), 1), np.sqrt(2) * np.array([1, 0, np.sqrt(2), 2, 2]), rtol=1e-14)
@@ -153,14 +150,14 @@ def test_exact_takes_small_examples_of_the_same() -> None:
 
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_exact_accepts_a_good_component_of_a_bad_mesh(solver: str) -> None:
+def test_exact_accepts_a_good_component_of_a_bad_mesh(solver):
     good = rectangle(5, 5, 1, 1)
     mesh = Mesh(np.concatenate([fin().V + 5, good.V]), np.concatenate([fin().F, good.F + 5]))
     distance = reference.exact(mesh, 5, solver=solver)
     assert np.array_equal(np.isfinite(distance), np.arange(mesh.n_vertices) >= 5)
 
 
-def test_other_exact_solvers_refuse_edges_without_length() -> None:
+def test_other_exact_solvers_refuse_edges_without_length():
     mesh = rectangle(5, 5, 1, 1)
     V = mesh.V.copy()
     V[mesh.F[0, 0]] = V[mesh.F[0, 1]]
@@ -171,7 +168,7 @@ def test_other_exact_solvers_refuse_edges_without_length() -> None:
     assert abs(distance[mesh.F[0, 0]] - distance[mesh.F[0, 1]]) < 1e-7
 
 
-def test_exact_refuses_tetrahedra_and_unknown_solvers() -> None:
+def test_exact_refuses_tetrahedra_and_unknown_solvers():
     box = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
     with pytest.raises(ReferenceSolverError, match=r"closed_forms\.convex_solid"):
         reference.exact(box, 0)
@@ -184,7 +181,7 @@ def test_exact_refuses_tetrahedra_and_unknown_solvers() -> None:
 # --- closed forms ----------------------------------------------------------------------------------------------------
 
 
-def test_plane_is_exact() -> None:
+def test_plane_is_exact():
     mesh = rectangle(12, 9, 2, 1, jitter=0.4)
     for sources in (0, [3, 50, 77]):
         np.testing.assert_allclose(closed_forms.plane(mesh, sources), reference.exact(mesh, sources), atol=1e-9)
@@ -194,7 +191,7 @@ def test_plane_is_exact() -> None:
         closed_forms.plane(Mesh(mesh.V, mesh.F[20:]), 0)
 
 
-def test_flat_torus_is_exact() -> None:
+def test_flat_torus_is_exact():
     mesh, coordinates, periods = flat_torus(12, 9)
     for sources in (0, [40, 111]):
         closed = closed_forms.flat_torus(coordinates, sources, periods=periods)
@@ -212,9 +209,7 @@ def test_flat_torus_is_exact() -> None:
     ],
     ids=["cylinder", "cone", "sphere"],
 )
-def test_exact_tends_to_the_smooth_surface_with_the_square_of_the_edge(
-    build: Callable[[int], Mesh], closed: Callable[[Mesh, int], FloatArray]
-) -> None:
+def test_exact_tends_to_the_smooth_surface_with_the_square_of_the_edge(build, closed):
     errors = []
     for level in range(4):
         mesh = build(level)
@@ -227,7 +222,7 @@ def test_exact_tends_to_the_smooth_surface_with_the_square_of_the_edge(
 
 
 @pytest.mark.slow
-def test_exact_on_a_fine_sphere() -> None:
+def test_exact_on_a_fine_sphere():
     mesh = shapes.icosphere(7)
     found = reference.measured("pygeodesic", mesh, 5)
     # Inscribed with edges of h = 0.0094, the polyhedron is shorter by a fraction of h^2 = 9e-5.
@@ -235,7 +230,7 @@ def test_exact_on_a_fine_sphere() -> None:
     assert found.peak_memory is None or 1e9 < found.peak_memory < 4e9
 
 
-def test_closed_forms_refuse_other_shapes() -> None:
+def test_closed_forms_refuse_other_shapes():
     with pytest.raises(ReferenceSolverError, match="distance from the center varies"):
         closed_forms.sphere(shapes.cylinder(8, 5), 0)
     with pytest.raises(ReferenceSolverError, match="distance from the z axis varies"):
@@ -246,7 +241,7 @@ def test_closed_forms_refuse_other_shapes() -> None:
         closed_forms.convex_solid(shapes.icosphere(1), 0)
 
 
-def test_convex_solid_is_the_straight_line() -> None:
+def test_convex_solid_is_the_straight_line():
     points = np.random.default_rng(2).uniform(size=(60, 3))
     mesh = Mesh(points, Delaunay(points).simplices)
     truth = np.linalg.norm(points[:, None] - points[[4, 9]], axis=2).min(axis=1)
@@ -259,7 +254,7 @@ def test_convex_solid_is_the_straight_line() -> None:
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_heat_filter_of_meshlab_survives_an_offset() -> None:
+def test_heat_filter_of_meshlab_survives_an_offset():
     mesh = cow()
     near = reference.meshlab_heat(mesh, 5)
     assert 0 < relative_error(near, reference.exact(mesh, 5)).mean() < 0.1
@@ -278,7 +273,7 @@ INEXACT: dict[str, Callable[..., FloatArray]] = {
 
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("name", INEXACT)
-def test_unreachable_is_inf_in_all(name: str) -> None:
+def test_unreachable_is_inf_in_all(name):
     mesh, n = cow(), cow().n_vertices
     pair = Mesh(np.vstack([mesh.V, mesh.V + 5, [[0, 0, 0]]]), np.vstack([mesh.F, mesh.F + n]))
     distance = INEXACT[name](pair, [3, 900])
@@ -290,7 +285,7 @@ def test_unreachable_is_inf_in_all(name: str) -> None:
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_igl_heat_is_what_libigl_computes() -> None:
+def test_igl_heat_is_what_libigl_computes():
     mesh = cow()
     for intrinsic in (False, True):
         data = igl.HeatGeodesicsData()
@@ -305,7 +300,7 @@ def test_igl_heat_is_what_libigl_computes() -> None:
 # --- the guard -------------------------------------------------------------------------------------------------------
 
 
-def test_a_crash_is_an_error_and_the_next_call_works() -> None:
+def test_a_crash_is_an_error_and_the_next_call_works():
     mesh = rectangle(5, 5, 1, 1)
     before = reference.exact(mesh, 0, solver="igl")
     with pytest.raises(ReferenceSolverError, match=r"os:abort died with (SIGABRT|exit status).*mesh\.report\(\)"):
@@ -314,7 +309,7 @@ def test_a_crash_is_an_error_and_the_next_call_works() -> None:
 
 
 @pytest.mark.parametrize("function", ["pygeodesic_exact", "igl_exact", "meshlab_front", "igl_heat"])
-def test_an_index_out_of_range_takes_nothing_down(function: str) -> None:
+def test_an_index_out_of_range_takes_nothing_down(function):
     mesh = rectangle(4, 4, 1, 1)
     F = mesh.F.copy()
     F[3, 1] = 10**6
@@ -327,7 +322,7 @@ def test_an_index_out_of_range_takes_nothing_down(function: str) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signal.pause")
-def test_a_hang_is_stopped() -> None:
+def test_a_hang_is_stopped():
     start = time.perf_counter()
     with pytest.raises(ReferenceSolverError, match=r"signal:pause was stopped after 0\.5 s: raise timeout"):
         guarded.call("signal:pause", {}, timeout=0.5)
@@ -336,7 +331,7 @@ def test_a_hang_is_stopped() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the bound needs Linux")
-def test_memory_is_bounded() -> None:
+def test_memory_is_bounded():
     with pytest.raises(ReferenceSolverError, match=r"numpy:ones needs more than 0\.25 GiB: raise memory"):
         guarded.call("numpy:ones", {}, {"shape": 2**27}, memory=2**28)
     assert (guarded.call("numpy:ones", {}, {"shape": 2**27}, memory=2**31).peak_memory or 2**30) > 2**29
@@ -357,12 +352,10 @@ def test_memory_is_bounded() -> None:
     ],
     ids=["empty", "nan", "short", "long"],
 )
-def test_what_is_no_distance_is_an_error(
-    change: Callable[[FloatArray], FloatArray], message: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_no_distance_is_an_error(change, message, monkeypatch):
     mesh, original = rectangle(5, 5, 1, 1), guarded.call
 
-    def changed(*args: Any, **options: Any) -> guarded.Reply:
+    def changed(*args, **options):
         reply = original(*args, **options)
         reply.values["distance"] = change(reply.values["distance"])
         return reply
@@ -373,7 +366,7 @@ def test_what_is_no_distance_is_an_error(
         reference.exact(mesh, 0, solver="igl")
 
 
-def test_a_missing_package_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_names_its_extra(monkeypatch):
     monkeypatch.setattr(measurement, "find_spec", lambda name: object() if name == "igl" else None)
     mesh = rectangle(3, 3, 1, 1)
     with pytest.raises(MissingExtraError, match="needs pymeshlab: pip install pymeshlab"):
@@ -384,14 +377,14 @@ def test_a_missing_package_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> N
         np.testing.assert_allclose(reference.exact(mesh, 0, solver=solver), closed_forms.plane(mesh, 0))
 
 
-def test_a_library_that_does_not_load_is_one_line() -> None:
+def test_a_library_that_does_not_load_is_one_line():
     with pytest.raises(ReferenceSolverError, match="no_such_module:run cannot be loaded: No module named") as caught:
         guarded.call("no_such_module:run", {})
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="needs a high-water mark")
-def test_arrays_cross_without_a_copy() -> None:
+def test_arrays_cross_without_a_copy():
     big = np.ones(2**24)
     guarded.call("numpy:sum", {"a": big[:10]})
     with PeakMemory() as peak:
@@ -418,13 +411,13 @@ os._exit(0)  # nobody waits for the child any more
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signal.pause")
-def test_a_hanging_child_does_not_outlive_a_killed_caller_for_long() -> None:
+def test_a_hanging_child_does_not_outlive_a_killed_caller_for_long():
     found = subprocess.run([sys.executable, "-c", ABANDON], capture_output=True, text=True, check=True)
     child = psutil.Process(int(found.stdout))
     assert child.is_running()
     assert psutil.wait_procs([child], timeout=20)[0]
 
 
-def test_memory_of_a_solver_is_without_that_of_its_library() -> None:
+def test_memory_of_a_solver_is_without_that_of_its_library():
     pytest.importorskip("pymeshlab")  # which takes 50 MB
     assert (reference.measured("meshlab", rectangle(5, 5, 1, 1), 0).peak_memory or 0) < 2e7

@@ -1,7 +1,5 @@
 """Distances in a region are those on the mesh cut out of the whole, under the numbers of the whole."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

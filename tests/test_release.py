@@ -1,7 +1,5 @@
 """What a release says of itself agrees: versions, supported Pythons, extras, and the files that workflows name."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import tomllib
@@ -23,25 +21,25 @@ def loaded(path: str | Path) -> dict[Any, Any]:
     return yaml.safe_load((ROOT / path).read_text(encoding="utf8"))
 
 
-def test_versions_agree() -> None:
+def test_versions_agree():
     assert loaded("CITATION.cff")["version"] == heat_igl.__version__
     assert loaded("packaging/conda/recipe.yaml")["context"]["version"] == heat_igl.__version__
 
 
-def test_every_supported_python_is_tested() -> None:
+def test_every_supported_python_is_tested():
     tested = loaded(".github/workflows/tests.yml")["jobs"]["tests"]["strategy"]["matrix"]["python"]
     classified = [text.rpartition(" ")[2] for text in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", text)]
     assert tested == classified
     assert PROJECT["requires-python"] == f">={tested[0]}"
 
 
-def test_all_brings_every_extra_but_the_largest() -> None:
+def test_all_brings_every_extra_but_the_largest():
     extras = PROJECT["optional-dependencies"]
     (everything,) = extras["all"]
     assert set(re.search(r"\[(.*)\]", everything)[1].split(",")) == extras.keys() - {"all", "torch"}
 
 
-def test_the_recipe_needs_what_the_package_needs() -> None:
+def test_the_recipe_needs_what_the_package_needs():
     needed = {re.split(r"[>=]", text)[0] for text in PROJECT["dependencies"]}
     names = {text.split()[0] for text in loaded("packaging/conda/recipe.yaml")["requirements"]["run"]}
     run = {"libigl" if name == "igl" else name for name in names}  # its name on conda-forge
@@ -49,7 +47,7 @@ def test_the_recipe_needs_what_the_package_needs() -> None:
 
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
-def test_workflows_may_do_no_more_than_they_need(path: Path) -> None:
+def test_workflows_may_do_no_more_than_they_need(path):
     workflow = loaded(path)
     assert workflow["permissions"] == {"contents": "read"}
     granted = [job["permissions"] for job in workflow["jobs"].values() if "permissions" in job]
@@ -63,7 +61,7 @@ LINK = r"\]\((?!https?:|mailto:)([^)#]*)#?([^)]*)\)"
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_relative_links_lead_to_files_and_headings(name: str) -> None:
+def test_relative_links_lead_to_files_and_headings(name):
     for path, heading in re.findall(LINK, (ROOT / name).read_text(encoding="utf8")):
         target = ROOT / (path or name)
         assert target.exists(), path
@@ -72,7 +70,7 @@ def test_relative_links_lead_to_files_and_headings(name: str) -> None:
         assert not heading or heading in headings, f"{path}#{heading}"
 
 
-def test_an_index_of_packages_shows_no_relative_link() -> None:
+def test_an_index_of_packages_shows_no_relative_link():
     spec = importlib.util.spec_from_file_location("setup_script", ROOT / "setup.py")
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
@@ -82,7 +80,7 @@ def test_an_index_of_packages_shows_no_relative_link() -> None:
     assert f"({PROJECT['urls']['Repository']}/blob/main/docs/exact.md)" in text
 
 
-def test_contributing_names_what_exists() -> None:
+def test_contributing_names_what_exists():
     """Files between backticks, in the repository or in the package; commands begin with something that is there."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf8")
     for name in re.findall(r"`([\w./]+(?:\.(?:py|toml|md|yml|yaml|cff)|/))`", text):

@@ -1,7 +1,5 @@
 """Farthest points, Voronoi cells and their dual, centres, diameters, matrices: against closed forms and definitions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
@@ -12,7 +10,7 @@ from heat_igl.mesh import Mesh
 
 
 @pytest.fixture(scope="module")
-def square() -> tuple[Mesh, heat_igl.HeatMethodSolver]:
+def square():
     """A flat square, where the sweep is exact."""
     mesh = shapes.grid(20)
     return mesh, heat_igl.GeodesicSolver(mesh, method="sweep")

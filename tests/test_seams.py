@@ -1,7 +1,5 @@
 """Texture seams: what a loader split is measured as one where that is asked for, and nothing else is joined."""
 
-from __future__ import annotations
-
 import warnings
 from types import SimpleNamespace
 
@@ -31,21 +29,21 @@ def charts(mesh: Mesh, kind: str, seed: int) -> np.ndarray:
 
 
 @pytest.fixture(params=["halves", "cells", "faces"])
-def torn(request) -> tuple[Mesh, Mesh, np.ndarray]:
+def torn(request):
     """A surface, the same with seams that are merged, and which of its vertices each of those was."""
     whole = shapes.torus(20, 12)
     parts, was = split(whole, charts(whole, request.param, 3))
     return whole, as_mesh(parts, merge="seams"), was
 
 
-def test_a_split_model_is_measured_as_one(torn) -> None:
+def test_a_split_model_is_measured_as_one(torn):
     whole, joined, was = torn
     assert joined.report().seam_edges.size == joined.report().unreferenced_vertices.size == 0
     assert joined.with_vertices(2 * joined.V).has_copies
     source = int(np.argmax(joined.originals != np.arange(len(was))))  # a copy
     region, region_of_whole = joined.V[:, 0] > -0.5, whole.V[:, 0] > -0.5
 
-    def of_both(answer) -> None:
+    def of_both(answer):
         found, truth = answer(joined, source, region), answer(whole, was[source], region_of_whole)[was]
         np.testing.assert_allclose(found, truth, rtol=1e-12, atol=1e-12)
 
@@ -68,7 +66,7 @@ def test_a_split_model_is_measured_as_one(torn) -> None:
     assert path.length == pytest.approx(truth, rel=1e-12)
 
 
-def test_heat_takes_a_split_model_as_one(torn) -> None:
+def test_heat_takes_a_split_model_as_one(torn):
     whole, joined, was = torn
     source = int(np.argmax(joined.originals != np.arange(len(was))))
     for make in (heat_igl.HeatMethodSolver, heat_igl.VectorHeatSolver):
@@ -89,7 +87,7 @@ def test_heat_takes_a_split_model_as_one(torn) -> None:
     )
 
 
-def test_a_slit_that_leaves_one_piece_is_closed() -> None:
+def test_a_slit_that_leaves_one_piece_is_closed():
     n = 24
     angle, height = np.meshgrid(np.linspace(0, 2 * np.pi, n + 1), np.arange(5.0))
     angle[:, -1] = 0  # the same positions, another column of vertices, as texture coordinates need
@@ -110,7 +108,7 @@ def with_copy(mesh: Mesh, V: np.ndarray, flipped: bool) -> Mesh:
 
 
 @pytest.mark.parametrize("flipped", [False, True])
-def test_a_sheet_on_another_is_left_alone(flipped: bool) -> None:
+def test_a_sheet_on_another_is_left_alone(flipped):
     sheet = shapes.grid(5)
     double = with_copy(sheet, sheet.V, flipped)
     with pytest.warns(heat_igl.AccuracyWarning, match="places: 20"):
@@ -120,7 +118,7 @@ def test_a_sheet_on_another_is_left_alone(flipped: bool) -> None:
 
 @pytest.mark.filterwarnings("ignore:vertices of the boundary")  # rounding gives some of them equal positions
 @pytest.mark.parametrize("seed", range(50))
-def test_sheets_that_are_only_near_are_left_alone(seed: int) -> None:
+def test_sheets_that_are_only_near_are_left_alone(seed):
     generator = np.random.default_rng(seed)
     ball = shapes.icosphere(2)
     parts, _ = split(ball, charts(ball, "cells", seed))
@@ -130,7 +128,7 @@ def test_sheets_that_are_only_near_are_left_alone(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_soups_are_measured_as_the_mesh(seed: int) -> None:
+def test_soups_are_measured_as_the_mesh(seed):
     """Parts of random triangles that share random vertices: any edges may have three faces, any parts may touch."""
     generator = np.random.default_rng(seed)
     F = np.stack([generator.choice(30, 3, replace=False) for _ in range(generator.integers(2, 40))])
@@ -145,7 +143,7 @@ def test_soups_are_measured_as_the_mesh(seed: int) -> None:
         np.testing.assert_allclose(heat_igl.geodesic_distance(joined, 0), truth, rtol=1e-12)
 
 
-def test_parts_that_only_touch_are_warned_of() -> None:
+def test_parts_that_only_touch_are_warned_of():
     """Coinciding corners of parts that no seam joins: turned round, three at an edge, or one point in common."""
     V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0], [0, -1, 0], [0, 0, 0], [1, 0, 0], [0, 0, 1.0]])
     turned, three = (V[:6], [[0, 1, 2], [3, 4, 5]]), (V, [[0, 1, 2], [4, 3, 5], [7, 6, 8]])
@@ -161,14 +159,14 @@ def test_parts_that_only_touch_are_warned_of() -> None:
     assert as_mesh((ring, [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]])).components.max() == 0
 
 
-def test_merged_vertices_leave_out_collapsed_faces() -> None:
+def test_merged_vertices_leave_out_collapsed_faces():
     V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]])
     assert as_mesh((V, [[0, 1, 2], [1, 3, 2]]), merge="vertices").n_faces == 1
     with pytest.raises(heat_igl.MeshError, match="none is left"):
         as_mesh((V, [[1, 3, 2]]), merge="vertices")
 
 
-def test_t_junctions_and_three_sheets_are_left_alone() -> None:
+def test_t_junctions_and_three_sheets_are_left_alone():
     V = np.array([[0, 0, 0], [2, 0, 0], [1, 2, 0], [0, 0, 0], [1, 0, 0], [2, 0, 0], [1, -2, 0]], float)
     tee = Mesh(V, [[0, 1, 2], [4, 3, 6], [5, 4, 6]])
     with pytest.warns(heat_igl.AccuracyWarning, match="places: 2"):
@@ -185,7 +183,7 @@ def test_t_junctions_and_three_sheets_are_left_alone() -> None:
         assert as_mesh(other, merge="seams") is other
 
 
-def test_what_is_none_of_this_package_is_warned_of(tmp_path) -> None:
+def test_what_is_none_of_this_package_is_warned_of(tmp_path):
     parts, _ = split(shapes.icosphere(2), charts(shapes.icosphere(2), "halves", 1))
     heat_igl.write_mesh(tmp_path / "parts.ply", parts)
     theirs = SimpleNamespace(vertices=parts.V, faces=parts.F)

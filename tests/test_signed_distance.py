@@ -1,7 +1,5 @@
 """Signed distance: sizes against closed forms, signs against the pieces of the cut mesh, broken curves, errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

@@ -1,7 +1,5 @@
 """Signed distance in space from surfaces with holes: closed forms, libigl where the surface is closed, errors."""
 
-from __future__ import annotations
-
 import igl
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Sources of every kind: what they are, exact distances around them, and distance from points, curves and offsets."""
 
-from __future__ import annotations
-
 import pickle
 import re
 

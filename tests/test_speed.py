@@ -1,7 +1,5 @@
 """Travel time with a speed on each face: identities, and closed forms in optics and conformal geometry."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Each of the three steps by itself, against what is known about it in closed form."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

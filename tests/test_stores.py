@@ -1,14 +1,11 @@
 """Stores of distances, damaged on purpose: what is read is what was written, or an error names the file."""
 
-from __future__ import annotations
-
 import errno
 import os
 import random
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +25,7 @@ BALL = shapes.icosphere(2)
 
 
 @pytest.fixture(scope="module")
-def near(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def near(tmp_path_factory):
     """A sparse matrix in three chunks of each array."""
     path = tmp_path_factory.mktemp("within") / "near.zarr"
     with pytest.MonkeyPatch.context() as patch:
@@ -38,7 +35,7 @@ def near(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def client() -> Iterator[object]:
+def client():
     with cluster.connected(n_workers=1) as connected:
         yield connected
 
@@ -47,7 +44,7 @@ MESHES = {"ball": BALL, "strip": shapes.strip(40, 3)}
 
 
 @pytest.fixture(scope="module")
-def batch(client: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batch(client, tmp_path_factory):
     """Two meshes in several blocks each."""
     path = tmp_path_factory.mktemp("batch") / "store.zarr"
     report = cluster.distances(MESHES, range(150), path, client=client)
@@ -88,7 +85,7 @@ def named(problem: str, files: list[Path], store: Path) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_damaged_matrix_is_an_error_or_without_effect(near: Path, tmp_path: Path, seed: int) -> None:
+def test_a_damaged_matrix_is_an_error_or_without_effect(near, tmp_path, seed):
     generator, whole, refused = random.Random(seed), read_distances_within(near), 0
     for trial in range(50):
         store = tmp_path / str(trial)
@@ -109,7 +106,7 @@ def test_a_damaged_matrix_is_an_error_or_without_effect(near: Path, tmp_path: Pa
     assert refused >= 35
 
 
-def test_rows_beside_the_damage_are_read(near: Path, tmp_path: Path) -> None:
+def test_rows_beside_the_damage_are_read(near, tmp_path):
     store = shutil.copytree(near, tmp_path / "near")
     whole = read_distances_within(near)
     last = max((store / "data" / "c").iterdir(), key=lambda file: int(file.name))
@@ -120,7 +117,7 @@ def test_rows_beside_the_damage_are_read(near: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_damaged_batch_is_an_error_or_without_effect(batch: Path, tmp_path: Path, seed: int) -> None:
+def test_a_damaged_batch_is_an_error_or_without_effect(batch, tmp_path, seed):
     generator, refused = random.Random(seed), 0
     whole = {name: cluster.read_distances(batch, name) for name in MESHES}
     checksums = {row.name: row.checksum for row in cluster.report(batch).rows}
@@ -149,7 +146,7 @@ def test_a_damaged_batch_is_an_error_or_without_effect(batch: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_same_batch_again_repairs_a_store(client: object, batch: Path, tmp_path: Path, seed: int) -> None:
+def test_the_same_batch_again_repairs_a_store(client, batch, tmp_path, seed):
     store = shutil.copytree(batch, tmp_path / "store")
     generator = random.Random(seed)
     while True:
@@ -162,7 +159,7 @@ def test_the_same_batch_again_repairs_a_store(client: object, batch: Path, tmp_p
         np.testing.assert_array_equal(cluster.read_distances(store, name), cluster.read_distances(batch, name))
 
 
-def test_blocks_that_changed_places_are_found_before_the_mesh_is_done(batch: Path, tmp_path: Path) -> None:
+def test_blocks_that_changed_places_are_found_before_the_mesh_is_done(batch, tmp_path):
     from heat_igl.cluster.store import Store
 
     store = shutil.copytree(batch, tmp_path / "store")
@@ -176,10 +173,10 @@ def test_blocks_that_changed_places_are_found_before_the_mesh_is_done(batch: Pat
         cluster.read_distances(store, "ball")
 
 
-def test_one_of_two_writers_of_a_matrix_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_of_two_writers_of_a_matrix_is_told(tmp_path, monkeypatch):
     path, plain = tmp_path / "near", within_store.blocks_within
 
-    def with_a_second_writer(*arguments: object) -> Iterator[object]:
+    def with_a_second_writer(*arguments):
         for block in plain(*arguments):
             with pytest.raises(FileExistsError, match=r"near.partial exists: another process writes .*near, or was"):
                 write_distances_within(path, BALL, 0.3)
@@ -192,8 +189,8 @@ def test_one_of_two_writers_of_a_matrix_is_told(tmp_path: Path, monkeypatch: pyt
     assert [entry.name for entry in tmp_path.iterdir()] == ["near"]
 
 
-def test_a_store_that_appears_meanwhile_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def late(*_: object) -> Iterator[object]:
+def test_a_store_that_appears_meanwhile_stays(tmp_path, monkeypatch):
+    def late(*_):
         yield distances_within(BALL, 0.2)
         (tmp_path / "near").mkdir()
 
@@ -208,11 +205,11 @@ class KilledError(BaseException):
 
 
 @pytest.mark.parametrize("moment", range(20))
-def test_a_writer_that_is_killed_leaves_no_matrix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: int) -> None:
+def test_a_writer_that_is_killed_leaves_no_matrix(tmp_path, monkeypatch, moment):
     """From some write on nothing reaches the disk, and nothing is cleaned up."""
     path, plain, n_written = tmp_path / "near", zarr.storage.LocalStore.set, 0
 
-    async def set_or_die(self: object, key: str, value: object) -> None:
+    async def set_or_die(self, key, value):
         nonlocal n_written
         if n_written == moment:
             raise KilledError
@@ -235,10 +232,10 @@ def test_a_writer_that_is_killed_leaves_no_matrix(tmp_path: Path, monkeypatch: p
     assert (read_distances_within(path) != distances_within(BALL, 0.4)).nnz == 0
 
 
-def test_a_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_nothing(tmp_path, monkeypatch):
     plain = zarr.storage.LocalStore.set
 
-    async def full(self: object, key: str, value: object) -> None:
+    async def full(self, key, value):
         if "data/c" in key:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), key)
         await plain(self, key, value)
@@ -249,7 +246,7 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_one_of_two_batches_on_a_store_is_told(client: object, tmp_path: Path) -> None:
+def test_one_of_two_batches_on_a_store_is_told(client, tmp_path):
     store = tmp_path / "store"
     code = "import sys, pathlib\nfrom heat_igl.cluster.store import locked\n"
     code += "with locked(pathlib.Path(sys.argv[1])):\n  print(1, flush=True)\n  input()"
@@ -268,7 +265,7 @@ def test_one_of_two_batches_on_a_store_is_told(client: object, tmp_path: Path) -
         pass
 
 
-def test_files_of_somebody_else_in_a_store_stay(client: object, tmp_path: Path) -> None:
+def test_files_of_somebody_else_in_a_store_stay(client, tmp_path):
     store = tmp_path / "store"
     cluster.distances({"ball": BALL}, [0], store, client=client)
     (store / "strip").mkdir()

@@ -1,7 +1,5 @@
 """GIFTI and FreeSurfer surfaces, files packed by gzip, and point clouds: nothing is lost, and damage is named."""
 
-from __future__ import annotations
-
 import gzip
 import importlib.util
 from collections.abc import Callable
@@ -13,7 +11,7 @@ import scipy.io
 import scipy.sparse
 
 import heat_igl
-from heat_igl import Mesh, MeshError, PointCloud, cli
+from heat_igl import MeshError, PointCloud, cli
 from heat_igl.io import write_point_cloud
 
 needs_nibabel = pytest.mark.skipif(importlib.util.find_spec("nibabel") is None, reason="needs nibabel")
@@ -21,7 +19,7 @@ neuro = [pytest.param(name, marks=needs_nibabel) for name in ("lh.pial.surf.gii"
 
 
 @pytest.fixture(scope="module")
-def mesh() -> Mesh:
+def mesh():
     return heat_igl.shapes.torus(9, 6)
 
 
@@ -34,7 +32,7 @@ def rewritten(path: Path, change: Callable[[bytes], bytes]) -> Path:
 
 
 @pytest.mark.parametrize("suffix", [".off", ".obj", ".ply", ".mesh", ".msh"])
-def test_a_packed_file_is_the_plain_one(tmp_path: Path, mesh: Mesh, suffix: str) -> None:
+def test_a_packed_file_is_the_plain_one(tmp_path, mesh, suffix):
     packed, plain = tmp_path / f"a{suffix}.gz", tmp_path / f"a{suffix}"
     heat_igl.write_mesh(packed, mesh)
     heat_igl.write_mesh(plain, mesh)
@@ -43,7 +41,7 @@ def test_a_packed_file_is_the_plain_one(tmp_path: Path, mesh: Mesh, suffix: str)
     assert (back.V.tobytes(), back.F.tobytes()) == (mesh.V.tobytes(), mesh.F.tobytes())
 
 
-def test_packed_files_have_the_same_bytes_each_time(tmp_path: Path, mesh: Mesh) -> None:
+def test_packed_files_have_the_same_bytes_each_time(tmp_path, mesh):
     for name in ("a.PLY.GZ", "b.ply.gz"):
         heat_igl.write_mesh(tmp_path / name, mesh, distance=mesh.V[:, 0])
     assert (tmp_path / "a.PLY.GZ").read_bytes() == (tmp_path / "b.ply.gz").read_bytes()
@@ -52,7 +50,7 @@ def test_packed_files_have_the_same_bytes_each_time(tmp_path: Path, mesh: Mesh) 
 
 
 @pytest.mark.parametrize("change", [lambda data: data[:-20], lambda _: b"v 0 0 0\n", lambda data: data[:40] + b"x"])
-def test_a_damaged_packed_file_is_named(tmp_path: Path, mesh: Mesh, change: Callable[[bytes], bytes]) -> None:
+def test_a_damaged_packed_file_is_named(tmp_path, mesh, change):
     heat_igl.write_mesh(tmp_path / "a.obj.gz", mesh)
     with pytest.raises(MeshError, match=r"a.obj.gz cannot be unpacked .*damaged, cut short"):
         heat_igl.read_mesh(rewritten(tmp_path / "a.obj.gz", change))
@@ -62,7 +60,7 @@ def test_a_damaged_packed_file_is_named(tmp_path: Path, mesh: Mesh, change: Call
 
 
 @pytest.mark.parametrize("name", neuro)
-def test_a_cortex_comes_back_in_single_precision(tmp_path: Path, mesh: Mesh, name: str) -> None:
+def test_a_cortex_comes_back_in_single_precision(tmp_path, mesh, name):
     heat_igl.write_mesh(tmp_path / name, mesh)
     back = heat_igl.read_mesh(tmp_path / name)
     assert np.array_equal(back.V, mesh.V.astype(np.float32))
@@ -70,7 +68,7 @@ def test_a_cortex_comes_back_in_single_precision(tmp_path: Path, mesh: Mesh, nam
 
 
 @needs_nibabel
-def test_nibabel_reads_what_is_written(tmp_path: Path, mesh: Mesh) -> None:
+def test_nibabel_reads_what_is_written(tmp_path, mesh):
     import nibabel
 
     distance = np.where(mesh.V[:, 0] > 1, np.inf, mesh.V[:, 0])
@@ -97,14 +95,14 @@ def test_nibabel_reads_what_is_written(tmp_path: Path, mesh: Mesh) -> None:
         ("lh.pial", b"solid a", "nibabel cannot read this surface"),
     ],
 )
-def test_a_damaged_cortex_is_named(tmp_path: Path, name: str, content: bytes, said: str) -> None:
+def test_a_damaged_cortex_is_named(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(MeshError, match=rf"{name}: .*{said}"):
         heat_igl.read_mesh(tmp_path / name)
 
 
 @needs_nibabel
-def test_gifti_without_a_surface_lists_its_arrays(tmp_path: Path, mesh: Mesh) -> None:
+def test_gifti_without_a_surface_lists_its_arrays(tmp_path, mesh):
     import nibabel
 
     shape = nibabel.gifti.GiftiDataArray(np.zeros(3, np.float32), "NIFTI_INTENT_SHAPE")
@@ -117,7 +115,7 @@ def test_gifti_without_a_surface_lists_its_arrays(tmp_path: Path, mesh: Mesh) ->
 
 
 @needs_nibabel
-def test_scalars_on_two_surfaces_are_written_to_cifti(tmp_path: Path, mesh: Mesh) -> None:
+def test_scalars_on_two_surfaces_are_written_to_cifti(tmp_path, mesh):
     import nibabel
 
     path, x = tmp_path / "a.dscalar.nii", np.where(mesh.V[:, 2] > 0, mesh.V[:, 0], np.nan)
@@ -146,9 +144,7 @@ def test_scalars_on_two_surfaces_are_written_to_cifti(tmp_path: Path, mesh: Mesh
 
 
 @needs_nibabel
-def test_maps_without_a_surface_are_read_and_matrices_take_them(
-    tmp_path: Path, mesh: Mesh, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_maps_without_a_surface_are_read_and_matrices_take_them(tmp_path, mesh, capsys, monkeypatch):
     import nibabel
     from nibabel import cifti2
 
@@ -195,7 +191,7 @@ def test_maps_without_a_surface_are_read_and_matrices_take_them(
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".xyz", ".npy", ".xyz.gz", ".ply.gz"])
 @pytest.mark.parametrize("with_normals", [False, True])
-def test_point_clouds_come_back_exactly(tmp_path: Path, mesh: Mesh, suffix: str, with_normals: bool) -> None:
+def test_point_clouds_come_back_exactly(tmp_path, mesh, suffix, with_normals):
     normals = mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True)
     cloud = PointCloud(mesh.V, normals if with_normals else None)
     write_point_cloud(tmp_path / f"a{suffix}", cloud)

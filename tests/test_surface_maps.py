@@ -1,7 +1,5 @@
 """Maps on a surface: parcel distances from full matrices, widths of smoothed deltas, errors of matches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from surfaces import arcs, twice

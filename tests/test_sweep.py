@@ -1,7 +1,5 @@
 """Distance by sweeps over triangles in an order of their own, and the bounds that it is moved inside."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import perturbed, pygeodesic_distance, relative_error
@@ -36,7 +34,7 @@ def swept(mesh: Mesh, sources: object) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def bumpy() -> Mesh:
+def bumpy():
     return perturbed(shapes.icosphere(4), 0.3, 1)
 
 

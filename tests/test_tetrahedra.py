@@ -1,7 +1,5 @@
 """Distance through tetrahedra: straight lines in convex bodies, ways around an edge, many sources."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

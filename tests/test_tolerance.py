@@ -1,7 +1,5 @@
 """Windows that are joined within a tolerance: errors, how many there are, and labels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import perturbed
@@ -22,7 +20,7 @@ SMOOTH = {
 
 
 @pytest.mark.parametrize("name", SMOOTH)
-def test_errors_are_within_the_tolerance_by_fewer_windows(name: str) -> None:
+def test_errors_are_within_the_tolerance_by_fewer_windows(name):
     """The raw answers, before their check, from two vertices that no symmetry names."""
     surface = ExactSurface(from_mesh(SMOOTH[name](), 0))
     for source in (np.array([77]), np.array([surface.n // 3])):
@@ -36,7 +34,7 @@ def test_errors_are_within_the_tolerance_by_fewer_windows(name: str) -> None:
                 assert error.max() > 0
 
 
-def test_a_sphere_against_great_circles() -> None:
+def test_a_sphere_against_great_circles():
     """The error of the polyhedron, 1e-4 here, hides that of a small tolerance."""
     found = geodesic_distance(SPHERE, 0, tolerance=1e-4)
     circles = arcs(SPHERE.V, 0)
@@ -45,7 +43,7 @@ def test_a_sphere_against_great_circles() -> None:
 
 
 @pytest.mark.parametrize(("seed", "source"), [(10, 4425), (35, 6647)])
-def test_no_gap_opens_between_windows(seed: int, source: int) -> None:
+def test_no_gap_opens_between_windows(seed, source):
     """Dented spheres on which, without windows in the gaps, vertices have no distance or one that is .7 % too long."""
     rng = np.random.default_rng(seed)
     k, phase = rng.normal(size=(6, 3)) * rng.uniform(2, 8), rng.uniform(0, 6.28, 6)
@@ -56,7 +54,7 @@ def test_no_gap_opens_between_windows(seed: int, source: int) -> None:
     assert np.abs(found - truth).max() < 5e-5 * truth.max()
 
 
-def test_cells_are_those_of_exact_distance() -> None:
+def test_cells_are_those_of_exact_distance():
     """Within a tolerance single vertices would get the label of a cell beside theirs."""
     mesh = SMOOTH["ellipsoid"]()
     sources = list(range(0, mesh.n_vertices, 100))
@@ -66,14 +64,14 @@ def test_cells_are_those_of_exact_distance() -> None:
     assert np.array_equal(cells.distance, exact.distance)
 
 
-def test_a_source_in_a_face() -> None:
+def test_a_source_in_a_face():
     mesh, source = SMOOTH["torus"](), SurfacePoints([3000], [[0.2, 0.3, 0.5]])
     exact = geodesic_distance(mesh, source, method="exact")
     found = geodesic_distance(mesh, source, tolerance=1e-4)
     assert 0 < np.abs(found - exact).max() <= 1e-4 * exact.max()
 
 
-def test_derivatives_are_those_of_exact_distance() -> None:
+def test_derivatives_are_those_of_exact_distance():
     mesh = SMOOTH["torus"]()
     phi, pull_back = GeodesicSolver(mesh, tolerance=1e-4).distance_vjp(5)
     assert np.array_equal(phi, geodesic_distance(mesh, 5, method="exact"))
@@ -89,12 +87,12 @@ ROUGH = {
 
 
 @pytest.mark.parametrize("make", ROUGH.values(), ids=ROUGH)
-def test_where_windows_are_few_the_answer_is_exact(make) -> None:
+def test_where_windows_are_few_the_answer_is_exact(make):
     mesh = make()
     assert np.array_equal(geodesic_distance(mesh, 3, tolerance=1e-3), geodesic_distance(mesh, 3, method="exact"))
 
 
-def test_a_cutoff_ends_the_search_and_offsets_count() -> None:
+def test_a_cutoff_ends_the_search_and_offsets_count():
     surface = ExactSurface(from_mesh(SMOOTH["torus"](), 0))
     accuracy, sources, offsets = joining_accuracy(1e-4), np.array([0, 8000]), np.array([0.0, 0.3])
     truth = surface.solve(sources, offsets).distance

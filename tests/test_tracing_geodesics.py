@@ -1,7 +1,5 @@
 """Straightest geodesics and the exponential map."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import flat_perturbed

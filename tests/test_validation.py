@@ -1,7 +1,5 @@
 """Error norms by hand, and reports that tell good methods from broken ones and survive methods that fail."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import warnings
@@ -52,14 +50,14 @@ BROKEN: dict[str, Callable[[Mesh], HeatMethodSolver]] = {
 
 
 @pytest.mark.parametrize(("mesh", "percent"), [(shapes.grid(40), 3.0), (shapes.disk(20), 2.3)], ids=["grid", "disk"])
-def test_threshold_catches_broken_heat_steps(mesh: Mesh, percent: float) -> None:
+def test_threshold_catches_broken_heat_steps(mesh, percent):
     # Heat is at 1.8 % on the grid and 2.1 % on the disk, the best of the broken ones at 4.7 and 2.5 %.
     report = validate(mesh, draw_sources(mesh, 3), ["heat", *BROKEN.items()])
     assert [row.method for row in report.exceeding(percent)] == list(BROKEN)
     assert [row.method for row in report.exceeding(0.5)] == ["heat", *BROKEN]
 
 
-def test_threshold_catches_a_field_that_points_to_the_source(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_threshold_catches_a_field_that_points_to_the_source(monkeypatch):
     # Not flat: there a wrong answer is raised to straight lines, which are right.
     mesh, right = shapes.icosphere(3), NormalizedDivergence.divergence
     assert not validate(mesh, 0, ["heat"]).exceeding(3.5)
@@ -68,8 +66,8 @@ def test_threshold_catches_a_field_that_points_to_the_source(monkeypatch: pytest
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_report_on_the_cow(cow: Mesh) -> None:
-    steps: list[tuple[str, int, int]] = []
+def test_report_on_the_cow(cow):
+    steps = []
     methods = ("heat", "meshlab", "meshlab_heat", "igl", "potpourri3d", "exact")
     report = validate(cow, [[5], [1000], [2000]], methods, name="cow", progress=lambda *step: steps.append(step))
     assert [row.method for row in report.rows] == list(methods)
@@ -93,7 +91,7 @@ def test_report_on_the_cow(cow: Mesh) -> None:
     assert exact.asymmetry < 1e-12
     assert exact.triangle_excess is not None
     assert exact.triangle_excess < 1e-12
-    assert 0 < by_name["meshlab"].errors.mean < by_name["heat"].errors.mean < by_name["igl"].errors.mean  # type: ignore[union-attr]
+    assert 0 < by_name["meshlab"].errors.mean < by_name["heat"].errors.mean < by_name["igl"].errors.mean
     assert by_name["heat"].parameters["t"] > 0
     assert by_name["exact"].parameters == {"solver": "windows"}
     # One step per distance: three of the reference, three of each other method; then the end.
@@ -104,7 +102,7 @@ def test_report_on_the_cow(cow: Mesh) -> None:
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_report_in_every_format() -> None:
+def test_report_in_every_format():
     mesh = shapes.icosphere(3)
     report = validate(mesh, [[5], [7]], ["heat", "meshlab"], name="ball")
     again = json.loads(json.dumps(report.to_dict(), allow_nan=False))
@@ -122,7 +120,7 @@ def test_report_in_every_format() -> None:
     assert len(figure.axes) == 2 * 2 + 1  # a surface and a scatter for each method, and a colour bar for all
 
 
-def test_the_figure_shows_the_surface_upright_and_where_the_errors_are() -> None:
+def test_the_figure_shows_the_surface_upright_and_where_the_errors_are():
     pytest.importorskip("matplotlib")
     from matplotlib import colormaps
 
@@ -144,7 +142,7 @@ def test_the_figure_shows_the_surface_upright_and_where_the_errors_are() -> None
         assert cosine[0] > 0.99 > 0.9 > cosine[1]
 
 
-def test_infinite_errors_reach_json_as_text() -> None:
+def test_infinite_errors_reach_json_as_text():
     class Lost:
         def __init__(self, mesh: Mesh) -> None:
             self.distance = lambda _: np.full(mesh.n_vertices, np.nan)
@@ -154,10 +152,10 @@ def test_infinite_errors_reach_json_as_text() -> None:
     assert report.exceeding(1e6) == report.rows
 
 
-def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch):
     monkeypatch.setattr(reference.measurement, "find_spec", lambda name: None if name == "pymeshlab" else object())
     mesh = shapes.grid(5)
-    steps: list[int] = []
+    steps = []
     report = validate(mesh, [[0], [7]], ["meshlab", "heat"], progress=lambda *step: steps.append(step[1]))
     failed, fine = report.rows
     assert failed.failure == (
@@ -172,7 +170,7 @@ def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("name", ["voxel blob", "pinched", "dust"])
-def test_no_reference_brings_the_process_down(name: str) -> None:
+def test_no_reference_brings_the_process_down(name):
     mesh = zoo(name)
     report = validate(mesh, draw_sources(mesh, 1), validation.METHODS, reference=None)
     assert [row.method for row in report.rows] == list(validation.METHODS)
@@ -183,7 +181,7 @@ def test_no_reference_brings_the_process_down(name: str) -> None:
     assert not failed["meshlab"]
 
 
-def test_warnings_about_accuracy_are_notes_and_others_pass() -> None:
+def test_warnings_about_accuracy_are_notes_and_others_pass():
     class Doubtful(HeatMethodSolver):
         def distance(self, sources: Any) -> Any:
             warnings.warn("not so sure", AccuracyWarning, stacklevel=1)
@@ -208,8 +206,8 @@ TOUCHING = Mesh(  # two tetrahedra's surfaces, with one vertex in common
 )
 
 
-def test_without_a_reference_the_rest_of_the_report_stands(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refusing(*_: object, **__: object) -> None:
+def test_without_a_reference_the_rest_of_the_report_stands(monkeypatch):
+    def refusing(*_, **__):
         raise heat_igl.errors.ReferenceSolverError(
             "at 1 vertices connected with the sources two surfaces touch in a point"
         )
@@ -236,7 +234,7 @@ def test_without_a_reference_the_rest_of_the_report_stands(monkeypatch: pytest.M
     assert validate(TOUCHING, 1, ["heat"]).failure is None
 
 
-def test_no_reference() -> None:
+def test_no_reference():
     report = validate(TOUCHING, 1, ["heat"], reference=None)
     assert report.reference is None
     assert report.rows[0].errors is None
@@ -247,7 +245,7 @@ def test_no_reference() -> None:
         report.plot()
 
 
-def test_references_of_ones_own() -> None:
+def test_references_of_ones_own():
     mesh = shapes.grid(10)
     known = np.stack([closed_forms.plane(mesh, source) for source in (0, 50)])
     by_array = validate(mesh, [[0], [50]], ["heat"], reference=known)
@@ -255,7 +253,7 @@ def test_references_of_ones_own() -> None:
     by_exact = validate(mesh, [[0], [50]], ["heat"])
     assert (by_array.reference, by_function.reference, by_exact.reference) == ("given distances", "plane", "exact")
     assert by_array.rows[0].errors == by_function.rows[0].errors
-    assert by_array.rows[0].errors.mean == pytest.approx(by_exact.rows[0].errors.mean, rel=1e-9)  # type: ignore[union-attr]
+    assert by_array.rows[0].errors.mean == pytest.approx(by_exact.rows[0].errors.mean, rel=1e-9)
     box = shapes.box(4)
     report = validate(box, 0, ["heat", "exact", "windows"], reference=closed_forms.convex_solid)
     assert report.rows[0].errors is not None
@@ -266,7 +264,7 @@ def test_references_of_ones_own() -> None:
         validate(mesh, 0, ["heat"], reference=known)
 
 
-def test_rows_of_other_domains() -> None:
+def test_rows_of_other_domains():
     """Methods of this package take the points of a cloud, not its triangles; lines are right in a solid."""
     P = np.random.default_rng(0).standard_normal((1500, 3))
     cloud = heat_igl.PointCloud(P / np.linalg.norm(P, axis=1, keepdims=True))
@@ -283,7 +281,7 @@ def test_rows_of_other_domains() -> None:
     assert lines.errors.mean < 1e-6 < heat.errors.mean < 0.1
 
 
-def test_unknown_repeated_and_no_methods_are_refused() -> None:
+def test_unknown_repeated_and_no_methods_are_refused():
     mesh = shapes.grid(3)
     with pytest.raises(ValueError, match="'magic' is unknown: choose from heat, sweep, windows, meshlab"):
         validate(mesh, 0, ["magic"])
@@ -294,7 +292,7 @@ def test_unknown_repeated_and_no_methods_are_refused() -> None:
     assert set(validation.METHODS) >= {"heat", "sweep", "windows", "meshlab", "igl", "potpourri3d", "exact"}
 
 
-def test_drawn_sources_are_on_the_largest_component_and_repeat_with_the_seed() -> None:
+def test_drawn_sources_are_on_the_largest_component_and_repeat_with_the_seed():
     small, large = shapes.grid(2), shapes.grid(6)
     mesh = Mesh(np.vstack([small.V, large.V + 5, [[9, 9, 9]]]), np.vstack([small.F, large.F + small.n_vertices]))
     drawn = draw_sources(mesh, 10, seed=4)
@@ -310,7 +308,7 @@ def test_drawn_sources_are_on_the_largest_component_and_repeat_with_the_seed() -
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     heat_igl.write_mesh("disk.off", shapes.disk(8))
     Path("noise.off").write_text("OFF\n3 1 0\n0 0 zero\n")
@@ -318,7 +316,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_command_prints_and_writes_the_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_prints_and_writes_the_report(folder, capsys):
     written = {"report.json", "errors.png"}
     before = {path.name for path in folder.iterdir()}
     arguments = "validate disk.off --sources 2 --seed 7 --methods heat,meshlab --json report.json --picture errors.png"
@@ -346,9 +344,7 @@ def test_command_prints_and_writes_the_report(folder: Path, capsys: pytest.Captu
         (["disk.off", "--json", "nowhere/report.json"], "nowhere"),
     ],
 )
-def test_command_fails_in_one_line_and_leaves_nothing(
-    folder: Path, capsys: pytest.CaptureFixture[str], options: list[str], message: str
-) -> None:
+def test_command_fails_in_one_line_and_leaves_nothing(folder, capsys, options, message):
     before = {path.name for path in folder.iterdir()}
     assert cli.run(["validate", *options]) == 1
     printed = capsys.readouterr()
@@ -362,14 +358,14 @@ def test_command_fails_in_one_line_and_leaves_nothing(
 # --- Error norms on cases that can be worked out by hand, and bounds that a true distance keeps and a wrong one break
 
 
-def test_relative_error_entry_by_entry() -> None:
+def test_relative_error_entry_by_entry():
     error = metrics.relative_error([0, 1, 2, np.inf, 7, np.nan], [0, 2, 2, 3, np.inf, 4])
     np.testing.assert_array_equal(error, [np.nan, 0.5, 0, np.inf, np.nan, np.inf])
     with pytest.raises(ValueError, match=r"one shape, not \(2,\) and \(3,\)"):
         metrics.relative_error([1, 2], [1, 2, 3])
 
 
-def test_a_distance_too_long_by_one_percent() -> None:
+def test_a_distance_too_long_by_one_percent():
     mesh = shapes.grid(8)
     sources = [0, 40]
     truths = np.stack([closed_forms.plane(mesh, source) for source in sources])
@@ -385,7 +381,7 @@ def test_a_distance_too_long_by_one_percent() -> None:
     assert found.n_wrong_reach == 0
 
 
-def test_norms_do_not_depend_on_the_unit() -> None:
+def test_norms_do_not_depend_on_the_unit():
     mesh = shapes.grid(6)
     truth = closed_forms.plane(mesh, 3)[None]
     noisy = truth + 0.01 * np.random.default_rng(0).uniform(size=truth.shape)
@@ -396,7 +392,7 @@ def test_norms_do_not_depend_on_the_unit() -> None:
         assert getattr(one, name) > 0
 
 
-def test_area_counts_and_the_number_of_vertices_does_not() -> None:
+def test_area_counts_and_the_number_of_vertices_does_not():
     # A fine and a coarse half: all error on the fine half of the vertices is on half of the area only.
     x = np.concatenate([np.linspace(0, 1, 21), [2.0]])
     V = np.array([[a, b, 0] for a in x for b in (0.0, 1.0)])
@@ -409,7 +405,7 @@ def test_area_counts_and_the_number_of_vertices_does_not() -> None:
     assert found.mean == pytest.approx(40 / 44)
 
 
-def test_near_field_is_the_one_ring() -> None:
+def test_near_field_is_the_one_ring():
     mesh = shapes.disk(4)
     truth = closed_forms.plane(mesh, 0)
     distance = truth.copy()
@@ -420,7 +416,7 @@ def test_near_field_is_the_one_ring() -> None:
     assert metrics.error_summary(mesh, distance[None], truth[None], [0]).near_field == 0
 
 
-def test_wrong_reach_is_counted() -> None:
+def test_wrong_reach_is_counted():
     one = shapes.grid(2)
     mesh = twice(one)
     truth = closed_forms.plane(one, 0)
@@ -436,7 +432,7 @@ def test_wrong_reach_is_counted() -> None:
         metrics.error_summary(mesh, truth, truth, [0])
 
 
-def test_eikonal_residual_of_a_linear_function_is_its_slope_less_one() -> None:
+def test_eikonal_residual_of_a_linear_function_is_its_slope_less_one():
     mesh = shapes.grid(5)
     assert metrics.eikonal_residual(mesh, mesh.V[:, 0]).max() < 1e-12
     np.testing.assert_allclose(metrics.eikonal_residual(mesh, 3 * mesh.V[:, 0]), 2)
@@ -447,7 +443,7 @@ def test_eikonal_residual_of_a_linear_function_is_its_slope_less_one() -> None:
     assert np.isnan(metrics.eikonal_residual(mesh, part)).sum() == (mesh.F == 0).any(axis=1).sum()
 
 
-def test_true_distances_are_symmetric_and_keep_the_triangle_inequality() -> None:
+def test_true_distances_are_symmetric_and_keep_the_triangle_inequality():
     mesh = shapes.icosphere(2)
     sources = [0, 50, 100]
     distances = np.stack([closed_forms.sphere(mesh, source) for source in sources])
@@ -464,7 +460,7 @@ def test_true_distances_are_symmetric_and_keep_the_triangle_inequality() -> None
     np.testing.assert_array_equal(found, -found.T)
 
 
-def test_pairs_in_different_components_are_left_out() -> None:
+def test_pairs_in_different_components_are_left_out():
     apart = np.array([[0.0, 1, np.inf], [np.inf, np.inf, 0]])
     assert not metrics.asymmetry(apart, [0, 2]).any()
     assert metrics.triangle_violations(apart, [0, 2]) == metrics.TriangleViolations(0, 0.0, 0.0)
@@ -473,7 +469,7 @@ def test_pairs_in_different_components_are_left_out() -> None:
 
 
 @pytest.mark.parametrize("mesh", [shapes.icosphere(2), shapes.box(3)], ids=["triangles", "tetrahedra"])
-def test_bounds_hold_for_a_true_distance_and_break_for_a_scaled_one(mesh: Mesh) -> None:
+def test_bounds_hold_for_a_true_distance_and_break_for_a_scaled_one(mesh):
     lines = np.linalg.norm(mesh.V - mesh.V[5], axis=1)
     truth = lines if mesh.is_tetrahedral else closed_forms.sphere(mesh, 5)
     held = metrics.bound_violations(mesh, truth, 5)

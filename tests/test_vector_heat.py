@@ -1,7 +1,5 @@
 """The connection Laplacian and the vector heat method."""
 
-from __future__ import annotations
-
 import igl
 import numpy as np
 import pytest
@@ -222,12 +220,12 @@ def test_transport_around_the_corner_of_a_box_turns_by_a_right_angle():
     low, high = mesh.V.min(axis=0), mesh.V.max(axis=0)
     at = (mesh.V - low) / (high - low)
 
-    def vertex(*place: float) -> int:
+    def vertex(*place):
         return int(np.argmin(np.linalg.norm(at - place, axis=1)))
 
     solver = VectorHeatSolver(mesh, method="windows")
 
-    def holonomy(*loop: int) -> complex:
+    def holonomy(*loop):
         turned = 1.0 + 0j
         for start, end in zip(loop, [*loop[1:], loop[0]], strict=True):
             turned *= complex(*solver.transport(start, [1, 0])[end])

@@ -1,7 +1,5 @@
 """The command `view`: the page that it writes, and opens."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
@@ -12,7 +10,7 @@ from heat_igl import cli, shapes
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     pytest.importorskip("typer")
     pytest.importorskip("matplotlib")
     heat_igl.write_mesh(tmp_path / "ball.off", shapes.icosphere(2))
@@ -20,10 +18,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("display", ["", ":0"])
-def test_the_page_is_opened_where_there_is_a_display(
-    display: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    opened: list[str] = []
+def test_the_page_is_opened_where_there_is_a_display(display, folder, monkeypatch, capsys):
+    opened = []
     monkeypatch.setattr("webbrowser.open", lambda address: not opened.append(address))
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -41,9 +37,7 @@ def test_the_page_is_opened_where_there_is_a_display(
     assert "with t = 0.5 h^2." in text
 
 
-def test_the_command_writes_the_page_that_it_is_told_to(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_writes_the_page_that_it_is_told_to(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     assert cli.run(["view", "ball.off", "--html", "shown.html"]) == 0
     for name, message in (("shown.pdf", "pages go to .html or .htm files"), ("no/a.html", "there is no directory no")):
@@ -54,7 +48,7 @@ def test_the_command_writes_the_page_that_it_is_told_to(
     assert {path.name for path in folder.iterdir()} == {"ball.off", "shown.html"}
 
 
-def test_the_command_writes_exact_signed_and_points(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_writes_exact_signed_and_points(folder, monkeypatch):
     monkeypatch.chdir(folder)
     sphere = shapes.icosphere(2)
     heat_igl.write_curves("loops.obj", sphere, heat_igl.isolines(sphere, sphere.V[:, 2], [0.1])[0])

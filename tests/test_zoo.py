@@ -1,7 +1,5 @@
 """Shapes that no default was tuned for, cases of other domains, and the check that every answer by heat gets."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from functools import cache
@@ -25,7 +23,7 @@ from heat_igl.heat.source_terms import SourceAssembler, drop_overtaken
 from heat_igl.intrinsic import mollify
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.domains import CASES, DomainCase, around_the_wall, by_fermat
+from heat_igl.validation.domains import CASES, around_the_wall, by_fermat
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 
 # --- Heat on shapes that no default was tuned for, and the check that every answer gets
@@ -55,14 +53,14 @@ def made(name: str) -> Mesh:
     return BY_NAME[name].make()
 
 
-def test_a_third_is_held_out() -> None:
+def test_a_third_is_held_out():
     assert len(SHAPES) >= 60
     assert 0.33 < np.mean([shape.held_out for shape in SHAPES]) < 0.5
     assert len(BY_NAME) == len(SHAPES)
 
 
 @pytest.mark.parametrize("kind", FAMILIES)
-def test_a_seed_is_a_mesh_of_its_own(kind: str) -> None:
+def test_a_seed_is_a_mesh_of_its_own(kind):
     one, again, other = (FAMILIES[kind](seed) for seed in (1, 1, 2))
     assert np.array_equal(one.V, again.V)
     assert np.array_equal(one.F, again.F)
@@ -72,7 +70,7 @@ def test_a_seed_is_a_mesh_of_its_own(kind: str) -> None:
 
 
 @pytest.mark.parametrize("name", MEASURED)
-def test_heat_on_shapes_of_the_zoo(name: str) -> None:
+def test_heat_on_shapes_of_the_zoo(name):
     table = load_script("accuracy")
     mesh = made(name)
     solver = HeatMethodSolver(mesh)
@@ -99,10 +97,10 @@ def beside_a_larger_one(ratio: float) -> tuple[Mesh, int]:
 
 @pytest.mark.parametrize("options", [{}, {"laplacian": "cotan"}, {"magnitude": "unit"}])
 @pytest.mark.parametrize("ratio", [10.0, 1e3, 1e8])
-def test_a_small_component_is_as_accurate_as_alone(ratio: float, options: dict[str, str]) -> None:
+def test_a_small_component_is_as_accurate_as_alone(ratio, options):
     mesh, n = beside_a_larger_one(ratio)
-    solver = HeatMethodSolver(mesh, **options)  # type: ignore[arg-type]
-    alone = HeatMethodSolver(shapes.icosphere(3), **options)  # type: ignore[arg-type]
+    solver = HeatMethodSolver(mesh, **options)
+    alone = HeatMethodSolver(shapes.icosphere(3), **options)
     assert np.abs(solver.distance(0)[:n] - alone.distance(0)).max() < 1e-9
     assert np.abs(solver.distance(n)[n : 2 * n] / ratio - alone.distance(0)).max() < 1e-9
     small, large = solver.time_steps[:2]
@@ -111,12 +109,12 @@ def test_a_small_component_is_as_accurate_as_alone(ratio: float, options: dict[s
     assert np.abs(solver.distance(point)[:n] - alone.distance(point)).max() < 1e-9
 
 
-def test_one_time_step_that_is_asked_for_is_that_of_all_components() -> None:
+def test_one_time_step_that_is_asked_for_is_that_of_all_components():
     mesh, _ = beside_a_larger_one(3.0)
     assert (HeatMethodSolver(mesh, t=0.01).time_steps == 0.01).all()
 
 
-def test_a_small_component_is_not_mollified() -> None:
+def test_a_small_component_is_not_mollified():
     small, flat = np.array([3.0, 4.0, 5.0]) * 1e-9, np.array([1.0, 1.0, 2.0])
     added = mollify(np.stack([small, flat]), np.array([[0, 1, 2], [3, 4, 5]]))
     assert not added[0].any()
@@ -132,7 +130,7 @@ def thin_rectangle() -> Mesh:
     return Mesh(flat.V @ np.array([[1.0, 0, 0], [3, 1, 0], [0, 0, 1]]), flat.F)
 
 
-def test_a_wrong_answer_is_raised_to_straight_lines_or_warns() -> None:
+def test_a_wrong_answer_is_raised_to_straight_lines_or_warns():
     mesh = thin_rectangle()
     lines = np.linalg.norm(mesh.V - mesh.V[210], axis=1)
     solver = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
@@ -157,7 +155,7 @@ def test_a_wrong_answer_is_raised_to_straight_lines_or_warns() -> None:
     assert np.mean(unchecked.distance < 0.9 * lines) > 0.2
 
 
-def test_a_good_answer_is_left_alone() -> None:
+def test_a_good_answer_is_left_alone():
     mesh = shapes.icosphere(3)
     solution = HeatMethodSolver(mesh, t_coef=0.5).solve(0)
     check = solution.diagnostics.check
@@ -171,7 +169,7 @@ def test_a_good_answer_is_left_alone() -> None:
     assert check.largest_shortfall * solution.distance.max() <= 1.1 * below.max()
 
 
-def test_the_check_measures_from_where_distance_begins() -> None:
+def test_the_check_measures_from_where_distance_begins():
     solver = HeatMethodSolver(thin_rectangle(), laplacian="cotan")
     with pytest.warns(AccuracyWarning, match="too short"):
         plain = solver.distance(210)
@@ -180,7 +178,7 @@ def test_the_check_measures_from_where_distance_begins() -> None:
     assert np.abs(late - 1e5 - plain).max() < 1e-6
 
 
-def test_many_sources_are_checked_too() -> None:
+def test_many_sources_are_checked_too():
     mesh = thin_rectangle()
     sources = np.flatnonzero(mesh.V[:, 1] == 0)
     repeated = np.concatenate([sources, np.flatnonzero(mesh.V[:, 1] == 0.05)])
@@ -199,11 +197,11 @@ TRIANGLE = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 
 
 @pytest.mark.parametrize("boundary", ["dirichlet", "average"])
-def test_a_boundary_of_all_vertices_cannot_be_held(boundary: str) -> None:
+def test_a_boundary_of_all_vertices_cannot_be_held(boundary):
     with pytest.raises(ValueError, match=f"boundary='{boundary}' holds the heat .* every vertex lies there: take"):
-        HeatMethodSolver(TRIANGLE, boundary=boundary, laplacian="intrinsic-delaunay")  # type: ignore[arg-type]
+        HeatMethodSolver(TRIANGLE, boundary=boundary, laplacian="intrinsic-delaunay")
     # Refined, it has vertices inside.
-    assert HeatMethodSolver(TRIANGLE, boundary=boundary).distance(0).tolist() == [0, 1, 1]  # type: ignore[arg-type]
+    assert HeatMethodSolver(TRIANGLE, boundary=boundary).distance(0).tolist() == [0, 1, 1]
 
 
 class NegativeHeat:
@@ -217,11 +215,11 @@ class NegativeHeat:
 
 
 @pytest.mark.parametrize("heat", [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (1e9, 1.0)])
-def test_the_first_source_is_never_overtaken(heat: tuple[float, float]) -> None:
+def test_the_first_source_is_never_overtaken(heat):
     domain = HeatMethodSolver(shapes.icosphere(2), laplacian="cotan").operators
     assembler = SourceAssembler(domain, 0.1, domain.mean_mass)
     sources = source_set(OffsetSources([3, 80], [0.0, 0.4]), domain.n, None)
-    term = drop_overtaken(assembler.term(sources), NegativeHeat(*heat), domain.n)  # type: ignore[arg-type]
+    term = drop_overtaken(assembler.term(sources), NegativeHeat(*heat), domain.n)
     assert 3 in term.anchors.vertex
     assert 3 in term.near.vertex
 
@@ -230,7 +228,7 @@ def test_the_first_source_is_never_overtaken(heat: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_every_method_stays_within_its_bound(case: DomainCase):
+def test_every_method_stays_within_its_bound(case):
     problem = case.problem(np.random.default_rng([5, CASES.index(case)]))
     away = problem.exact > 0
     for method, bound in case.bounds.items():
