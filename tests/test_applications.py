@@ -14,7 +14,7 @@ from heat_igl.reference import edge_paths
 
 @pytest.fixture(scope="module")
 def pairs(bunny):
-    return [(int(a), int(b)) for a, b in np.random.default_rng(0).integers(bunny.n_vertices, size=(100, 2))]
+    return [(int(a), int(b)) for a, b in np.random.default_rng(0).integers(bunny.n_vertices, size=(40, 2))]
 
 
 @pytest.fixture(scope="module")

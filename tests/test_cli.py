@@ -38,6 +38,12 @@ def assert_one_line(stderr: str, *words: str) -> None:
         assert word in stderr
 
 
+@pytest.fixture(autouse=True)
+def _small(monkeypatch):
+    """Pictures of few pixels."""
+    monkeypatch.setattr("heat_igl.drawing.figure.DPI", 40)
+
+
 @pytest.fixture
 def ball(tmp_path):
     io.write_mesh(tmp_path / "sphere.off", shapes.icosphere(2))
@@ -67,20 +73,19 @@ def test_distance_writes_what_the_library_returns_and_a_picture(ball):
     assert files(ball.parent) == {"sphere.off", "out.ply", "out.png"}
 
 
-def test_distance_from_positions_in_space(ball):
-    done = command("distance", ball, "--source", 12, "--at", "0.3,-2,0.1", "--cutoff", 0.5, "--output", "out.ply",
-                   cwd=ball.parent)  # fmt: skip
-    assert done.returncode == 0, done.stderr
+def test_distance_from_positions_in_space(ball, capsys):
+    output = ball.with_name("out.ply")
+    options = ["--source=12", "--at=0.3,-2,0.1", "--cutoff=0.5", f"--output={output}"]
+    assert cli.run(["distance", str(ball), *options]) == 0
     mesh = shapes.icosphere(2)
     points, gap = heat_igl.closest_points(mesh, [0.3, -2, 0.1])
     expected = heat_igl.geodesic_distance(mesh, [12, points], cutoff=0.5)
-    np.testing.assert_array_equal(io.read_attributes(ball.parent / "out.ply")["distance"], expected)
+    np.testing.assert_array_equal(io.read_attributes(output)["distance"], expected)
     assert np.isinf(expected).any()
-    assert f"{gap[0]:.6g}" in done.stdout
+    assert f"{gap[0]:.6g}" in capsys.readouterr().out
     for arguments, words in ((["--at", "1,2"], "--at 1,2: three numbers"), ([], "no source: name vertices")):
-        refused = command("distance", ball, *arguments, cwd=ball.parent)
-        assert refused.returncode == 1
-        assert_one_line(refused.stderr, words)
+        assert cli.run(["distance", str(ball), *arguments]) == 1
+        assert_one_line(capsys.readouterr().err, words)
 
 
 def test_paths_and_traces_are_those_of_the_library(ball, capsys, monkeypatch):
@@ -122,10 +127,11 @@ def test_a_request_without_meaning_names_its_option_and_leaves_no_file(
 
 
 @pytest.mark.parametrize("option", ["--output=/proc/out.ply", "--picture=/proc/out.png"])
-def test_an_output_that_cannot_be_written(ball, option):
-    done = command("distance", ball, "--source", 0, option, cwd=ball.parent)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert_one_line(done.stderr, "/proc/out", "cannot be written")
+def test_an_output_that_cannot_be_written(ball, option, capsys):
+    assert cli.run(["distance", str(ball), "--source=0", option]) == 1
+    printed = capsys.readouterr()
+    assert not printed.out
+    assert_one_line(printed.err, "/proc/out", "cannot be written")
 
 
 def test_without_typer_one_line_names_the_extra(tmp_path):

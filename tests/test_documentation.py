@@ -56,6 +56,8 @@ def _folder(tmp_path, monkeypatch):
         heat_igl.write_mesh("solid.mesh", shapes.box(4))
     if importlib.util.find_spec("nibabel"):
         heat_igl.write_mesh("lh.pial.surf.gii", surface)
+    if importlib.util.find_spec("matplotlib"):
+        monkeypatch.setattr("heat_igl.drawing.figure.DPI", 40)
     # The sample without the pymeshlab wheel, which has the fewer vertices of the two.
     monkeypatch.setattr("heat_igl.validation.samples.bunny_path", lambda: None)
 
@@ -68,8 +70,6 @@ def test_a_block_runs_as_it_is_copied(block, monkeypatch):
 
         initialize = polyscope.init
         monkeypatch.setattr(polyscope, "init", lambda: initialize("openGL_mock"))
-    if importlib.util.find_spec("matplotlib"):
-        monkeypatch.setattr("heat_igl.drawing.figure.DPI", 40)
     names = {"__name__": "__main__"}
     exec(compile(block, "block", "exec"), names)
     for name in ("phi", "d", "distance"):  # what the pages call a distance
@@ -130,17 +130,3 @@ def test_an_example_runs_by_itself(text):
 def test_every_public_name_has_an_example(name):
     section = (inspect.getdoc(getattr(heat_igl, name)) or "").partition("\nExamples\n--------\n")[2]
     assert any(part.want for part in PARSER.get_examples(section)), f"{name} has no example that shows a result"
-
-
-def test_the_drawn_strip_is_flat_and_true_to_length(monkeypatch):
-    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "docs")
-    figures = importlib.import_module("drawings")
-    mesh = shapes.torus(14, 22, tube=0.5)
-    path = heat_igl.geodesic_path(mesh, heat_igl.SurfacePoints([476, 546], [[0.2, 0.3, 0.5], [0.3, 0.4, 0.3]]))
-    corners, way = figures.laid_out(mesh, path)
-    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    in_space = mesh.V[mesh.F[path.faces]]
-    assert len(sides) > 10
-    np.testing.assert_allclose(sides, np.linalg.norm(np.roll(in_space, -1, axis=1) - in_space, axis=2), rtol=1e-12)
-    np.testing.assert_allclose(way[:, 1], 0, atol=1e-9)  # one straight line
-    np.testing.assert_allclose(way[-1, 0], path.lengths(mesh).sum(), rtol=1e-12)

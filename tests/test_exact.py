@@ -296,15 +296,6 @@ def test_origins_lead_back():
     np.testing.assert_allclose(before + left, found.distance[here], rtol=1e-11)
 
 
-def test_coincident_vertices():
-    """Degenerate faces are mollified: an edge of length 0 gets one of 1e-12 of the mean."""
-    mesh = shapes.grid(6)
-    V = mesh.V.copy()
-    V[24] = V[25]
-    truth = np.linalg.norm(V - V[0], axis=1)
-    np.testing.assert_allclose(exact_distance(V, mesh.F, 0), truth, rtol=1e-11)
-
-
 @pytest.mark.parametrize("seed", [5, 9, 10, 14])
 def test_faces_whose_corners_coincide(seed):
     """Distances are those of the surface on which such corners are one vertex, to 1e-10 for each edge crossed."""

@@ -168,15 +168,6 @@ def test_steps_that_leave_heat_level_are_refused(options):
 RING = shapes.torus(60, 40)
 
 
-def test_directions_are_those_of_the_distance():
-    solver = GeodesicSolver(RING, tolerance=0)
-    found = solver.directions([3, 500])
-    np.testing.assert_allclose(found.distance, solver.distance([3, 500]), rtol=1e-12, atol=1e-14)
-    np.testing.assert_array_equal(found.labels, solver.voronoi([3, 500]).labels)
-    along = np.linalg.norm(found.gradient, axis=1)
-    np.testing.assert_allclose(np.delete(along, [3, 500]), 1, rtol=1e-12)
-
-
 def test_what_has_no_paths():
     with pytest.raises(ValueError, match="directions need the positions of a mesh"):
         GeodesicSolver.from_edge_lengths(RING.F, igl.edge_lengths(RING.V, RING.F)).directions(3)

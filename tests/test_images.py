@@ -7,7 +7,6 @@ import heat_igl
 from heat_igl import (
     GeodesicSolver,
     HeatMethodSolver,
-    Mesh,
     MeshError,
     PointCloud,
     PolygonMesh,
@@ -157,16 +156,6 @@ def test_wrong_voxels_are_refused(mask, spacing, error, message):
     with pytest.raises(error, match=message):
         image_domain(mask, spacing)
     assert image_domain(np.ones((2, 2, 2), bool), (1.0, 2.0, 3.0)).mesh.is_tetrahedral
-
-
-def test_planar_positions():
-    V = np.array([[0, 0], [3, 0], [3, 4], [0, 4]])
-    mesh = Mesh(V, [[0, 1, 2], [0, 2, 3]])
-    np.testing.assert_array_equal(mesh.V, np.append(V, np.zeros((4, 1)), axis=1))
-    assert GeodesicSolver((V, [[0, 1, 3], [1, 2, 3]]), method="exact").distance(0).tolist() == [0, 3, 5, 4]
-    np.testing.assert_array_equal(mesh.with_vertices(2 * V).V, 2 * mesh.V)
-    assert PolygonMesh(V, [[0, 1, 2, 3]]).V.shape == (4, 3)
-    assert PointCloud(V).P.shape == (4, 3)
 
 
 def test_planar_points_of_files(tmp_path):

@@ -60,13 +60,6 @@ def same(mesh: Mesh, V: object, F: object) -> bool:
 # --- round trips ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("extension", SURFACE_FORMATS)
-def test_surface_comes_back_exactly(tmp_path, extension):
-    mesh = grid(9)
-    write_mesh(tmp_path / f"a{extension}", mesh)
-    assert same(read_mesh(tmp_path / f"a{extension}"), mesh.V, mesh.F)
-
-
 @pytest.mark.parametrize("extension", [".mesh", ".msh", VTU])
 def test_tetrahedra_come_back_exactly(tmp_path, extension):
     write_mesh(tmp_path / f"a{extension}", solid())

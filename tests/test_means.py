@@ -96,7 +96,7 @@ def test_means_on_spheres_approach_those_of_the_sphere(p):
 
 def test_means_of_two_points_on_rough_ground_are_in_the_middle():
     flat = shapes.grid(14)
-    for seed in (0, 5, 9, 33):
+    for seed in (0, 33):
         rng = np.random.default_rng(seed)
         mesh = Mesh(flat.V + 0.3 * flat.edge_lengths.mean() * rng.standard_normal(flat.V.shape), flat.F)
         ends = rng.choice(mesh.n_vertices, 2, replace=False)

@@ -36,13 +36,6 @@ def code(cell: dict[str, Any]) -> str:
     return "".join(line for line in cell["source"] if not line.startswith("%"))
 
 
-def test_notebooks_are_numbered():
-    numbers = [path.name[:2] for path in NOTEBOOKS]
-    assert len(numbers) > 7
-    assert len(set(numbers)) == len(numbers)
-    assert all(re.fullmatch(r"\d\d_[a-z_]+", path.stem) for path in NOTEBOOKS)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs(path, tmp_path):

@@ -154,9 +154,9 @@ def terrain(n: int) -> Mesh:
 
 
 MESHES = {
-    "terrain": lambda: terrain(25),
-    "rough sphere": lambda: perturbed(shapes.icosphere(4), 0.8, 1),
-    "rough grid": lambda: perturbed(shapes.grid(30), 0.8, 2),
+    "terrain": lambda: terrain(18),
+    "rough sphere": lambda: perturbed(shapes.icosphere(3), 0.8, 1),
+    "rough grid": lambda: perturbed(shapes.grid(20), 0.8, 2),
     "flat grid": lambda: shapes.grid(20),
     "torus": lambda: shapes.torus(30, 20),
     "two arms": lambda: two_arms(8),

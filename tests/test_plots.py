@@ -19,7 +19,7 @@ from heat_igl.drawing.surface_image import LINE
 @pytest.fixture(autouse=True)
 def _small(monkeypatch):
     """The same picture with fewer pixels."""
-    monkeypatch.setattr(figure, "DPI", 160)
+    monkeypatch.setattr(figure, "DPI", 120)
 
 
 def surface_image(drawn: Picture) -> np.ndarray:
@@ -57,16 +57,6 @@ def test_each_pixel_shows_the_nearest_triangle_and_interpolates_exactly():
     np.testing.assert_allclose(pixels.depth, depth, atol=1e-9)
     where = np.einsum("pk,pkd->pd", pixels.weights, points[F[pixels.face]])
     np.testing.assert_allclose(where[:, 0] + 40 * where[:, 1], pixels.place, atol=1e-6)
-
-
-def test_neighbouring_triangles_leave_no_gap():
-    mesh, _ = flat_grid(8)
-    points = mesh.V @ camera.rotation(30, 40).T * [80, 80, 1] + [40, 40, 0]
-    pixels = raster.rasterize(points, mesh.F, 150, 150)
-    covered = np.isfinite(pixels.depth)
-    for row in covered[covered.any(axis=1)]:
-        inside = np.flatnonzero(row)
-        assert len(inside) == inside[-1] - inside[0] + 1
 
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (90, 0), (33, -70), (0, 90)])
@@ -204,7 +194,7 @@ def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told():
 def test_unreachable_is_grey_and_the_legend_says_so():
     mesh, x = flat_grid()
     both = twice(mesh, np.array([1.5, 0, 0]))
-    drawn = plot(both, np.concatenate([x, np.full_like(x, np.inf)]), sources=[0])
+    drawn = plot(both, np.concatenate([x, np.full_like(x, np.inf)]), sources=[0], style="plain")
     image = surface_image(drawn)
     right = image[image.shape[0] // 2, image.shape[1] * 3 // 4]
     left = image[image.shape[0] // 2, image.shape[1] // 8]

@@ -47,7 +47,7 @@ MESHES = {"ball": BALL, "strip": shapes.strip(40, 3)}
 def batch(client, tmp_path_factory):
     """Two meshes in several blocks each."""
     path = tmp_path_factory.mktemp("batch") / "store.zarr"
-    report = cluster.distances(MESHES, range(150), path, client=client)
+    report = cluster.distances(MESHES, range(100), path, client=client)
     assert [row.status for row in report.rows] == ["done", "done"]
     return path
 
@@ -153,7 +153,7 @@ def test_the_same_batch_again_repairs_a_store(client, batch, tmp_path, seed):
         files, kind = damaged(store, generator)
         if kind != "turned" and store / "zarr.json" not in files:  # the reader alone sees a turned bit
             break
-    report = cluster.distances(MESHES, range(150), store, client=client)
+    report = cluster.distances(MESHES, range(100), store, client=client)
     assert [row.checksum for row in report.rows] == [row.checksum for row in cluster.report(batch).rows]
     for name in MESHES:
         np.testing.assert_array_equal(cluster.read_distances(store, name), cluster.read_distances(batch, name))
