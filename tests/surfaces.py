@@ -44,6 +44,13 @@ def two_arms(n: int) -> Mesh:
     return Mesh(V, mesh.F[(x < 0) | (y < 0)])
 
 
+def folded_torus(n: int) -> Mesh:
+    """The flat torus of circumference 1, folded flat twice: lengths along the surface are not changed by folds."""
+    along = np.minimum(np.arange(n), n - np.arange(n)) / n
+    x, y = np.meshgrid(along, along, indexing="ij")
+    return Mesh(np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1), shapes.lattice_faces(n, n, True, True))
+
+
 def rough_field(seed: int) -> Mesh:
     rng = np.random.default_rng(seed)
     P = rng.random((rng.integers(8, 60), 2))

@@ -1,6 +1,7 @@
 """HeatMethodSolver: the three steps together, options, range, parity with libigl, and rates of convergence."""
 
 import dataclasses
+from collections.abc import Callable
 
 import igl
 import numpy as np
@@ -13,6 +14,7 @@ from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import SolverOptions
 from heat_igl.operators import Operators, intrinsic_operators, operators
 from heat_igl.steps import HeatFlow, fitted_laplacian, integrate
+from heat_igl.validation import closed_forms
 
 # --- heat method
 
@@ -290,48 +292,35 @@ def test_cotan_agrees_with_libigl(name, seed):
 # --- Distance converges to the known one, at the rate the theory gives and no faster, on every kind of domain
 
 
-def periodic(x, period):
-    return np.minimum(x % period, -x % period)
+def on(mesh: Mesh, source: int, closed: Callable[[Mesh, int], np.ndarray]) -> tuple[Operators, int, np.ndarray]:
+    return operators(mesh), source, closed(mesh, source)
 
 
 def disk(n: int) -> tuple[Operators, int, np.ndarray]:
     mesh = shapes.disk(n)
-    source = nearest_vertex(mesh, [0.5, 0, 0])
-    return operators(mesh), source, np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+    return on(mesh, nearest_vertex(mesh, [0.5, 0, 0]), closed_forms.plane)
 
 
 def sphere(n: int) -> tuple[Operators, int, np.ndarray]:
-    mesh = shapes.icosphere(int(np.log2(n)))
-    return operators(mesh), 0, arcs(mesh.V, 0)
+    return on(shapes.icosphere(int(np.log2(n))), 0, closed_forms.sphere)
 
 
 def cylinder(n: int) -> tuple[Operators, int, np.ndarray]:
-    ring, k = np.divmod(np.arange(n * (n + 1)), n)
-    step = 2 * np.pi / n
-    exact = np.hypot(periodic(k * step, 2 * np.pi), (ring - n // 2) * step)
-    return operators(shapes.cylinder(n, n)), n // 2 * n, exact
+    return on(shapes.cylinder(n, n), n // 2 * n, closed_forms.cylinder)
 
 
 def cone(n: int) -> tuple[Operators, int, np.ndarray]:
-    half_angle = np.pi / 6
-    around = 3 * n
-    ring, k = np.divmod(np.arange(around * n), around)
-    slant = (ring + 1) / n
-    start = (n // 2 + 1) / n
-    rolled = periodic(2 * np.pi * k / around, 2 * np.pi) * np.sin(half_angle)  # at most pi / 2: never by the apex
-    exact = np.sqrt(slant**2 + start**2 - 2 * slant * start * np.cos(rolled))
-    return operators(shapes.cone(around, n, half_angle)), 1 + n // 2 * around, np.concatenate([[start], exact])
+    return on(shapes.cone(3 * n, n, np.pi / 6), 1 + n // 2 * 3 * n, closed_forms.cone)
 
 
 def flat_torus(n: int) -> tuple[Operators, int, np.ndarray]:
-    row, column = np.divmod(np.arange(n * n), n)
-    return intrinsic_operators(shapes.flat_torus(n)), 0, np.hypot(periodic(row / n, 1), periodic(column / n, 1))
+    coordinates = np.stack(np.divmod(np.arange(n * n), n), axis=1) / n
+    return intrinsic_operators(shapes.flat_torus(n)), 0, closed_forms.flat_torus(coordinates, 0)
 
 
 def box(n: int) -> tuple[Operators, int, np.ndarray]:
     mesh = shapes.box(n)
-    source = nearest_vertex(mesh, 0.5)
-    return operators(mesh), source, np.linalg.norm(mesh.V - mesh.V[source], axis=1)
+    return on(mesh, nearest_vertex(mesh, 0.5), closed_forms.convex_solid)
 
 
 def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float, **options) -> float:

@@ -650,15 +650,15 @@ def test_cover_is_closed_and_oriented(mesh):
     assert flipped.areas.sum() == pytest.approx(2 * mesh.measures.sum(), rel=1e-12)
 
 
-def test_tufted_operators_are_on_the_vertices_and_areas_of_the_mesh(mesh):
+def test_tufted_operators_are_those_of_the_mesh_without_negative_weights(mesh):
+    """Not at edges of many faces and not on the boundary, where without a cover nothing can be flipped."""
     domain = tufted_operators(mesh)
     assert domain.weights.sum() == pytest.approx(mesh.measures.sum(), rel=1e-12)
     np.testing.assert_array_equal(domain.referenced, mesh.referenced)
-
-
-def test_no_weight_is_negative(mesh):
-    """Not at edges of many faces and not on the boundary, where without a cover nothing can be flipped."""
-    L = tufted_operators(mesh).L.tocoo()
+    np.testing.assert_array_equal(domain.boundary, mesh.boundary)
+    one, other = (components[:, None] == components for components in (domain.components, mesh.components))
+    np.testing.assert_array_equal(one, other)
+    L = domain.L.tocoo()
     assert L.data[L.row != L.col].min() >= -1e-7
 
 
@@ -667,13 +667,6 @@ def test_without_a_cover_weights_are_negative(name):
     """So that the test above says something."""
     L = intrinsic_operators(intrinsic_delaunay(intrinsic_triangulation(NONMANIFOLD[name]()))).L.tocoo()
     assert L.data[L.row != L.col].min() < -0.01
-
-
-def test_boundary_and_components_are_those_of_the_mesh(mesh):
-    domain = tufted_operators(mesh)
-    assert (domain.boundary == mesh.boundary).all()
-    together = mesh.components[:, None] == mesh.components
-    assert ((domain.components[:, None] == domain.components) == together).all()
 
 
 def test_cover_is_used_where_it_is_needed_and_only_there():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from conftest import flat_perturbed
-from surfaces import twice
+from surfaces import folded_torus, twice
 
 from heat_igl import (
     Mesh,
@@ -19,14 +19,6 @@ from heat_igl import (
 from heat_igl.curves import geodesic_bezier
 
 CELLS = 12
-
-
-def flat_torus() -> Mesh:
-    """The flat torus of circumference 1, folded flat twice: lengths along the surface are not changed by folds."""
-    along = np.minimum(np.arange(CELLS), CELLS - np.arange(CELLS)) / CELLS
-    x, y = np.meshgrid(along, along, indexing="ij")
-    V = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
-    return Mesh(V, shapes.lattice_faces(CELLS, CELLS, True, True))
 
 
 def torus_vertex(cell: np.ndarray) -> np.ndarray:
@@ -56,7 +48,7 @@ def sphere_mean(P: np.ndarray, weights: np.ndarray, p: float) -> np.ndarray:
 
 
 def test_means_on_the_flat_torus_are_those_of_the_plane():
-    mesh = flat_torus()
+    mesh = folded_torus(CELLS)
     rng = np.random.default_rng(0)
     for _ in range(6):
         cell = rng.integers(-2, 3, (5, 2))
@@ -66,7 +58,7 @@ def test_means_on_the_flat_torus_are_those_of_the_plane():
 
 
 def test_medians_on_the_flat_torus_are_those_of_the_plane():
-    mesh = flat_torus()
+    mesh = folded_torus(CELLS)
     # Where the diagonals of a convex quadrilateral meet.
     found = karcher_mean(mesh, torus_vertex(np.array([[-2, -1], [2, 2], [-1, 2], [2, -2]])), p=1)
     share = np.linalg.solve([[4, -3], [3, 4]], [1, 3])[0]

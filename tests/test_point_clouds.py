@@ -704,29 +704,17 @@ def test_the_two_sides_of_a_thin_disc():
     assert distance[1] == pytest.approx(2 + np.pi * thickness / 2, rel=0.03)
 
 
-def moebius_strip(m: int) -> tuple[np.ndarray, np.ndarray]:
-    """2 m triangles around a circle."""
-    turn = 2 * np.pi * np.arange(m) / m
-    ends = []
-    for side in (0.1, -0.1):
-        out = 1 + side * np.cos(turn / 2)
-        ends.append(np.stack([out * np.cos(turn), out * np.sin(turn), side * np.sin(turn / 2)], axis=1))
-    a, b = np.arange(m), np.arange(m) + m
-    # After a turn, the sides have changed places.
-    c, d = np.append(a[1:], m), np.append(b[1:], 0)
-    return np.concatenate(ends), np.concatenate([np.stack([a, c, b], 1), np.stack([c, d, b], 1)]).astype(np.int32)
-
-
 def test_triangles_that_contradict_are_left_out_if_they_are_few_and_on_a_fold():
-    P, F = moebius_strip(1000)
+    strips = (surfaces.moebius_strip(m, 1, 0.1) for m in (1000, 50))
+    (P, F), short = ((strip.V, strip.F.astype(np.int32)) for strip in strips)
     creased = P.copy()
-    creased[[0, 1000], 2] += 0.1  # across the strip: the two sides of this rung nearly lie on each other
+    creased[:2, 2] += 0.1  # across the strip: the two sides of this rung nearly lie on each other
     found, _ = oriented(creased, F, None)
     assert len(F) - 2 <= len(found) < len(F)
     sides = np.concatenate([found[:, [0, 1]], found[:, [1, 2]], found[:, [2, 0]]])
     assert len(np.unique(sides, axis=0)) == len(sides)
     assert len(np.unique(found)) == len(P)
-    for flat in ((P, F), moebius_strip(50)):
+    for flat in ((P, F), short):
         np.testing.assert_array_equal(np.sort(oriented(*flat, None)[0], axis=1), np.sort(flat[1], axis=1))
 
 

@@ -14,6 +14,7 @@ import pytest
 from conftest import relative_error, wheel_path, zoo
 from scipy.spatial import Delaunay
 from steiner import graph_distance
+from surfaces import folded_torus
 
 from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
@@ -41,19 +42,6 @@ def rectangle(n_x: int, n_y: int, width: float, height: float, jitter: float = 0
     step = np.array([width / (n_x - 1), height / (n_y - 1)])
     points[inner] += jitter * step * np.random.default_rng(5).uniform(-1, 1, (int(inner.sum()), 2))
     return Mesh(np.column_stack([points, np.zeros(len(points))]), Delaunay(points).simplices)
-
-
-def flat_torus(n: int, m: int) -> tuple[Mesh, FloatArray, FloatArray]:
-    """A prism's side covered twice, inside and outside joined at both rims: flat everywhere, and it fits into space."""
-    angle = 2 * np.pi * np.arange(n) / n
-    side = 2 * np.sin(np.pi / n)
-    corner = np.repeat(np.stack([np.cos(angle), np.sin(angle)], axis=1), 2 * m, axis=0)
-    along, up = np.meshgrid(side * np.arange(n), np.arange(2 * m) / m, indexing="ij")
-    V = np.column_stack([corner, np.abs(up.ravel() - 1)])
-    i, j = (a.ravel() for a in np.meshgrid(np.arange(n), np.arange(2 * m), indexing="ij"))
-    a, b, next_j = i * 2 * m, (i + 1) % n * 2 * m, (j + 1) % (2 * m)
-    F = np.concatenate([np.stack([a + j, b + j, b + next_j], 1), np.stack([a + j, b + next_j, a + next_j], 1)])
-    return Mesh(V, F), np.stack([along.ravel(), up.ravel()], axis=1), np.array([n * side, 2.0])
 
 
 # --- exact -----------------------------------------------------------------------------------------------------------
@@ -192,9 +180,10 @@ def test_plane_is_exact():
 
 
 def test_flat_torus_is_exact():
-    mesh, coordinates, periods = flat_torus(12, 9)
+    torus, cells = folded_torus(12), np.stack(np.divmod(np.arange(144), 12), axis=1)
+    mesh = Mesh(torus.V * [2, 1, 1], torus.F)
     for sources in (0, [40, 111]):
-        closed = closed_forms.flat_torus(coordinates, sources, periods=periods)
+        closed = closed_forms.flat_torus(cells / [6, 12], sources, periods=(2, 1))
         np.testing.assert_allclose(closed, reference.exact(mesh, sources), atol=1e-9)
     with pytest.raises(ReferenceSolverError, match=r"coordinates of shape \(n, 2\)"):
         closed_forms.flat_torus(mesh.V, 0)

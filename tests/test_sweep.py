@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from conftest import perturbed, pygeodesic_distance, relative_error
-from surfaces import COORDINATES, arcs, moebius_strip, random_disk, sheared, with_point
+from surfaces import COORDINATES, arcs, moebius_strip, with_point
+from test_exact import FLAT
 
 from heat_igl import GeodesicSolver, Mesh, OffsetSources, SurfacePoints, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
@@ -19,13 +20,6 @@ from heat_igl.windows.bounds import Bounds
 from heat_igl.windows.exact import exact_distance
 
 # --- Distance by sweeps over triangles, in an order of their own: exact on flat domains, near it on others
-
-
-FLAT = {
-    "grid": lambda: shapes.grid(12),
-    "sheared grid": lambda: sheared(shapes.grid(12), 2.3),
-    "sheared disk": lambda: sheared(random_disk(500, 3), 3.3),
-}
 
 
 def swept(mesh: Mesh, sources: object) -> np.ndarray:

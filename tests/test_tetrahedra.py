@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import cKDTree
 from surfaces import nearest_vertex
 
 import heat_igl
@@ -12,27 +12,19 @@ from heat_igl import GeodesicSolver, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.typing import BoolArray, FloatArray
+from heat_igl.validation import domains
+from heat_igl.validation.domains import around_the_edge, delaunay
 
 
-def scattered(n: int, body: str, seed: int = 0) -> Mesh:
+def scattered(n: int, seed: int = 0) -> Mesh:
     """Delaunay tetrahedra of random points, slivers and all."""
-    rng = np.random.default_rng(seed)
-    V = rng.random((n, 3))
-    if body == "ball":
-        V = V - 0.5
-        V = V[np.linalg.norm(V, axis=1) < 0.5]
-    F = Delaunay(V).simplices
-    volumes = np.abs(np.linalg.det(V[F[:, 1:]] - V[F[:, :1]]))
-    return Mesh(V, F[volumes > 1e-12])
+    return delaunay(np.random.default_rng(seed).random((n, 3)))
 
 
 def without(n: int, cut: Callable[[FloatArray], BoolArray], jitter: float = 0.25) -> Mesh:
     """A cube of n^3 cells without those whose centres are `cut`, vertices inside moved by a part of a cell."""
-    cube = shapes.box(n)
-    used, F = np.unique(cube.F[~cut(cube.V[cube.F].mean(axis=1))], return_inverse=True)
-    mesh = Mesh(cube.V[used], F.reshape(-1, 4))
-    V = mesh.V.copy()
-    inner = ~mesh.boundary
+    mesh = domains.without(n, cut)
+    V, inner = mesh.V.copy(), ~mesh.boundary
     V[inner] += np.random.default_rng(0).uniform(-jitter / n, jitter / n, (int(inner.sum()), 3))
     return Mesh(V, mesh.F)
 
@@ -40,16 +32,6 @@ def without(n: int, cut: Callable[[FloatArray], BoolArray], jitter: float = 0.25
 def l_shape(n: int, jitter: float) -> Mesh:
     """A cube without the quarter x, y > 1/2."""
     return without(n, lambda centre: (centre[:, :2] > 0.5).all(axis=1), jitter)
-
-
-def around_the_edge(V: FloatArray, source: int) -> FloatArray:
-    """The edge x = y = 1/2 of `l_shape` is where ways bend: the part beyond is turned about it."""
-    x, y, z = (V - [0.5, 0.5, V[source, 2]]).T
-    # From the wall y > 1/2, over the inside of the body, to the other wall.
-    angle = np.mod(np.arctan2(y, x) - np.pi / 2, 2 * np.pi)
-    apart = np.abs(angle - angle[source])
-    bent = np.hypot(np.hypot(x, y) + np.hypot(x[source], y[source]), z)
-    return np.where(apart > np.pi, bent, np.linalg.norm(V - V[source], axis=1))
 
 
 @pytest.mark.parametrize(("n", "jitter"), [(6, 0.25), (12, 0.25), (24, 0.0), (24, 0.25)])
@@ -156,7 +138,7 @@ def test_where_two_bodies_share_a_vertex():
 
 @pytest.mark.parametrize("k", [2, 30, 400])
 def test_nearest_of_many_sources(k):
-    mesh = scattered(2500, "cube", 1)
+    mesh = scattered(2500, 1)
     sources = np.random.default_rng(2).choice(mesh.n_vertices, k, replace=False)
     exact, nearest = cKDTree(mesh.V[sources]).query(mesh.V)
     found = GeodesicSolver(mesh).voronoi(sources)
@@ -170,7 +152,7 @@ def test_nearest_of_many_sources(k):
 
 def test_a_source_that_no_neighbour_belongs_to():
     """Of 400 sources, one cell was so narrow that a vertex in it had no neighbour there: 6 % too far."""
-    mesh = scattered(2500, "cube", 2)
+    mesh = scattered(2500, 2)
     sources = np.random.default_rng(2).choice(mesh.n_vertices, 400, replace=False)
     exact, nearest = cKDTree(mesh.V[sources]).query(mesh.V)
     found = GeodesicSolver(mesh).voronoi(sources)
@@ -257,7 +239,7 @@ def test_derivatives_of_lines(hollow):
 
 
 def test_halved_tetrahedra():
-    mesh = scattered(200, "cube")
+    mesh = scattered(200)
     halved = MetricSimplices.in_space(mesh).halved()
     fine = Mesh(halved.V, halved.corners)
     assert fine.n_vertices == mesh.n_vertices + len(np.unique(np.sort(MetricSimplices.in_space(mesh).edges[0]), axis=0))
