@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import igl
 import numpy as np
 import pytest
 import scipy.spatial
@@ -34,6 +35,13 @@ def bumpy() -> Mesh:
 def cube() -> Mesh:
     V = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
     return Mesh(V, scipy.spatial.ConvexHull(V).simplices)
+
+
+def box_surface(n: int, size: tuple[float, float, float] = (1, 1, 1)) -> Mesh:
+    """The surface of a box, each side a grid of squares, counter-clockwise seen from outside."""
+    solid = shapes.box(n, size)
+    used, F = np.unique(igl.boundary_facets(solid.F)[0], return_inverse=True)
+    return Mesh(solid.V[used], F.reshape(-1, 3))
 
 
 def two_arms(n: int) -> Mesh:

@@ -103,19 +103,6 @@ def test_a_metric_per_pixel_is_a_linear_map():
         domain.per_face(g.swapaxes(0, 1))
 
 
-def test_wrong_images_are_refused():
-    with pytest.raises(heat_igl.MeshError, match="mask must be a boolean image"):
-        image_domain([[0, 1], [1, 1]])
-    with pytest.raises(heat_igl.MeshError, match="mask must be a boolean image"):
-        image_domain([[True], [True, False]])
-    with pytest.raises(heat_igl.MeshError, match="mask holds no pixel"):
-        image_domain([[False]])
-    for spacing in (0, (1, -1), (1, 2, 3), "x", np.inf):
-        with pytest.raises(ValueError, match="spacing must be one or two positive numbers"):
-            image_domain([[True]], spacing)
-    image_domain([[True, False]])
-
-
 # --- Images of three dimensions: voxels as tetrahedra, and distance through them
 
 
@@ -147,12 +134,16 @@ def test_speeds_of_voxels():
 @pytest.mark.parametrize(
     ("mask", "spacing", "error", "message"),
     [
+        ([[0, 1], [1, 1]], 1.0, MeshError, "mask must be a boolean image"),
+        ([[True], [True, False]], 1.0, MeshError, "mask must be a boolean image"),
+        ([[False]], 1.0, MeshError, "mask holds no pixel"),
+        *(([[True]], bad, ValueError, "spacing must be one or two") for bad in (0, (1, -1), (1, 2, 3), "x", np.inf)),
         (np.ones((2, 2, 2, 2), bool), 1.0, MeshError, r"mask must be a boolean image .* of shape \(2, 2, 2, 2\)"),
         (np.zeros((2, 2, 2), bool), 1.0, MeshError, "mask holds no pixel"),
         (np.ones((2, 2, 2), bool), (1.0, 2.0), ValueError, "spacing must be one or three positive numbers"),
     ],
 )
-def test_wrong_voxels_are_refused(mask, spacing, error, message):
+def test_wrong_images_are_refused(mask, spacing, error, message):
     with pytest.raises(error, match=message):
         image_domain(mask, spacing)
     assert image_domain(np.ones((2, 2, 2), bool), (1.0, 2.0, 3.0)).mesh.is_tetrahedral

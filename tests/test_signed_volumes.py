@@ -3,7 +3,7 @@
 import igl
 import numpy as np
 import pytest
-from surfaces import twice
+from surfaces import box_surface, twice
 
 from heat_igl import Mesh, MeshError, PointCloud, SourceError, VoxelBox, shapes, volume_signed_distance
 
@@ -14,18 +14,8 @@ def ball() -> Mesh:
 
 
 def brick() -> Mesh:
-    """The surface of a box, each side a grid of squares, counter-clockwise seen from outside."""
-    solid = shapes.box(6, (0.6, 0.5, 0.4))
-    corners = solid.F[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
-    opposite = solid.F.reshape(-1)
-    ascending = np.sort(corners, axis=1)
-    _, first, count = np.unique(ascending, axis=0, return_index=True, return_counts=True)
-    outer = first[count == 1]
-    F, inner = corners[outer], solid.V[opposite[outer]]
-    normal = np.cross(solid.V[F[:, 1]] - solid.V[F[:, 0]], solid.V[F[:, 2]] - solid.V[F[:, 0]])
-    inward = np.einsum("fx,fx->f", normal, inner - solid.V[F[:, 0]]) > 0
-    used, compact = np.unique(np.where(inward[:, None], F[:, ::-1], F), return_inverse=True)
-    return Mesh(solid.V[used] + [0.2, 0.25, 0.3], compact.reshape(-1, 3))
+    mesh = box_surface(6, (0.6, 0.5, 0.4))
+    return Mesh(mesh.V + np.array([0.2, 0.25, 0.3]), mesh.F)
 
 
 def ring() -> Mesh:

@@ -1,10 +1,10 @@
 """The connection Laplacian and the vector heat method."""
 
-import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import flat_perturbed, perturbed
+from surfaces import box_surface
 
 import heat_igl
 from heat_igl import Mesh, VectorHeatSolver, exp_map, shapes, tangent_frames
@@ -213,10 +213,7 @@ def test_a_large_sphere_is_finite_and_right():
 
 def test_transport_around_the_corner_of_a_box_turns_by_a_right_angle():
     """The holonomy of a triangle of geodesics is the curvature inside: pi / 2 around a corner, else 0."""
-    solid = shapes.box(8)
-    faces = igl.boundary_facets(solid.F)[0]
-    used, F = np.unique(faces, return_inverse=True)
-    mesh = Mesh(solid.V[used], F.reshape(-1, 3))
+    mesh = box_surface(8)
     low, high = mesh.V.min(axis=0), mesh.V.max(axis=0)
     at = (mesh.V - low) / (high - low)
 
