@@ -11,12 +11,12 @@ from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax
 from cython.cimports.heat_igl.kernels.windows.joining import (
     carry_joined,
     cut_joined_by_ends,
-    find_side,
     join,
 )
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
     BESIDE,
+    CROSSED_AROUND_APEX,
     JOINS,
     LEFT_OF_APEX,
     MARGIN,
@@ -42,7 +42,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     backward,
     bent,
     direction,
-    error_of,
     is_joined,
     is_within,
     keep_root,
@@ -526,7 +525,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     for i in range(n):
         w = windows + i
         if has_errors:
-            margin = error_of(s, w)
+            margin = w.turn_y
         if not _cut_by_ends(w, from_tail + margin - w.offset, from_head + margin - w.offset):
             continue
         if w.stop - w.start <= NARROW * length:
@@ -612,7 +611,7 @@ def _arrive(
     is_nearer: cython.bint = distance < s.upper[s.vertex[h]]
     relax(s, s.vertex[h], distance, w.root, h, at, w.corner, leaving_x, leaving_y)
     if is_nearer and s.is_joining:
-        s.error[s.vertex[h]] = error_of(s, w)
+        s.error[s.vertex[h]] = w.turn_y
 
 
 @cython.cfunc
@@ -622,35 +621,13 @@ def _straight(w: cython.pointer(Window), apex: cython.pointer(Apex)) -> cython.d
     """Distance of the apex by the straight line of a window."""
     x: cython.double = apex.x - w.x
     y: cython.double = apex.y + w.depth
-    return w.offset + (w.x * apex.x + w.depth * apex.y if w.is_plane else sqrt(x * x + y * y))
-
-
-@cython.cfunc
-@cython.nogil
-def _reach_over_joined(
-    s: cython.pointer(Search),
-    h: cython.int,
-    windows: cython.pointer(Window),
-    i: cython.int,
-    apex: cython.pointer(Apex),
-) -> cython.void:
-    """`_reach_apex` for the joined window i."""
-    w: cython.pointer(Window) = windows + i
-    a: cython.double
-    b: cython.double
-    at: cython.double
-    distance: cython.double
-    find_side(w, apex, cython.address(a), cython.address(b))
-    near: cython.double = NEAR * apex.length * fabs(w.depth)
-    if b < -near or a > near or apex.y + w.depth == 0.0:
-        return
-    at = min(max(backward(w, apex.x, apex.y), w.start), w.stop)
-    distance = bent(w, at, apex.x, apex.y)
-    if w.side == LEFT_OF_APEX or w.side == RIGHT_OF_APEX:
-        _arrive(s, h, w, apex, distance, at)
-    elif distance < apex.nearest:
-        apex.nearest = distance
-        apex.best = i
+    if w.is_plane:
+        return w.offset + (w.x * apex.x + w.depth * apex.y)
+    distance: cython.double = sqrt(x * x + y * y)
+    if is_joined(w):
+        # Behind where the lines meet they count forwards again, whatever the sign of the depth.
+        distance = w.turn_x * backward(w, apex.x, apex.y) + (distance if y > 0.0 else -distance)
+    return w.offset + distance
 
 
 @cython.cfunc
@@ -669,34 +646,40 @@ def _reach_apex(
     b: cython.double
     at: cython.double
     distance: cython.double
+    is_crossed: cython.bint
     w: cython.pointer(Window)
     for i in range(n):
         w = windows + i
+        is_crossed = False
         if w.is_plane:
             x = backward(w, apex.x, apex.y)
             m = 1.0
             a = w.start - x
             b = w.stop - x
-        elif is_joined(w):
-            _reach_over_joined(s, h, windows, i, apex)
-            continue
         else:
             x = apex.x - w.x
             m = apex.y + w.depth
             a = (w.start - w.x) * m - w.depth * x
             b = (w.stop - w.x) * m - w.depth * x
+            if w.depth < 0.0:
+                # Joined lines that meet ahead; if before they come to the height of the apex, in reverse order there.
+                is_crossed = m > 0.0
+                a, b = (-b, -a) if is_crossed else (-a, -b)
+                m = fabs(m)
         if b < 0.0:
             w.side = LEFT_OF_APEX
             if b < -NEAR * apex.length * m:
                 continue
-            b = w.stop
+            b = w.start if is_crossed else w.stop
         elif a > 0.0:
             w.side = RIGHT_OF_APEX
             if a > NEAR * apex.length * m:
                 continue
-            b = w.start
+            b = w.stop if is_crossed else w.start
         else:
-            w.side = AROUND_APEX
+            w.side = CROSSED_AROUND_APEX if is_crossed else AROUND_APEX
+            if m == 0.0:
+                continue
             distance = _straight(w, apex)
             if distance < apex.nearest:
                 apex.nearest = distance
@@ -922,7 +905,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
         # Those that meet ahead may cross that path twice.
         is_best = (apex.best < 0) | (i == apex.best) | (w.depth < 0.0)
         if s.is_joining:
-            margin = s.error[s.vertex[h]] + error_of(s, w)
+            margin = s.error[s.vertex[h]] + w.turn_y
         if w.side != RIGHT_OF_APEX and (
             is_best
             or w.start < apex.best_at

@@ -13,7 +13,6 @@ fraction `accuracy` of its distance. Where lines of two windows separate behind 
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge
 from cython.cimports.heat_igl.kernels.windows.front import has_room
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
@@ -21,7 +20,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     FARTHEST_MEETING,
     FEW_JOINED,
     FIRST,
-    LEFT_OF_APEX,
     LONG,
     LONG_LISTS,
     NARROW,
@@ -30,15 +28,14 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     OFTEN,
     ONE_IN,
     PAIRS,
-    RIGHT_OF_APEX,
     SELDOM,
     Apex,
     List,
     Search,
     Window,
+    as_joined,
     backward,
     direction,
-    error_of,
     reach,
 )
 from cython.cimports.libc.math import fabs, sqrt
@@ -69,10 +66,21 @@ def join(s: cython.pointer(Search), one: cython.pointer(List), n: cython.int, h:
         s.is_joining = s.n_long > LONG_LISTS and ONE_IN * s.n_long > s.n_lists_done
         if not s.is_joining:
             return n
+        _begin(s)
     n = _fill_gaps(s, one, n, h)
     if s.n_lists_done % s.join_every == 0 and not s.failed:
         n = _join_neighbours(s, one.windows, n, h)
     return n
+
+
+@cython.cfunc
+@cython.nogil
+def _begin(s: cython.pointer(Search)) -> cython.void:
+    """Give all windows that wait, those of the list that is crossed among them, the form of joined ones."""
+    for i in range(s.n_lists):
+        if s.lists[i].half_edge >= 0:
+            for j in range(s.lists[i].count):
+                as_joined(s, s.lists[i].windows + j)
 
 
 @cython.cfunc
@@ -83,15 +91,8 @@ def _join_neighbours(
     """Join windows that lie side by side on half-edge h; how many are left."""
     k: cython.int = 1
     length: cython.double = s.length[h]
-    u: cython.pointer(Window)
-    w: cython.pointer(Window)
-    room: cython.double
-    # No distance here is larger than that of an end and the length.
-    most: cython.double = s.accuracy * (s.upper[s.vertex[next_half_edge(h)]] + length)
     for i in range(1, n):
-        u, w = windows + (k - 1), windows + i
-        room = most - max(error_of(s, u), error_of(s, w))
-        if room > 0.0 and not _is_bent(u, w, room) and _join(s, u, w, length):
+        if _join(s, windows + (k - 1), windows + i, length):
             continue
         if k < i:
             windows[k] = windows[i]
@@ -102,25 +103,6 @@ def _join_neighbours(
         s.join_every = min(2 * s.join_every, SELDOM) if FEW_JOINED * s.n_joined < s.n_pairs else OFTEN
         s.n_pairs = s.n_joined = 0
     return k
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _is_bent(u: cython.pointer(Window), w: cython.pointer(Window), most: cython.double) -> cython.bint:
-    """Whether joining would change distance by more than `most`.
-
-    The usual case for windows that were not joined before, found without a square root. Where both meet, a kink of
-    distance becomes even: by half of it, times the product of the widths over their sum. The kink is the change of
-    ``x / sqrt(1 + x x)`` for a direction x.
-    """
-    at: cython.double = 0.5 * (u.stop + w.start)
-    a: cython.double = direction(u, at)
-    b: cython.double = direction(w, at)
-    square: cython.double = max(a * a, b * b)
-    p: cython.double = u.stop - u.start
-    q: cython.double = w.stop - w.start
-    return fabs(a - b) * p * q > 2.0 * most * (p + q) * (1.0 + square) * (1.0 + 0.5 * square)
 
 
 @cython.cfunc
@@ -135,24 +117,28 @@ def _span(
 ) -> cython.double:
     """Make the window between a line of u and one of w, with the distances of both; the change of its offset between.
 
-    -1 if the lines are parallel to rounding, or meet ahead before a few faces are crossed.
+    -1 if the lines are parallel to rounding, or meet ahead before a few faces are crossed. `turn_y` takes the smaller
+    one of the distances at both ends.
     """
     rise: cython.double = direction(u, start)
-    spread: cython.double = direction(w, stop) - rise
-    first: cython.double = _distance(u, start)
-    last: cython.double = _distance(w, stop)
+    other_rise: cython.double = direction(w, stop)
+    spread: cython.double = other_rise - rise
+    # How much longer a line is than what it rises, and the offsets at which the lines come.
+    slant: cython.double = sqrt(1.0 + rise * rise)
+    other_slant: cython.double = sqrt(1.0 + other_rise * other_rise)
+    first: cython.double = u.offset + u.turn_x * start
+    last: cython.double = w.offset + w.turn_x * stop
     one[0] = u[0]
-    one.corner = -1
     one.start, one.stop = start, stop
+    one.turn_y = min(first + u.depth * slant, last + w.depth * other_slant)
     if fabs(spread) * FARTHEST_MEETING * length <= stop - start:
         return -1.0
     one.depth = (stop - start) / spread
     if -NEAREST_FOCUS * length < one.depth < 0.0:
         return -1.0
     one.x = start - rise * one.depth
-    square: cython.double = one.depth * one.depth
-    first -= _signed(sqrt((start - one.x) * (start - one.x) + square), one.depth)
-    last -= _signed(sqrt((stop - one.x) * (stop - one.x) + square), one.depth)
+    first += (u.depth - one.depth) * slant
+    last += (w.depth - one.depth) * other_slant
     one.turn_x = (last - first) / (stop - start)
     one.offset = first - one.turn_x * start
     return fabs(last - first)
@@ -166,16 +152,14 @@ def _join(
     """Let u take the place of both, if distance stays within the tolerance."""
     one: Window
     at: cython.double = 0.5 * (u.stop + w.start)
-    error: cython.double = max(error_of(s, u), error_of(s, w))
+    error: cython.double = max(u.turn_y, w.turn_y)
     more: cython.double
     # Side by side: neither is inside the other.
-    if w.start - u.stop > NEAR * length or w.start <= u.start or w.stop <= u.stop or u.is_plane or w.is_plane:
-        return False
-    room: cython.double = s.accuracy * min(_distance(u, u.start), _distance(w, w.stop)) - error
-    if room <= 0.0:
+    if w.start - u.stop > NEAR * length or w.start <= u.start or w.stop <= u.stop:
         return False
     more = _span(u, u.start, w, w.stop, length, cython.address(one))
-    if more < 0.0:
+    room: cython.double = s.accuracy * one.turn_y - error
+    if more < 0.0 or room <= 0.0:
         return False
     # Where the lines diverge, or meet ahead, equal shares of a side do not stay equal.
     if one.depth > 0.0:
@@ -249,22 +233,15 @@ def _between(
     u: cython.pointer(Window) = windows + before
     w: cython.pointer(Window) = windows + behind
     more: cython.double
-    if w.start <= u.stop + NEAR * length or u.is_plane or w.is_plane:
+    if w.start <= u.stop + NEAR * length:
         return False
     if direction(w, w.start) <= direction(u, u.stop) or _is_covered(windows, n, u.stop, w.start):
         return False
     more = _span(u, u.stop, w, w.start, length, gap)
     # Nothing is known of distance between, but that it has no larger kink than that of the lines.
-    gap.turn_y = max(error_of(s, u), error_of(s, w)) + more
+    gap.turn_y = max(u.turn_y, w.turn_y) + more
     gap.turn_y += 0.125 * (w.start - u.stop) * (direction(w, w.start) - direction(u, u.stop))
     return more >= 0.0 and gap.turn_y < 2.0 * s.accuracy * _distance(u, u.stop)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _signed(distance: cython.double, depth: cython.double) -> cython.double:
-    return distance if depth > 0.0 else -distance
 
 
 @cython.cfunc
@@ -303,27 +280,6 @@ def _as_long(
     return min(max(at, w.start), w.stop)
 
 
-def find_side(
-    w: cython.pointer(Window), apex: cython.pointer(cython.const[Apex]), start: cython.p_double, stop: cython.p_double
-) -> cython.void:
-    """On which side the lines of a joined window pass the apex; how far beside it the first and the last line pass.
-
-    Both come times the depth, without its sign.
-    """
-    start[0] = (w.start - apex.x) * w.depth + (w.start - w.x) * apex.y
-    stop[0] = (w.stop - apex.x) * w.depth + (w.stop - w.x) * apex.y
-    if w.depth < 0.0:
-        start[0], stop[0] = -start[0], -stop[0]
-    w.side = AROUND_APEX
-    if start[0] > stop[0]:
-        start[0], stop[0] = stop[0], start[0]
-        w.side = CROSSED_AROUND_APEX
-    if stop[0] < 0.0:
-        w.side = LEFT_OF_APEX
-    elif start[0] > 0.0:
-        w.side = RIGHT_OF_APEX
-
-
 @cython.cfunc
 @cython.inline
 @cython.nogil
@@ -334,11 +290,15 @@ def _along_side(
     cosine: cython.double,
     sine: cython.double,
     length: cython.double,
+    otherwise: cython.double,
 ) -> cython.double:
-    """Where a line that goes `along` while it rises by `depth` meets a side, from its lower end; at most the apex."""
+    """Where a line that goes `along` while it rises by `depth` meets a side, from its lower end; at most the apex.
+
+    A line along the side meets it anywhere, and to rounding before its end or not at all: then it is taken for
+    `otherwise`, such that the window becomes wider.
+    """
     place: cython.double = at * depth / (cosine * depth - along * sine)
-    # A line that separates from the side meets it behind its end.
-    return min(place, length) if place >= 0.0 else length
+    return min(place, length) if place >= 0.0 else otherwise
 
 
 def carry_joined(
@@ -364,18 +324,19 @@ def carry_joined(
         length = apex.left_length
         out.x = w.x * apex.cos_left - w.depth * apex.sin_left
         out.depth = w.x * apex.sin_left + w.depth * apex.cos_left
-        low = _along_side(w.start, w.start - w.x, w.depth, apex.cos_left, apex.sin_left, length)
-        high = _along_side(w.stop, w.stop - w.x, w.depth, apex.cos_left, apex.sin_left, length)
+        low = _along_side(w.start, w.start - w.x, w.depth, apex.cos_left, apex.sin_left, length, 0.0)
+        high = _along_side(w.stop, w.stop - w.x, w.depth, apex.cos_left, apex.sin_left, length, length)
     else:
         length = apex.right_length
         at = apex.length - w.x
         out.x = length - (at * apex.cos_right - w.depth * apex.sin_right)
         out.depth = at * apex.sin_right + w.depth * apex.cos_right
         at = apex.length - w.start
-        low = length - _along_side(at, w.x - w.start, w.depth, apex.cos_right, apex.sin_right, length)
+        low = length - _along_side(at, w.x - w.start, w.depth, apex.cos_right, apex.sin_right, length, length)
         at = apex.length - w.stop
-        high = length - _along_side(at, w.x - w.stop, w.depth, apex.cos_right, apex.sin_right, length)
-    if out.depth == 0.0:
+        high = length - _along_side(at, w.x - w.stop, w.depth, apex.cos_right, apex.sin_right, length, 0.0)
+    # Lines that come from their root do not go back to it.
+    if out.depth == 0.0 or (w.depth > 0.0 and out.depth < 0.0):
         return False
     if is_around:
         at = min(max(backward(w, apex.x, apex.y), w.start), w.stop)

@@ -26,6 +26,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     Search,
     Window,
     apart,
+    as_joined,
     at_corner,
     nearest_on,
     twice_product,
@@ -87,6 +88,8 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         one.turn_x = (place_x[(c + 1) % 3] - place_x[(c + 2) % 3]) / length
         one.turn_y = (place_y[(c + 1) % 3] - place_y[(c + 2) % 3]) / length
         one.side = one.is_plane = 0
+        if s.is_joining:
+            as_joined(s, cython.address(one))
         if one.depth > 0.0:
             add(s, h, cython.address(one), 1, False)
     j: cython.int = s.first_target[f] if s.first_target != cython.NULL else -1
@@ -185,6 +188,8 @@ def _emit_from_bend(
     one.corner = k
     one.turn_x, one.turn_y = 0.5 * twice_product(length, right, left) / (length * right), -one.depth / right
     one.side = one.is_plane = 0
+    if s.is_joining:
+        as_joined(s, cython.address(one))
     if one.depth > 0.0:
         add(s, k, cython.address(one), 1, False)
 

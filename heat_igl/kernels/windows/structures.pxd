@@ -219,7 +219,7 @@ cdef extern from *:
     #define NEAREST_FOCUS 4.0
     #define FARTHEST_MEETING 1e5
     // Windows are joined at one of so many crossings at least, at most: what was not joined at one seldom is at the next.
-    #define OFTEN 2
+    #define OFTEN 4
     #define SELDOM 64
     // Joining begins when more than so many lists, and more than one in so many, had so many windows, within the first
     // crossings, one for so many half-edges: it costs time in shorter lists, and on two threads.
@@ -336,11 +336,12 @@ cdef inline double bent(const Window* w, double at, double x, double y) noexcept
     return w.offset + reach(w, at) + sqrt((at - x) * (at - x) + y * y)
 
 
-# Largest error of the distance by a window.
-cdef inline double error_of(const Search* s, const Window* w) noexcept nogil:
-    if is_joined(w):
-        return w.turn_y
-    return s.error[w.root] if s.is_joining and w.root < s.n else 0.0
+# While windows are joined, all have the form of joined ones, so that no branch depends on which are: the offset of one
+# with a root does not grow, and its error is that of the root.
+cdef inline void as_joined(const Search* s, Window* w) noexcept nogil:
+    w.turn_x = 0.0
+    w.turn_y = s.error[w.root] if w.root < s.n else 0.0
+    w.corner = -1
 
 
 # The direction of the line of a window through a point of its half-edge: how far it goes along while it rises by 1.
