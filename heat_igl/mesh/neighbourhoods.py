@@ -47,8 +47,9 @@ _HARDLY_CHANGED = 0.9
 # Noise is looked for at this many points.
 _SAMPLE = 500
 # Deviations from a quadric of half as many neighbours, in shares of those from the quadric of all: noise deviates from
-# both alike, 0.68 to 1 in measurements, detail from the smaller one by less, 0.14 to 0.58.
-_NOISE_NOT_DETAIL = 0.63
+# both alike, by 0.85 to 1 in measurements, detail from the smaller one by less, 0.14 to 0.74. Noise of about a spacing
+# makes neighbourhoods balls, to which quadrics fit worse the larger they are: 0.68 to 1.
+_NOISE_NOT_DETAIL, _THICK_NOISE_NOT_DETAIL = 0.8, 0.63
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +238,7 @@ def without_noise(tree: PointTree) -> PointTree:
     if few < _NOISE:
         return tree
     noise, thickness = of_sample(_K)
-    if few < _NOISE_NOT_DETAIL * noise:
+    if few < noise * (_NOISE_NOT_DETAIL if of_few <= _NO_DISC else _THICK_NOISE_NOT_DETAIL):
         return tree
     moved = tree
     for k, stride in _spreads(of_sample, {_K // 2: of_few, _K: thickness}, n):
