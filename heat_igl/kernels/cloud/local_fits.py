@@ -124,7 +124,6 @@ def _around(
     px: cython.double = P[index[0], 0]
     py: cython.double = P[index[0], 1]
     pz: cython.double = P[index[0], 2]
-    j: cython.Py_ssize_t
     for j in range(k):
         dx: cython.double = P[index[j], 0] - px
         dy: cython.double = P[index[j], 1] - py
@@ -187,7 +186,6 @@ def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cy
 @cython.nogil
 def _turn(local: cython.double[:, ::1], axes: cython.double[:, ::1]) -> cython.void:
     """Turn rows 0 to 2 of `local` into the axes."""
-    j: cython.Py_ssize_t
     for j in range(local.shape[1]):
         x: cython.double = local[0, j]
         y: cython.double = local[1, j]

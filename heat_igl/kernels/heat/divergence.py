@@ -21,9 +21,6 @@ def divergence_of_descent(
     """
     divergence = np.zeros(u.shape[0])
     total: cython.double[::1] = divergence
-    x: cython.double
-    y: cython.double
-    largest: cython.double
     with cython.nogil:
         for f in range(corners.shape[0]):
             # The triangle lies with corner a at the origin and corner b on the first axis.

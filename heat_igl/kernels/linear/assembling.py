@@ -32,7 +32,6 @@ def laplacian(F: cython.const[cython.int][:, ::1], weight: cython.const[cython.d
     indptr: cython.int[::1] = pointers
     indices: cython.int[::1] = rows
     data: cython.double[::1] = values
-    j: cython.Py_ssize_t
     count: cython.int = 0
     with cython.nogil:
         for e in range(size):

@@ -244,7 +244,6 @@ def _subtract_from_update(
     update: numbers, left: cython.Py_ssize_t, panel: entries, columns: cython.Py_ssize_t
 ) -> cython.void:
     """Subtract the contribution of the eliminated columns of a front from the other rows."""
-    top: cython.Py_ssize_t
     size: cython.Py_ssize_t = columns + left
     low: cython.Py_ssize_t = 0
     while low < left:

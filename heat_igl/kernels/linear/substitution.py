@@ -127,7 +127,6 @@ def _forward_one(
 def _back_one(
     f: Substitution, x: cython.double[::1], first: cython.Py_ssize_t, end: cython.Py_ssize_t, room: cython.double[::1]
 ) -> cython.void:
-    total: cython.double
     below: numbers = cython.address(room[0])
     for p in range(end - 1, first - 1, -1):
         b: cython.Py_ssize_t = f.pieces[p]

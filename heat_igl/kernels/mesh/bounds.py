@@ -93,7 +93,6 @@ def shorten(
     is_waiting: cython.uchar[::1] = np.zeros(n, np.uint8)
     begin: cython.Py_ssize_t = 0
     count: cython.Py_ssize_t = 0
-    lowered: cython.int
     with cython.nogil:
         for e in range(length.shape[0]):
             # Nearly always false, and so cheaper than to ask which end is nearer.

@@ -26,8 +26,6 @@ def index_moves(kind: cython.longlong[:, ::1], n_faces):
     first_array, following_array = np.full(n_faces, -1), np.full((k, 3), -1)
     first: cython.longlong[::1] = first_array
     following: cython.longlong[:, ::1] = following_array
-    f: cython.longlong
-    g: cython.longlong
     for i in range(kind.shape[0] - 1, -1, -1):
         if kind[i, 0] == 0:
             f, g = kind[i, 1], kind[i, 2]

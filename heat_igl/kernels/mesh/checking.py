@@ -120,7 +120,6 @@ def steepest_edge(
     x: cython.double[12]
     far: cython.longlong = -1
     near: cython.longlong = -1
-    squared: cython.double
     with cython.nogil:
         for f in range(F.shape[0]):
             for a in range(n_corners):

@@ -57,9 +57,6 @@ def _by_lower_end(
 
     `begin` (n + 1,), which must come full of 0, takes where the half-edges with lower end v end, at ``begin[v]``.
     """
-    a: cython.int
-    b: cython.int
-    c: cython.int
     for f in range(F.shape[0]):
         a, b, c = cython.cast(cython.int, F[f, 0]), cython.cast(cython.int, F[f, 1]), cython.cast(cython.int, F[f, 2])
         vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2] = a, b, c

@@ -40,7 +40,6 @@ def _around(
     """Visit the corners around one vertex; return whether they close up."""
     most: cython.longlong = twin.shape[0]
     start: cython.longlong = first
-    t: cython.longlong
     # Clockwise to the boundary, if there is one: across the half-edge that leaves from the corner.
     for _k in range(most):
         t = twin[start + 2 if start % 3 == 0 else start - 1]

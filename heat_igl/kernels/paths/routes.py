@@ -42,7 +42,6 @@ class EdgeRoutes:
         last: cython.const[cython.int][::1] = np.ascontiguousarray(goal, np.int32)
         after: cython.const[cython.double][::1] = np.ascontiguousarray(goal_cost, np.float64)
         self.goal[0], self.goal[1], self.goal[2] = point
-        v: cython.int
         with cython.nogil:
             v = self.search(first, before, last, after)
         found = None

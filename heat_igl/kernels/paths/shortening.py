@@ -140,7 +140,6 @@ class Loop:
         """Base the loop elsewhere: at the middle one of its bends, or else on the middle one of its edges."""
         n_bends: cython.int = self.course.funnel.n_bends
         at: cython.int = self.course.strip.count // 2
-        share: cython.double
         if n_bends > 2:
             bend = cython.address(self.course.funnel.bend[n_bends // 2])
             at = bend.first
@@ -205,7 +204,6 @@ class Shortener:
 
         First comes -1, or the number of the join at which only a vertex holds a loop together; then there is no curve.
         """
-        stuck: cython.int
         # A loop is straightened from many bases.
         self.passing.largest_loss = 0.0 if is_closed else LARGEST_LOSS
         with cython.nogil:

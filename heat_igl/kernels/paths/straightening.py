@@ -152,8 +152,6 @@ class Course:
 
     def _trim(self) -> cython.void:
         """Drop crossings of edges on which the path starts or ends: rounding would put it on either side."""
-        h: cython.int
-        g: cython.int
         n_dropped: cython.int = 0
         end_vertex: cython.int = vertex_at(self.s, self.last_face(), cython.address(self.end))
         while n_dropped < self.strip.count:

@@ -101,7 +101,6 @@ class _Tracer:
         """
         f: cython.longlong = corner // 3
         k: cython.int = corner % 3
-        t: cython.longlong
         half: cython.double = self.half[f, k]
         if half > 0.0:
             while turn < 0.0:

@@ -146,7 +146,6 @@ class Detour:
                     return -1
                 step = cython.address(self.step[n_steps])
                 step.enter, step.before = g, at
-                angle: cython.double
                 if f == goal:
                     step.leave = -1
                     angle = after.this if g == end else after.other

@@ -63,7 +63,6 @@ class Facet:
         inverse metric as well, and the integral along the line is Simpson's rule of an exponential function.
         """
         p: cython.int = self.p
-        of: cython.double
         to: cython.double = 0.0
         by: cython.double[3][4]
         slope: cython.double[3]

@@ -38,8 +38,6 @@ def squared_lengths(
     size: cython.int = corners.shape[1]
     found = np.zeros((corners.shape[0], tensors.shape[1], size, size))
     squares: cython.double[:, :, :, ::1] = found
-    s: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     e: cython.double[3]
     with cython.nogil:
         for s in range(corners.shape[0]):
@@ -78,8 +76,6 @@ def measured(
     slack: cython.double[::1] = slacks
     gradient: cython.double[:, :, ::1] = gradients
     growth: cython.double[::1] = growths
-    s: cython.Py_ssize_t
-    k: cython.Py_ssize_t
     e: cython.double[3][3]
     P: cython.double[3][3]
     with cython.nogil:
@@ -231,7 +227,6 @@ class HopfLax(Facet):
     def spread(self) -> cython.void:
         """First order: Dijkstra's algorithm, in which a vertex comes again if its distance falls again."""
         v: cython.int
-        c: cython.int
         size: cython.int = self.p + 1
         gain: cython.double = FIRST_GAIN
         while True:
@@ -294,7 +289,6 @@ class HopfLax(Facet):
         at: cython.int = 0
         other: cython.int = -1
         place: cython.double = 0.0
-        i: cython.int
         j: cython.int
         d: cython.double[3]
         d[2] = self.nearest = INFINITY
@@ -374,7 +368,6 @@ class HopfLax(Facet):
     def sharpen(self, least: cython.double) -> cython.void:
         """Second order: the nearest vertex next, until no distance around any has changed by more than is settled."""
         v: cython.int
-        c: cython.int
         size: cython.int = self.p + 1
         settled: cython.double = FIRST_SETTLED
         while True:
@@ -410,7 +403,6 @@ class HopfLax(Facet):
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it."""
-        i: cython.int
         size: cython.int = self.p + 1
         best: cython.double = INFINITY
         best_at: cython.int = -1
@@ -467,7 +459,6 @@ class HopfLax(Facet):
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """Fill `product`: of v's metric first, then of those of the corners of the facet."""
-        i: cython.int
         j: cython.int
         size: cython.int = self.p + 1
         for k in range(self.q if self.q == 1 else self.p + 1):
@@ -587,7 +578,6 @@ class HopfLax(Facet):
         if not self.is_sloped[v] or self.rests_on(v, self.corners[s, c]):
             return 0.0
         e: cython.double[3]
-        j: cython.int
         for j in range(self.p):
             e[j] = 0.0
             for k in range(3):
@@ -599,7 +589,6 @@ class HopfLax(Facet):
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
         """The derivative of the length of v - x by the position of v, at the best place x."""
         v: cython.int = self.corners[s, c]
-        i: cython.int
         self.is_sloped[v] = self.length(self.share) > 0.0
         for k in range(3):
             self.slope[v, k] = 0.0

@@ -133,7 +133,6 @@ class _Sweep:
     @cython.nogil
     def read_ahead(self, i: cython.Py_ssize_t) -> cython.void:
         """Prefetch the data of the next visits: on large meshes that takes longer than the visits."""
-        v: cython.int
         if i + 3 < self.n_ordered:
             prefetch(cython.address(self.t.first[self.order[i + 3]]))
         if i + 1 < self.n_ordered:
@@ -199,7 +198,6 @@ class _Sweep:
         """Lower v to the best value from the triangles at it, with the source of that; whether there is one."""
         best: cython.double = self.d[v]
         across: cython.double = INFINITY  # squared
-        squared: cython.double
         # The triangle of the best value of either kind.
         ignored: cython.int = -1
         along_edge: cython.int = v
@@ -334,8 +332,6 @@ class _Sweep:
         whose cosine is below L / (2 d), L the length of the spoke and d counted from `begin`, the offset of the source.
         """
         lowest: cython.Py_ssize_t = self.order.shape[0]
-        a: cython.int
-        b: cython.int
         dv: cython.double = self.d[v] - begin
         for k in range(self.t.first[v], self.t.first[v + 1]):
             s = cython.address(self.t.spoke[k])

@@ -114,12 +114,7 @@ def _meeting(
     """
     x: cython.double = low + (high - low) * at_low / (at_low - at_high)
     margin: cython.double = room[0]
-    y: cython.double
-    a: cython.double
-    b: cython.double
     slope: cython.double = 0.0
-    step: cython.double
-    bend: cython.double
     shift += u.offset - w.offset
     for _ in range(8):
         a = reach(u, x)
@@ -193,8 +188,6 @@ def _ordered(
     until: cython.p_double,
 ) -> cython.int:
     """`_compare`, if u is nearer at one end and w is at most at the other; by the excess and its slope at both."""
-    a: cython.double
-    b: cython.double
     if at_high < -margin:
         # The difference has at most one extremum: for two roots, where the line through both meets the half-edge.
         if slope_low <= 0.0 or slope_high >= 0.0:
@@ -237,16 +230,6 @@ def _compare(
 
     If one is nearer at one end and the other at the other, `until` takes the points up to which u and w are needed.
     """
-    a: cython.double
-    b: cython.double
-    c: cython.double
-    d: cython.double
-    at_low: cython.double
-    at_high: cython.double
-    slope_low: cython.double
-    slope_high: cython.double
-    margin: cython.double
-    order: cython.int
     if u.offset == w.offset and _has_one_root(u) and _has_one_root(w):
         return _compare_squares(u, w, low, high, until)
     a, b, c, d = reach(u, low), reach(w, low), reach(u, high), reach(w, high)
@@ -275,7 +258,6 @@ def _gives_way(
     Within a tolerance, u may be nearer as far as it goes by its error alone, while its lines and those of w separate
     behind its end. Then w keeps its lines between.
     """
-    at: cython.double
     if low <= w.start:
         if high >= w.stop:
             return 2
@@ -325,7 +307,6 @@ def _settle(
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
     until: cython.double[2]
-    order: cython.int
     first: cython.int = 4 * ((w.start < u.start) & (w.stop < u.stop))
     if _overlap_little(u, w, sliver):
         return first
@@ -365,10 +346,6 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
     The way over the tail is longer than the offset of the window by `a` plus the place on the half-edge, the one over
     the head by `b` minus the place.
     """
-    p: cython.double
-    q: cython.double
-    r: cython.double
-    square: cython.double
     if w.is_plane:
         if w.x * w.stop > a + w.stop or w.x * w.start > b - w.start:
             return False
@@ -456,7 +433,6 @@ def _insert(
     and is one with those of the same root. The window may stand in the same array, behind the k.
     """
     j: cython.int = k
-    outcome: cython.int
     moved: Window
     u: cython.pointer(Window)
     narrow: cython.double = NARROW * length
@@ -552,9 +528,6 @@ def is_covered(
 ) -> cython.bint:
     """Whether n trimmed windows, and the ends of the half-edge, lead to all points of the windows before as shortly."""
     length: cython.double = s.length[h]
-    at: cython.double
-    reached: cython.double
-    nearest: cython.double
     j: cython.int
     w: cython.pointer(cython.const[Window])
     for i in range(n_before):
@@ -706,7 +679,6 @@ def _reach_apex(
 @cython.nogil
 def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
     """Make the window over the side between the tail and the apex; true if there is one."""
-    scale: cython.double
     if is_joined(w):
         return carry_joined(w, apex, True, out)
     keep_root(w, out)
@@ -737,7 +709,6 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
 @cython.nogil
 def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
     """Make the window over the side between the apex and the head; true if there is one."""
-    scale: cython.double
     x: cython.double = apex.length - w.x
     if is_joined(w):
         return carry_joined(w, apex, False, out)
@@ -954,10 +925,6 @@ def _measure(
     """Distances of the targets in the face of h, over its windows."""
     j: cython.int = s.first_target[h // 3]
     length: cython.double = s.length[h]
-    x: cython.double
-    y: cython.double
-    at: cython.double
-    distance: cython.double
     w: cython.pointer(Window)
     while j >= 0:
         x = s.target[3 * j + previous_half_edge(h) % 3] * length + s.target[3 * j + h % 3] * apex_x
@@ -991,7 +958,6 @@ def over_corners(s: cython.pointer(Search), j: cython.int) -> cython.void:
     """Distance of target j over the corners of its face."""
     f: cython.int = s.target_face[j]
     c: cython.int
-    v: cython.int
     corner: cython.double[3]
     for c in range(3):
         at_corner(c, corner)

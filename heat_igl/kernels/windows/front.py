@@ -286,8 +286,6 @@ def _key(
 
     Of parallel lines, the power of the root becomes the distance of the circle's centre.
     """
-    square: cython.double
-    x: cython.double
     if w.is_plane:
         x = w.x * length + w.depth * bulge
         return w.offset + (0.5 * x if s.is_delaunay else w.x * (w.start if w.x > 0.0 else w.stop))

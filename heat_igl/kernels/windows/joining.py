@@ -153,7 +153,6 @@ def _join(
     one: Window
     at: cython.double = 0.5 * (u.stop + w.start)
     error: cython.double = max(u.turn_y, w.turn_y)
-    more: cython.double
     # Side by side: neither is inside the other.
     if w.start - u.stop > NEAR * length or w.start <= u.start or w.stop <= u.stop:
         return False
@@ -232,7 +231,6 @@ def _between(
     """Whether two of n windows have a gap between whose lines separate; makes the window that closes it."""
     u: cython.pointer(Window) = windows + before
     w: cython.pointer(Window) = windows + behind
-    more: cython.double
     if w.start <= u.stop + NEAR * length:
         return False
     if direction(w, w.start) <= direction(u, u.stop) or _is_covered(windows, n, u.stop, w.start):
@@ -270,7 +268,6 @@ def _as_long(
     w: cython.pointer(cython.const[Window]), more: cython.double, sign: cython.double, at: cython.double
 ) -> cython.double:
     """Where the way over an end is as long, starting from `at`: with a fixed offset it is a point of a hyperbola."""
-    constant: cython.double
     for _ in range(_STEPS):
         constant = more - w.turn_x * at
         at = constant + sign * w.x
@@ -312,12 +309,8 @@ def carry_joined(
     Each line keeps its offset. If the lines meet inside the face, they are in reverse order behind.
     """
     # Of the first line over this side, from its lower end, and of the last: places, and offsets.
-    low: cython.double
-    high: cython.double
     of_low: cython.double = w.offset + w.turn_x * w.start
     of_high: cython.double = w.offset + w.turn_x * w.stop
-    at: cython.double
-    length: cython.double
     is_around: cython.bint = w.side == AROUND_APEX or w.side == CROSSED_AROUND_APEX
     out[0] = w[0]
     if to_left:

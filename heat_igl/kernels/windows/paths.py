@@ -167,7 +167,6 @@ class PathTracer:
         here: cython.double[3]
         corner: cython.double[3]
         line: Line
-        v: cython.int
         here[0], here[1], here[2] = begin.x, begin.y, begin.z
         for c in range(3):
             v = self.vertex[3 * f + c]

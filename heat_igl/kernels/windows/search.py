@@ -41,7 +41,6 @@ _ASK = cython.declare(cython.longlong, 4096)
 @cython.nogil
 def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
     """Whether the result cannot change any more by windows with this key or a larger one."""
-    j: cython.int
     while s.n_found < s.n_goals:
         if s.distance[s.goal[s.n_found]] > key:
             return False
@@ -61,8 +60,6 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 @cython.nogil
 def carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
     """Let a list cross its face, or windows leave a vertex, point or segment, unless the entry is out of date."""
-    v: cython.int
-    place: cython.int
     if entry.what < s.n_half_edges:
         place = s.slot[entry.what]
         if place >= 0 and s.lists[place].key == entry.key:
@@ -86,7 +83,6 @@ def _first(s: cython.pointer(Search)) -> Entry:
     """Take the first entry of the queue, and prefetch what the next one reads."""
     first: Entry = pop(s)
     h: cython.int = s.heap[0].what
-    place: cython.int
     if s.n_heap > 0 and h >= s.n_half_edges:
         h -= s.n_half_edges
         prefetch(s.upper + h)
@@ -134,7 +130,6 @@ def narrow(s: cython.pointer(Search)) -> cython.void:
     low: cython.int = 0
     high: cython.int = s.n_touched - 1
     wanted: cython.int = s.n_nearest - 1
-    pivot: cython.double
     if s.n_touched > s.n_all_ranked:
         free(s.ranked)
         s.n_all_ranked = 2 * s.n_touched
@@ -171,7 +166,6 @@ def narrow(s: cython.pointer(Search)) -> cython.void:
 
 def forget(s: cython.pointer(Search)) -> cython.void:
     """Clear the entries that a search wrote, for the next search on the same front."""
-    v: cython.int
     empty_front(s)
     for i in range(s.n_touched):
         v = s.touched[i]
@@ -228,9 +222,6 @@ def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int)
 def run_beside(s: cython.pointer(Search)) -> cython.void:
     """As `run`, for one of two searches on two threads; both return at the same time."""
     o: cython.pointer(Search) = s.other
-    p: cython.int
-    key: cython.double
-    is_alone: cython.bint
     s.last_key = s.cutoff * (1.0 + MARGIN)
     while True:
         p = s.parity
@@ -278,9 +269,6 @@ def _balance(s: cython.pointer(Search)) -> cython.bint:
 @cython.nogil
 def _next_seed(s: cython.pointer(Search)) -> cython.int:
     """A half-edge with windows that wait, if possible next to the part of the other thread; -1 if there is none."""
-    h: cython.int
-    u: cython.int
-    v: cython.int
     seed: cython.int = -1
     for i in range(s.n_lists):
         h = s.lists[i].half_edge
@@ -347,8 +335,6 @@ def _hand_over(s: cython.pointer(Search), o: cython.pointer(Search), amount: cyt
     queue: cython.p_int = cython.cast(cython.p_int, malloc((s.n_lists + 1) * cython.sizeof(cython.int)))
     n: cython.int = 0
     i: cython.int = 0
-    k: cython.int
-    v: cython.int
     h: cython.int
     if queue == cython.NULL:
         return

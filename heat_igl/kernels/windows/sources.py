@@ -304,9 +304,6 @@ def _fill(
 def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     """Windows from vertex v into all directions in which a shortest path can go on."""
     h: cython.int = s.entered[v]
-    length: cython.double
-    right_length: cython.double
-    left_length: cython.double
     at: cython.double = s.crossing[v]
     left: Direction
     right: Direction

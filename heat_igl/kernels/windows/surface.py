@@ -51,9 +51,6 @@ def shapes(tables) -> bool:
     next_corner: cython.int[::1] = tables.next_corner
     m: cython.int = double_area.shape[0]
     h: cython.int
-    a: cython.double
-    b: cython.double
-    d: cython.double
     is_delaunay: cython.bint = True
     broken: cython.int = -1
     with cython.nogil:
