@@ -54,6 +54,18 @@ def test_workflows_may_do_no_more_than_they_need(path):
     assert granted == ([{"id-token": "write"}] if path.name == "publish.yml" else [])
     for name in re.findall(r"(?:scripts|tests)/\w+\.py", path.read_text(encoding="utf8")):
         assert (ROOT / name).is_file(), name
+    for extras in re.findall(r'"\.\[([\w,]+)\]"', path.read_text(encoding="utf8")):
+        assert set(extras.split(",")) <= PROJECT["optional-dependencies"].keys()
+
+
+def test_pages_name_tests_and_scripts_that_exist():
+    sources = "".join(path.read_text(encoding="utf8") for path in (ROOT / "tests").glob("*.py"))
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
+        text = "" if page.name == "compat.md" else page.read_text(encoding="utf8")  # it names tests of other packages
+        for name in re.findall(r"`(test_\w+)`", text):
+            assert f"def {name}(" in sources, f"{page.name}: {name}"
+        for name in re.findall(r"\b(?:scripts|tests)/\w+\.py", text):
+            assert (ROOT / name).is_file(), f"{page.name}: {name}"
 
 
 PAGES = ["README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "CHANGELOG.md", "SECURITY.md"]
