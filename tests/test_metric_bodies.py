@@ -7,6 +7,7 @@ from surfaces import nearest_vertex
 from heat_igl import (
     AccuracyWarning,
     GeodesicSolver,
+    HeatMethodSolver,
     Mesh,
     OffsetSources,
     SourceError,
@@ -353,3 +354,20 @@ def test_a_wrong_metric_at_a_vertex_is_named():
     g[5, 0, 0] = -1
     with pytest.raises(ValueError, match=r"metric\[5\] = .* must be positive definite"):
         metric_operators(mesh, g)
+
+
+@pytest.mark.filterwarnings("ignore:the metric grows:heat_igl.AccuracyWarning")
+@pytest.mark.parametrize(
+    ("mesh", "ratio"), [(shapes.box(8), 10), (shapes.grid(20), 1000)], ids=["tetrahedra", "triangles"]
+)
+def test_heat_says_that_it_is_wrong_where_the_speed_varies_much(mesh, ratio):
+    """From the fast side; heat is compared with the Hopf-Lax formula, and bounds say nothing."""
+    x = mesh.V[mesh.F].mean(axis=1)[:, 0]
+    domain = speed_operators(mesh, float(ratio) ** -((x - x.min()) / np.ptp(x)))
+    heat, source = HeatMethodSolver(domain), int(np.argmin(mesh.V.sum(axis=1)))
+    with pytest.warns(AccuracyWarning, match="heat is off by"):
+        found = heat.distance(source)
+    truth = GeodesicSolver(domain).distance(source)
+    off = np.abs(found - truth)[truth > 0] / truth[truth > 0]
+    assert heat.diagnostics.compared.mean == pytest.approx(off.mean(), rel=0.01)
+    assert off.mean() > 0.05

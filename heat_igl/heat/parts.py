@@ -255,7 +255,9 @@ def prepare(
         seconds_analysis=analysed - begun,
         seconds_factorization=factored - analysed,
     )
-    is_triangles = domain.surface is not None and domain.fans is None
+    # Of tetrahedra in space the check against straight lines says enough.
+    has_metric = domain.simplices is not None and domain.simplices.V is None
+    is_comparable = (domain.surface is not None and domain.fans is None) or has_metric
     return SolverParts(
         options=options,
         operators=domain,
@@ -268,7 +270,7 @@ def prepare(
         t_damping=t_damping,
         fitted=fitted,
         checker=Checker(domain, V),
-        comparisons=Comparisons(domain) if is_triangles and options.holds_to_bounds else None,
+        comparisons=Comparisons(domain) if is_comparable and options.holds_to_bounds else None,
         is_default=options.holds_to_bounds,
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,
