@@ -11,7 +11,7 @@ from heat_igl.kernels.mesh import checking
 from heat_igl.operators import Operators
 from heat_igl.plan import Plan, sweep_plan
 from heat_igl.sources import SourceSet
-from heat_igl.sweep import HopfLaxEngine, SweepEngine
+from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import Engine, OperatorTriangles, WindowEngine, contradicted
 from heat_igl.windows.bounds import Bounds, raise_to_lines, source_places
@@ -166,7 +166,7 @@ class Comparisons:
     """Compares answers with those of an engine that shares nothing with heat, where heat may be wrong.
 
     These are the first three answers from every kind of sources in each component. If all are near, later ones are
-    trusted; if one is not, each later one is compared. The domain has triangles, or simplices with a metric.
+    trusted; if one is not, each later one is compared. The domain has triangles, or simplices.
     """
 
     def __init__(self, domain: Operators) -> None:
@@ -200,7 +200,7 @@ class Comparisons:
     def _made(self) -> Engine:
         domain, surface = self._domain, self._domain.surface
         if surface is None and domain.simplices is not None:
-            return HopfLaxEngine(domain.simplices)
+            return (HopfLaxEngine if domain.simplices.V is None else LineEngine)(domain.simplices)
         triangles = OperatorTriangles(domain)
         sweep = SweepEngine(triangles)
         if sweep_plan(sweep.measures, _BY_SWEEP).engine == "sweep":

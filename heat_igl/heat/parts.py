@@ -255,9 +255,7 @@ def prepare(
         seconds_analysis=analysed - begun,
         seconds_factorization=factored - analysed,
     )
-    # Of tetrahedra in space the check against straight lines says enough.
-    has_metric = domain.simplices is not None and domain.simplices.V is None
-    is_comparable = (domain.surface is not None and domain.fans is None) or has_metric
+    is_comparable = (domain.surface is not None and domain.fans is None) or domain.simplices is not None
     return SolverParts(
         options=options,
         operators=domain,
