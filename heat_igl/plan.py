@@ -125,22 +125,17 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
     return Plan("windows", float(tolerance), "windows are joined as far as the tolerance allows, and need no factor")
 
 
-# Windows are joined up to this share of the tolerance. Over the zoo, its random families and spheres the largest error
-# is at most 1.3 of what joining allows at 4e-6 and below; at 4e-5 it reaches 3 on spheres, whose fronts meet again in a
-# point (`scripts/random_members.py tolerance`).
-_JOINED_SHARE = 0.4
-# Not more: one of 2000 random members of all kinds had a vertex .15 % too long at 2e-5, and one of 1000 queries on
-# scans a vertex .09 % too long at 1.6e-5, which the check of answers may not see; at 4e-6 none was beyond the
-# tolerance. It saves little, too: at 2e-5 there are two thirds as many windows, and most of the time goes into the
-# faces.
-_COARSEST = 4e-6
-# Below, few windows can be joined: at 1e-6 a query took 1.0 to 1.3 of the time of an exact one on ten scans and models.
-_FINEST_JOINED = 3e-6
+# Windows are joined while they lose no more than this fraction of distance. At 2e-5 one of 2000 random members of all
+# kinds had a vertex .15 % too long, which the check of answers does not see.
+_JOINING_ACCURACY = 4e-6
+# Below this tolerance nothing is joined, and distance is exact: of 800 queries on bunny at 4e-6 three had a vertex that
+# was too long by up to 4e-4 of the largest distance, unseen by the check.
+_FINEST_JOINED = 1e-3
 
 
 def joining_accuracy(tolerance: float) -> float:
     """The fraction of distance that windows may lose by joining for a tolerance; 0 for exact distance."""
-    return min(_JOINED_SHARE * tolerance, _COARSEST) if tolerance >= _FINEST_JOINED else 0.0
+    return _JOINING_ACCURACY if tolerance >= _FINEST_JOINED else 0.0
 
 
 def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:

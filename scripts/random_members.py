@@ -87,7 +87,7 @@ Random = np.random.Generator
 # Kind, figures, and what of them the rounding of lengths explains.
 Member = tuple[str, dict[str, float], float]
 LARGEST = {"exact": 1e-9, "tolerance": 1.0, "many-faced": 20.0, "cuts": 1e-12, "log-maps": 1e-8, "signed": 1e-12}
-TOLERANCES = (1e-3, 1e-4, 1e-5, 3e-6)  # below the last, nothing is joined
+TOLERANCES = (1e-3,)  # below, nothing is joined
 _MOST_COMPARED, _COARSE = 60, 30
 
 

@@ -29,7 +29,7 @@ def test_errors_are_within_the_tolerance_by_fewer_windows(name):
             found = surface.solve(source, accuracy=joining_accuracy(tolerance))
             error = np.abs(found.distance - truth.distance)
             assert error.max() <= tolerance * truth.distance.max()
-            if tolerance > 1e-6 and name != "cylinder":
+            if tolerance == 1e-3 and name != "cylinder":
                 assert found.n_windows < 0.8 * truth.n_windows
                 assert error.max() > 0
 
@@ -67,15 +67,15 @@ def test_cells_are_those_of_exact_distance():
 def test_a_source_in_a_face():
     mesh, source = SMOOTH["torus"](), SurfacePoints([3000], [[0.2, 0.3, 0.5]])
     exact = geodesic_distance(mesh, source, method="exact")
-    found = geodesic_distance(mesh, source, tolerance=1e-4)
+    found = geodesic_distance(mesh, source, tolerance=1e-3)
     assert 0 < np.abs(found - exact).max() <= 1e-4 * exact.max()
 
 
 def test_derivatives_are_those_of_exact_distance():
     mesh = SMOOTH["torus"]()
-    phi, pull_back = GeodesicSolver(mesh, tolerance=1e-4).distance_vjp(5)
+    phi, pull_back = GeodesicSolver(mesh, tolerance=1e-3).distance_vjp(5)
     assert np.array_equal(phi, geodesic_distance(mesh, 5, method="exact"))
-    assert not np.array_equal(phi, GeodesicSolver(mesh, tolerance=1e-4).distance(5))
+    assert not np.array_equal(phi, GeodesicSolver(mesh, tolerance=1e-3).distance(5))
     assert len(pull_back.inexact) == 0
 
 
@@ -94,7 +94,7 @@ def test_where_windows_are_few_the_answer_is_exact(make):
 
 def test_a_cutoff_ends_the_search_and_offsets_count():
     surface = ExactSurface(from_mesh(SMOOTH["torus"](), 0))
-    accuracy, sources, offsets = joining_accuracy(1e-4), np.array([0, 8000]), np.array([0.0, 0.3])
+    accuracy, sources, offsets = joining_accuracy(1e-3), np.array([0, 8000]), np.array([0.0, 0.3])
     truth = surface.solve(sources, offsets).distance
     found = surface.solve(sources, offsets, accuracy=accuracy).distance
     np.testing.assert_allclose(found, truth, atol=1e-4 * truth.max())
