@@ -122,7 +122,8 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
         return Plan("sweep", None, "between points the triangles are an estimate themselves")
     if method == "exact" or tolerance == 0:
         return Plan("windows", 0.0, "exact distance was asked for")
-    return Plan("windows", float(tolerance), "windows are joined as far as the tolerance allows, and need no factor")
+    how = "are joined within the tolerance" if joining_accuracy(tolerance) else "are exact: none are joined below .001"
+    return Plan("windows", float(tolerance), f"windows need no factor, and {how}")
 
 
 # Windows are joined while they lose no more than this fraction of distance. At 2e-5 one of 2000 random members of all

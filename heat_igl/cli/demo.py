@@ -50,7 +50,7 @@ def demonstrate(out: Path) -> _Rows:
     start = time.perf_counter()
     by_heat = heat.distance(_SOURCE)
     rows.append(("one distance by heat", _since(start)))
-    # By windows: to 1e-5.
+    # By windows: exact.
     rows.append(("error of heat", _error(by_heat, phi)))
     try:
         rows.append(("error of MeshLab", _error(reference.meshlab(mesh, _SOURCE), phi)))

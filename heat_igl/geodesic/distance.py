@@ -41,7 +41,7 @@ def geodesic_distance(
     method : {"auto", "windows", "exact", "sweep", "heat"}
         As for `GeodesicSolver`; "heat" is the heat method as `HeatMethodSolver` has it by default.
     tolerance : float
-        Largest error over the distance, for windows; 0 is exact.
+        Largest error over the distance, for windows; below 1e-3, as by default, they are exact.
     cutoff : float, optional
         Distances beyond this are ``inf``, and a search by windows looks at no part of the mesh that is farther away.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional

@@ -39,7 +39,7 @@ class GeodesicSolver(BatchedSolver):
         windows on triangles, and a sweep on a `PointCloud`. Tetrahedra are passed by straight lines, and simplices that
         see their common edges at different lengths by the Hopf-Lax formula. `plan` says what was taken, and why.
     tolerance : float
-        Largest error over the distance; 0 is exact.
+        Largest error over the distance; below 1e-3, as by default, windows are exact.
     region : (n,) or (m,) array_like of bool, optional
         What paths may enter, of a mesh: faces all of whose vertices are selected, or selected faces. Elsewhere distance
         is ``inf``, and sources are an error; all numbers stay those of the whole mesh. Angles of `directions` are those

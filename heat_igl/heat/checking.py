@@ -110,7 +110,7 @@ class AnswerCheck(NamedTuple):
         Whether the answer was raised to straight lines after that.
     compared : Comparison or None
         How far the answer is from that of another engine; None if it was not compared, see `Comparisons`: never if the
-        field has length 1 or a time step was asked for, and without triangles.
+        field has length 1 or a time step was asked for, and on polygons.
     """
 
     shortfall: float
