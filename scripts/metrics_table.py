@@ -55,7 +55,8 @@ from heat_igl import (
 from heat_igl.operators import MetricSimplices, Operators
 from heat_igl.sweep import LineEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.validation.domains import around_the_edge, by_fermat, delaunay, moved_inside, straight, without
+from heat_igl.validation.closed_forms import around_the_edge, by_fermat, straight
+from heat_igl.validation.zoo.registry import carved, compact, tetrahedra
 
 from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds
 
@@ -77,10 +78,17 @@ MANY = 3000
 # Closed forms in the plane.
 
 
-def plane(rows: int, rng: Random, border: float | None = None) -> Mesh:
+def moved_inside(mesh: Mesh, rng: Random, most: float, fixed: BoolArray | bool = False) -> Mesh:
+    """The mesh with vertices moved by up to `most` in x and y, except on the boundary and where `fixed` is true."""
+    V, inner = mesh.V.copy(), ~mesh.boundary & ~np.asarray(fixed)
+    V[inner, :2] += rng.uniform(-most, most, (int(inner.sum()), 2))
+    return Mesh(V, mesh.F)
+
+
+def plane(rows: int, rng: Random, border: float = np.nan) -> Mesh:
     """The unit square, with vertices inside moved by a quarter of an edge; those at x = `border` stay there."""
     mesh = shapes.grid(rows)
-    return moved_inside(mesh, rng, 0.25 / rows, None if border is None else mesh.V[:, 0] == border)
+    return moved_inside(mesh, rng, 0.25 / rows, mesh.V[:, 0] == border)
 
 
 def metrics(rows: int, rng: Random) -> Iterator[tuple[str, Operators, Query]]:
@@ -118,16 +126,16 @@ def bodies(points: int, rng: Random) -> Iterator[tuple[str, Mesh, Query]]:
     ball = rng.random((2 * points, 3)) - 0.5
     convex = {
         "cube, even tetrahedra": shapes.box(round(points ** (1 / 3)) - 1),
-        "cube, Delaunay tetrahedra": delaunay(rng.random((points, 3))),
-        "ball, Delaunay tetrahedra": delaunay(ball[np.linalg.norm(ball, axis=1) < 0.5][:points]),
+        "cube, Delaunay tetrahedra": tetrahedra(rng.random((points, 3))),
+        "ball, Delaunay tetrahedra": tetrahedra(ball[np.linalg.norm(ball, axis=1) < 0.5][:points]),
     }
     for name, mesh in convex.items():
         yield name, mesh, lambda i, V=mesh.V: straight(V, i)
     # A cube without the quarter x, y > 1/2, as many vertices.
-    quarter = without(2 * round((points / 6) ** (1 / 3)), lambda centre: (centre[:, :2] > 0.5).all(axis=1))
+    quarter = carved(2 * round((points / 6) ** (1 / 3)), lambda centre: (centre[:, :2] > 0.5).all(axis=1))
     yield "three quarters of a cube", quarter, lambda i: around_the_edge(quarter.V, i)
     cells = 9 * round((5 * points) ** (1 / 3) / 9)
-    hand = without(cells, lambda centre: ~in_hand(centre) | (np.abs(centre[:, 2] - 0.5) > 1 / 6))
+    hand = carved(cells, lambda centre: ~in_hand(centre) | (np.abs(centre[:, 2] - 0.5) > 1 / 6))
     yield "palm and five fingers", hand, lambda i: across_hand(hand.V, i, cells)
 
 
@@ -173,19 +181,14 @@ def in_bodies(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
 
 
 def cut_out(n: int, cut: Cut, rng: Random) -> Mesh:
-    """`without`, but of Delaunay tetrahedra whose vertices are moved by up to 0.4 cells along each axis."""
-    cube = delaunay(moved(shapes.box(n).V, 0.4 / n, rng))
-    return part(cube, ~cut(cube.V[cube.F].mean(axis=1)))
+    """`carved`, but of Delaunay tetrahedra whose vertices are moved by up to 0.4 cells along each axis."""
+    cube = tetrahedra(moved(shapes.box(n).V, 0.4 / n, rng))
+    return compact(cube.V, cube.F[~cut(cube.V[cube.F].mean(axis=1))])
 
 
 def moved(V: FloatArray, most: float, rng: Random) -> FloatArray:
     """Points away from a grid or a sphere, where Delaunay tetrahedra are not unique and Qhull leaves slits."""
     return V + rng.uniform(-most, most, V.shape)
-
-
-def part(mesh: Mesh, kept: BoolArray) -> Mesh:
-    used, F = np.unique(mesh.F[kept], return_inverse=True)
-    return Mesh(mesh.V[used], F.reshape(-1, 4))
 
 
 def shell(hollow: float, points: int, rng: Random) -> Mesh:
@@ -195,8 +198,8 @@ def shell(hollow: float, points: int, rng: Random) -> Mesh:
     radius = np.linalg.norm(P, axis=1)
     between = P[(radius > hollow + 0.05) & (radius < 0.95)][:points]
     walls = moved(np.concatenate([hollow * sphere, sphere]), 1e-3, rng)
-    ball = delaunay(np.concatenate([walls, between]))
-    return part(ball, ball.F.max(axis=1) >= len(sphere))
+    ball = tetrahedra(np.concatenate([walls, between]))
+    return compact(ball.V, ball.F[ball.F.max(axis=1) >= len(sphere)])
 
 
 def ring(around: int, along: int, points: int, rng: Random) -> Mesh:
@@ -207,8 +210,8 @@ def ring(around: int, along: int, points: int, rng: Random) -> Mesh:
 
     P = rng.uniform(-1.4, 1.4, (20 * points, 3)) * [1, 1, 2 / 7]
     wall = moved(shapes.torus(around, along, 0.4).V, 1e-3, rng)
-    hull = delaunay(np.concatenate([wall, P[in_tube(P, 0.34)][:points]]))
-    return part(hull, in_tube(hull.V[hull.F].mean(axis=1), 0.4))
+    hull = tetrahedra(np.concatenate([wall, P[in_tube(P, 0.34)][:points]]))
+    return compact(hull.V, hull.F[in_tube(hull.V[hull.F].mean(axis=1), 0.4)])
 
 
 def in_box(P: FloatArray, low: float | list[float], high: float | list[float]) -> BoolArray:
@@ -235,11 +238,11 @@ def two_balls(P: FloatArray) -> BoolArray:
 WALLS: dict[str, Callable[[Random], Mesh]] = {
     "cube, even": lambda _: shapes.box(15),
     "U, random": lambda rng: cut_out(9, lambda P: in_box(P, [1 / 3, 1 / 3, -1], [2 / 3, 2, 2]), rng),
-    "block with a cavity, even": lambda _: without(8, lambda P: in_box(P, 0.25, 0.75)),
+    "block with a cavity, even": lambda _: carved(8, lambda P: in_box(P, 0.25, 0.75)),
     "block with a cavity, random": lambda rng: cut_out(10, lambda P: in_box(P, 0.25, 0.75), rng),
-    "block with four holes, even": lambda _: without(10, holes),
+    "block with four holes, even": lambda _: carved(10, holes),
     "block with four holes, random": lambda rng: cut_out(15, holes, rng),
-    "frame of rods, even": lambda _: without(10, lambda P: (np.abs(P - 0.5) < 0.3).sum(axis=1) > 1),
+    "frame of rods, even": lambda _: carved(10, lambda P: (np.abs(P - 0.5) < 0.3).sum(axis=1) > 1),
     "shell": lambda rng: shell(0.5, 2000, rng),
     "thin shell without a vertex inside": lambda rng: shell(0.8, 0, rng),
     "torus": lambda rng: ring(16, 40, 400, rng),
@@ -510,7 +513,7 @@ def cylinder(rings: int, rng: Random) -> Mesh:
     V = np.concatenate([disk.V + np.array([0, 0, z]) for z in levels])
     is_inside = (np.hypot(V[:, 0], V[:, 1]) < 1 - 0.5 / rings) & (V[:, 2] > 0) & (V[:, 2] < 1.5)
     V[is_inside] = moved(V[is_inside], 0.2 / rings, rng)
-    return delaunay(V)
+    return tetrahedra(V)
 
 
 def smooth(rows: int, rng: Random) -> Iterator[tuple[str, Mesh, Callable[[FloatArray], FloatArray], int, FloatArray]]:

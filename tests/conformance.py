@@ -11,16 +11,26 @@ from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
-from conftest import flat_perturbed, perturbed
+from conftest import flat_perturbed, perturbed, two_halves
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 from surfaces import arcs, dual_of_sphere, moebius_strip
 
-from heat_igl import Mesh, PointCloud, PolygonMesh, image_domain, metric_operators, shapes, speed_operators
+from heat_igl import (
+    Mesh,
+    PointCloud,
+    PolygonMesh,
+    fibre_metric,
+    image_domain,
+    metric_operators,
+    shapes,
+    speed_operators,
+)
 from heat_igl.geodesic import SolverChoice
 from heat_igl.geodesic.choice import Solver
+from heat_igl.validation.closed_forms import around_the_wall, by_fermat, straight
+from heat_igl.validation.zoo.registry import tetrahedra
 
 METHODS = ("windows", "exact", "sweep", "heat")
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
@@ -133,17 +143,13 @@ class Domain:
         return lines * (np.sqrt(np.linalg.eigvalsh(self.field).min()) if self.field.ndim == 3 else 1 / self.field.max())
 
 
-def lines(V: np.ndarray) -> Callable[[int], np.ndarray]:
-    return lambda source: np.linalg.norm(V - V[source], axis=1)
-
-
 def _of_mesh(mesh: Mesh, **others: Any) -> Domain:
     return Domain("simplices", np.array(mesh.V), np.array(mesh.F), **others)
 
 
 def _convex(mesh: Mesh) -> Domain:
     """A convex part of the plane, or a convex body."""
-    return _of_mesh(mesh, truth=lines(mesh.V))
+    return _of_mesh(mesh, truth=partial(straight, mesh.V))
 
 
 def _pages() -> Domain:
@@ -166,42 +172,25 @@ def _tensor(dimensions: int) -> np.ndarray:
     return axes @ np.diag([2.25, 1.0, 1.0]) @ axes.T
 
 
-def _with_tensor(mesh: Mesh, dimensions: int) -> Domain:
-    metric = _tensor(dimensions)
-    return _of_mesh(mesh, field=np.tile(metric, (len(mesh.F), 1, 1)), truth=lines(mesh.V @ np.linalg.cholesky(metric)))
+def _with_metric(mesh: Mesh, metric: np.ndarray) -> Domain:
+    """The same tensor (3, 3) everywhere."""
+    return _of_mesh(
+        mesh,
+        field=np.tile(metric, (len(mesh.F), 1, 1)),
+        truth=partial(straight, mesh.V @ np.linalg.cholesky(metric)),
+    )
 
 
-def _scattered(n: int) -> np.ndarray:
+def on_sphere(n: int) -> np.ndarray:
     P = np.random.default_rng(8).standard_normal((n, 3))
     return P / np.linalg.norm(P, axis=1, keepdims=True)
 
 
-def _ball_of_tetrahedra() -> Mesh:
-    """Delaunay tetrahedra of random points: a convex body."""
-    V = np.random.default_rng(3).random((500, 3))
-    F = Delaunay(V).simplices
-    return Mesh(V, F[np.abs(np.linalg.det(V[F[:, 1:]] - V[F[:, :1]])) > 1e-9])
-
-
 def _speeds() -> Domain:
     """Two halves of a square at speeds 1 and 2: triangles that see their common sides at different lengths."""
-    mesh = flat_perturbed(shapes.grid(24))
-    V = np.array(mesh.V)
-    V[shapes.grid(24).V[:, 0] == 0.5, 0] = 0.5
-    is_fast = V[:, 0] > 0.5
-    border = np.column_stack([np.full(2001, 0.5), np.linspace(0, 1, 2001), np.zeros(2001)])
-    to_border = np.linalg.norm(V[:, None] - border, axis=2) / np.where(is_fast, 2.0, 1.0)[:, None]
-
-    def truth(source: int) -> np.ndarray:
-        """Along straight lines that are refracted at the border, or go along it on the fast side."""
-        arrival = to_border[source]
-        forth = np.minimum.accumulate(arrival - border[:, 1] / 2) + border[:, 1] / 2
-        back = (np.minimum.accumulate((arrival + border[:, 1] / 2)[::-1]) - border[::-1, 1] / 2)[::-1]
-        over = (np.minimum(forth, back) + to_border).min(axis=1)
-        straight = lines(V)(source) / (2.0 if is_fast[source] else 1.0)
-        return np.where(is_fast == is_fast[source], np.minimum(over, straight), over)
-
-    return _of_mesh(Mesh(V, mesh.F), field=np.where(V[mesh.F].mean(axis=1)[:, 0] > 0.5, 2.0, 1.0), truth=truth)
+    mesh = two_halves(24)
+    speed = np.where(mesh.V[mesh.F].mean(axis=1)[:, 0] > 0.5, 2.0, 1.0)
+    return _of_mesh(mesh, field=speed, truth=partial(by_fermat, mesh.V, left=1.0, right=2.0))
 
 
 _MAKE: dict[str, Callable[[], Domain]] = {
@@ -211,16 +200,113 @@ _MAKE: dict[str, Callable[[], Domain]] = {
     "one side": lambda: _of_mesh(moebius_strip(150, 8)),
     "non-manifold": _pages,
     "polygons": lambda: Domain("polygons", (mesh := dual_of_sphere(3)).V, mesh.polygons, truth=partial(arcs, mesh.V)),
-    "points": lambda: Domain("points", P := _scattered(1500), None, truth=partial(arcs, P)),
-    "points with normals": lambda: Domain("points", P := _scattered(1500), None, P, partial(arcs, P)),
+    "points": lambda: Domain("points", P := on_sphere(1500), None, truth=partial(arcs, P)),
+    "points with normals": lambda: Domain("points", P := on_sphere(1500), None, P, partial(arcs, P)),
     "pixels": lambda: _convex(image_domain(np.ones((30, 40), bool), (0.5, 0.7)).mesh),
     "voxels": lambda: _convex(image_domain(np.ones((5, 6, 7), bool), (1.0, 0.8, 0.7)).mesh),
-    "tetrahedra": lambda: _convex(_ball_of_tetrahedra()),
-    "metric on triangles": lambda: _with_tensor(flat_perturbed(shapes.disk(19)), 2),
+    "tetrahedra": lambda: _convex(tetrahedra(np.random.default_rng(3).random((500, 3)))),
+    "metric on triangles": lambda: _with_metric(flat_perturbed(shapes.disk(19)), _tensor(2)),
     "speeds on triangles": _speeds,
-    "metric on tetrahedra": lambda: _with_tensor(perturbed(shapes.box(5)), 3),
+    "metric on tetrahedra": lambda: _with_metric(perturbed(shapes.box(5)), _tensor(3)),
 }
 DOMAINS = tuple(_MAKE)
+
+
+# Harder ones, of which errors alone are bounded.
+
+
+def _points_on_a_cylinder() -> Domain:
+    rng = np.random.default_rng(5)
+    angle, height = rng.uniform(0, 2 * np.pi, 4000), rng.uniform(0, 3, 4000)
+
+    def helices(source: int) -> np.ndarray:
+        turn = np.abs(np.remainder(angle - angle[source] + np.pi, 2 * np.pi) - np.pi)
+        return np.hypot(turn, height - height[source])
+
+    return Domain("points", np.stack([np.cos(angle), np.sin(angle), height], axis=1), None, truth=helices)
+
+
+def _points_in_a_square() -> Domain:
+    P = np.pad(np.random.default_rng(6).random((4000, 2)), ((0, 0), (0, 1)))
+    return Domain("points", P, None, truth=partial(straight, P))
+
+
+def _helical_fibres() -> Domain:
+    """Fibres 1 : 3 along helices on a prism, which is unrolled: ways around it end at copies of the vertex."""
+    around, rise = 48, 0.5
+    tube = shapes.cylinder(around, 24, np.pi)
+    corners = tube.V[tube.F]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward *= np.sign((outward * corners.mean(axis=1)).sum(axis=1, keepdims=True))
+    fibres = np.stack([-outward[:, 1], outward[:, 0], rise * np.linalg.norm(outward, axis=1)], axis=1)
+    side = 2 * np.sin(np.pi / around)
+    flat = np.stack([np.arange(tube.n_vertices) % around * side, tube.V[:, 2]], axis=1)
+    along = np.array([1.0, rise]) / np.hypot(1.0, rise)
+
+    def truth(source: int) -> np.ndarray:
+        copies = flat - flat[source] + np.arange(-2, 3)[:, None, None] * [around * side, 0.0]
+        return np.hypot(copies @ along, 3 * (copies @ [-along[1], along[0]])).min(axis=0)
+
+    return _of_mesh(tube, field=fibre_metric(fibres, 1.0, 3.0), truth=truth)
+
+
+def _exponential_speed() -> Domain:
+    """From 1 to a million along a strip: the map exp(-k z) / k makes paths straight."""
+    mesh, rate = flat_perturbed(shapes.strip(200, 12), 0.25), np.log(1e6) / 200
+    unrolled = np.exp(-rate * (mesh.V[:, 0] + 1j * (mesh.V[:, 1] - 6))) / rate
+    speed = np.exp(rate * mesh.V[mesh.F][:, :, 0].mean(axis=1))
+    return _of_mesh(mesh, field=speed, truth=lambda source: np.abs(unrolled - unrolled[source]))
+
+
+def _concave_polygons() -> Domain:
+    """Squares whose inner sides are bent: two opposite sides inwards, the others outwards."""
+    n = 14
+    y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    corner, bend = np.arange(len(x)), np.where((x + y) % 2, 0.18, -0.18)
+    # Vertices in the middle of the inner sides that start at a corner, towards +x and towards +y.
+    lying, standing = corner[(x < n) & (y % n > 0)], corner[(y < n) & (x % n > 0)]
+    V = np.concatenate(
+        [
+            np.stack([x, y], axis=1),
+            np.stack([x + 0.5, y + bend], axis=1)[lying],
+            np.stack([x - bend, y + 0.5], axis=1)[standing],
+        ]
+    )
+    below, beside = np.full((2, len(corner)), -1)
+    below[lying] = len(corner) + np.arange(len(lying))
+    beside[standing] = len(corner) + len(lying) + np.arange(len(standing))
+    at = corner[(x < n) & (y < n)]
+    right, up = at + 1, at + n + 1
+    rows = np.stack([at, below[at], right, beside[right], up + 1, below[up], up, beside[at]], axis=1)
+    V = np.pad(V / n, ((0, 0), (0, 1)))
+    return Domain("polygons", V, [row[row >= 0] for row in rows], truth=partial(straight, V))
+
+
+def _wall(shape: tuple[int, ...], spacing: tuple[float, ...], rows: int) -> Domain:
+    """Pixels or voxels without `rows` of the middle column, from rows above the end of this wall."""
+    mask, column = np.ones(shape, bool), shape[-1] // 2
+    mask[..., :rows, column] = False
+    mesh = image_domain(mask, spacing).mesh
+    return _of_mesh(mesh, truth=partial(around_the_wall, mesh.V, wall=column - 0.5, end=(rows - 0.5) * spacing[-2]))
+
+
+_STRETCH = np.array([[80.0, 60.0, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])  # singular values 100, 1 and 1
+_CLOUD = {"heat": 0.012, "auto": 0.003, "windows": 1e-3}
+_FINE = {"sweep": 1e-3, "windows": 1e-3, "exact": 1e-9}
+_COARSE = {"sweep": 0.01, "windows": 1e-3, "exact": 1e-9}
+#: Name -> domain, the source, and the largest mean relative error by method.
+HARD: dict[str, tuple[Callable[[], Domain], int, dict[str, float]]] = {
+    "points on a cylinder": (_points_on_a_cylinder, 0, _CLOUD),
+    "points in a square": (_points_in_a_square, 0, _CLOUD),
+    "tensor of 1 : 100": (
+        lambda: _with_metric(flat_perturbed(shapes.grid(32)), _STRETCH.T @ _STRETCH), 500, {"heat": 0.015, **_FINE},
+    ),
+    "helical fibres on a cylinder": (_helical_fibres, 600, {"heat": 0.02, **_FINE}),
+    "speed that grows exponentially": (_exponential_speed, 1300, {"auto": 0.003}),
+    "concave polygons": (_concave_polygons, 100, {"heat": 0.03, **_COARSE}),
+    "wall of pixels": (partial(_wall, (20, 31), (2.0, 1.0), 15), 99, {"heat": 0.04, **_COARSE}),
+    "wall of voxels": (partial(_wall, (6, 12, 15), (1.5, 2.0, 1.0), 9), 400, {"auto": 0.01}),
+}  # fmt: skip
 
 
 @cache

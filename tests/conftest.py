@@ -68,6 +68,14 @@ def flat_perturbed(mesh: heat_igl.Mesh, amount: float = 0.3, seed: int = 0) -> h
     return heat_igl.Mesh(perturbed(mesh, amount, seed).V * [1, 1, 0], mesh.F)
 
 
+def two_halves(n: int) -> heat_igl.Mesh:
+    """A square of n by n cells, its inner vertices moved, but those at x = 1/2 only along that line."""
+    grid = heat_igl.shapes.grid(n)
+    V = flat_perturbed(grid).V.copy()
+    V[grid.V[:, 0] == 0.5, 0] = 0.5
+    return heat_igl.Mesh(V, grid.F)
+
+
 def relative_error(d: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """|d - truth| / truth at the vertices with a positive finite truth."""
     there = (truth > 0) & np.isfinite(truth)

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conformance import DOMAINS, METHODS, TURN, distance, domain, solver
-from conftest import pygeodesic_distance
+from conformance import DOMAINS, HARD, METHODS, TURN, distance, domain, solver
+from conftest import pygeodesic_distance, relative_error
 
 import heat_igl
 from heat_igl import MeshError, OffsetSources
@@ -104,6 +104,15 @@ def test_near_the_truth(name, method):
             assert error.max() < max(1e-9, tolerance)
         else:
             assert error.mean() < largest_mean_error(name, method)
+
+
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+@pytest.mark.parametrize(("name", "method"), [(name, method) for name in HARD for method in HARD[name][2]])
+def test_harder_domains_stay_within_their_bounds(name, method):
+    make, source, bounds = HARD[name]
+    at = make()
+    error = relative_error(at.solver(method).distance(source), at.truth(source))
+    assert error.mean() <= bounds[method]
 
 
 @table([*BOUNDED, *((name, "heat") for name in BODIES if " on " not in name)])

@@ -20,7 +20,8 @@ from heat_igl import (
 from heat_igl.operators import MetricSimplices
 from heat_igl.sweep import HopfLaxEngine
 from heat_igl.typing import FloatArray
-from heat_igl.validation.domains import delaunay, straight
+from heat_igl.validation.closed_forms import straight
+from heat_igl.validation.zoo.registry import tetrahedra
 
 
 def solver(mesh: Mesh, metric: FloatArray) -> GeodesicSolver:
@@ -202,7 +203,7 @@ def random_metric(m: int, rng: np.random.Generator, most: float) -> FloatArray:
 @pytest.mark.parametrize("most", [0.1, 1.0, 3.0, 6.0])
 def test_no_distance_contradicts_lines_or_edges(most):
     rng = np.random.default_rng(int(10 * most))
-    mesh = delaunay(rng.random((300, 3)))
+    mesh = tetrahedra(rng.random((300, 3)))
     g = random_metric(mesh.n_faces, rng, most)
     least = np.sqrt(np.linalg.eigvalsh(g)[:, 0].min())
     sources, start = [5, 77, 200], np.array([0.0, 0.01, 0.02])

@@ -12,18 +12,18 @@ from heat_igl import GeodesicSolver, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.typing import BoolArray, FloatArray
-from heat_igl.validation import domains
-from heat_igl.validation.domains import around_the_edge, delaunay
+from heat_igl.validation.closed_forms import around_the_edge
+from heat_igl.validation.zoo.registry import carved, tetrahedra
 
 
 def scattered(n: int, seed: int = 0) -> Mesh:
     """Delaunay tetrahedra of random points, slivers and all."""
-    return delaunay(np.random.default_rng(seed).random((n, 3)))
+    return tetrahedra(np.random.default_rng(seed).random((n, 3)))
 
 
 def without(n: int, cut: Callable[[FloatArray], BoolArray], jitter: float = 0.25) -> Mesh:
     """A cube of n^3 cells without those whose centres are `cut`, vertices inside moved by a part of a cell."""
-    mesh = domains.without(n, cut)
+    mesh = carved(n, cut)
     V, inner = mesh.V.copy(), ~mesh.boundary
     V[inner] += np.random.default_rng(0).uniform(-jitter / n, jitter / n, (int(inner.sum()), 3))
     return Mesh(V, mesh.F)

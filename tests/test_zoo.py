@@ -1,4 +1,4 @@
-"""Shapes that no default was tuned for, cases of other domains, and the check that every answer by heat gets."""
+"""Shapes that no default was tuned for, and the check that every answer by heat gets."""
 
 import math
 import warnings
@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from conftest import load_script, mean_error
 
-import heat_igl
 from heat_igl import (
     AccuracyWarning,
     HeatMethodSolver,
@@ -18,15 +17,14 @@ from heat_igl import (
     geodesic_distance,
     shapes,
 )
-from heat_igl.geodesic import SolverChoice
 from heat_igl.heat.source_terms import SourceAssembler, drop_overtaken
 from heat_igl.intrinsic import mollify
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.domains import CASES, around_the_wall, by_fermat
+from heat_igl.validation.closed_forms import around_the_wall, by_fermat
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 
-# --- Heat on shapes that no default was tuned for, and the check that every answer gets
+# Heat on shapes that no default was tuned for, and the check that every answer gets
 
 
 # Mean error in percent over three sources as measured; a bound on either side.
@@ -224,21 +222,7 @@ def test_the_first_source_is_never_overtaken(heat):
     assert 3 in term.near.vertex
 
 
-# --- Every kind of domain against known distances, and what those distances keep
-
-
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_every_method_stays_within_its_bound(case):
-    problem = case.problem(np.random.default_rng([5, CASES.index(case)]))
-    away = problem.exact > 0
-    for method, bound in case.bounds.items():
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", heat_igl.AccuracyWarning)
-            found = SolverChoice.of(method).on(problem.domain).distance(problem.sources)
-        error = found[away] / problem.exact[away] - 1
-        assert np.abs(error).mean() <= bound, method
-        # No value in a body is below the straight line by more than one percent.
-        assert case.domain != "tetrahedra" or error.min() > -0.01, method
+# Closed forms.
 
 
 def test_refracted_time_obeys_snells_law():

@@ -51,12 +51,6 @@ def _tetrahedra_surface(points: FloatArray, T: IntArray) -> Mesh:
     return compact(points, F)
 
 
-def _tetrahedra(points: FloatArray) -> IntArray:
-    from scipy.spatial import Delaunay
-
-    return np.asarray(Delaunay(points).simplices, np.int64)
-
-
 def _plate(rng: Generator, around: int, n_inside: int) -> tuple[FloatArray, IntArray]:
     """Points (k, 2) and triangles of a rectangle of 10 by 6 with round holes, few vertices between them."""
     holes: list[tuple[float, float, float]] = []
@@ -93,7 +87,7 @@ def _band(middle: FloatArray, across: FloatArray, rows: int) -> Mesh:
 def tetrahedra_surface(rng: Generator) -> Mesh:
     """The boundary of the Delaunay tetrahedra between random points: of a half of them that hang together."""
     points = rng.random((int(rng.integers(100, 700)), 3))
-    T = _tetrahedra(points)
+    T = delaunay(points)
     middle = points[T].mean(axis=1)
     return _tetrahedra_surface(points, T[np.linalg.norm(middle - 0.5, axis=1) < rng.uniform(0.3, 0.6)])
 
@@ -104,7 +98,7 @@ def alpha_shape(rng: Generator) -> Mesh:
     n = int(rng.integers(200, 700))
     points = rng.standard_normal((n, 3)) * [1, 1, 0.3]
     points[:, 2] += 0.5 * points[:, 0] ** 2
-    T = _tetrahedra(points)
+    T = delaunay(points)
     edges = points[T[:, 1:]] - points[T[:, :1]]
     centre = np.linalg.solve(edges, 0.5 * (edges**2).sum(axis=2)[:, :, None])[:, :, 0]
     radius = np.linalg.norm(centre, axis=1)

@@ -12,6 +12,10 @@ import numpy as np
 
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.validation.shapes import box
+
+# Times six: a tetrahedron is left out below it, since its corners lie in a plane up to rounding.
+_LEAST_VOLUME = 1e-12
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ def seeded(seed: int) -> np.random.Generator:
 
 
 def delaunay(points: FloatArray) -> IntArray:
-    """The Delaunay triangles of points (k, 2) in the plane, all counter-clockwise."""
+    """The Delaunay triangles of points (k, 2), all counter-clockwise, or the Delaunay tetrahedra of points (k, 3)."""
     from scipy.spatial import Delaunay  # takes as long to import as the rest of the package
 
     return np.asarray(Delaunay(points).simplices, np.int64)
@@ -147,9 +151,21 @@ def raised(points: FloatArray, height: AnyArray | float = 0.0) -> FloatArray:
 
 
 def compact(V: FloatArray, F: IntArray) -> Mesh:
-    """The mesh without the vertices that no face uses."""
-    used, F = np.unique(F, return_inverse=True)
-    return Mesh(V[used], F.reshape(-1, 3))
+    """The triangles or tetrahedra without the vertices that none uses."""
+    used, numbers = np.unique(F, return_inverse=True)
+    return Mesh(V[used], numbers.reshape(F.shape))
+
+
+def tetrahedra(V: FloatArray) -> Mesh:
+    """Delaunay tetrahedra of points (n, 3) in the unit cube, slivers included, but for those without a volume."""
+    F = delaunay(V)
+    return Mesh(V, F[np.abs(np.linalg.det(V[F[:, 1:]] - V[F[:, :1]])) > _LEAST_VOLUME])
+
+
+def carved(n: int, cut: Callable[[FloatArray], BoolArray]) -> Mesh:
+    """The unit cube of n^3 cells without the tetrahedra whose centres (m, 3) are `cut`."""
+    cube = box(n)
+    return compact(cube.V, cube.F[~cut(cube.V[cube.F].mean(axis=1))])
 
 
 def joined(*parts: Mesh) -> Mesh:
