@@ -97,6 +97,15 @@ def test_cells_come_with_the_sampling():
     assert np.array_equal(cells.labels[cells.sites], np.arange(30))
 
 
+def test_cells_of_single_searches_are_those_of_all_sites_together(bunny):
+    """Each search ends where earlier sites are nearer; on the bunny two threads share it."""
+    for mesh in (bunny, two_spheres()):
+        cells = heat_igl.farthest_cells(mesh, 40)
+        each = heat_igl.GeodesicSolver(mesh).distances(cells.sites[:, None])
+        np.testing.assert_allclose(cells.distance, each.min(axis=0), rtol=1e-12)
+        np.testing.assert_allclose(cells.distance, each[cells.labels, np.arange(mesh.n_vertices)], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("mesh", "k"), [(shapes.icosphere(4), 60), (shapes.torus(40, 100), 150), (shapes.cylinder(60, 60), 120)]
 )

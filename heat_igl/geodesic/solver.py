@@ -236,6 +236,10 @@ class GeodesicSolver(BatchedSolver):
         distance[distance > limit] = np.inf
         return distance
 
+    def _nearer(self, vertex: int, than: FloatArray) -> FloatArray:
+        """Distance (n,) from a vertex where it is smaller than `than` (n,), the distance from others; else ``inf``."""
+        return self._engine.nearer(self._source_set(vertex), than, n_threads())
+
     @names_guessed
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
         """Distance, and which source is nearest: a geodesic Voronoi diagram.

@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 
 from heat_igl.errors import names_guessed, shown
-from heat_igl.geodesic import Solver
+from heat_igl.geodesic import GeodesicSolver, Solver
 from heat_igl.mesh import MeshLike
 from heat_igl.runtime import TimeLeft
 from heat_igl.sampling.queries import as_solver
@@ -84,7 +84,12 @@ def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -
         # No vertex is farther from the sites so far than the one chosen, so no vertex beyond that is nearer to it.
         reach = np.inf if i < len(first) else distance[sites[i]]
         if reach > 0:
-            claim_nearer(distance, labels, i, solver.distance(int(sites[i]), cutoff=float(reach)))
+            site = int(sites[i])
+            if isinstance(solver, GeodesicSolver):
+                found = solver._nearer(site, distance)
+            else:
+                found = solver.distance(site, cutoff=float(reach))
+            claim_nearer(distance, labels, i, found)
         else:
             labels[sites[i]] = i
         left()

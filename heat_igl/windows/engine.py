@@ -58,6 +58,12 @@ class Engine(ABC):
         """The distance of `labelled` alone."""
         return self.labelled(sources, cutoff, threads)[0]
 
+    def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
+        """Distance (n,) from vertices where it is smaller than `than` (n,), the distance from others; else ``inf``."""
+        found = self.distance(sources, float(than.max()), threads)
+        found[found >= than] = np.inf
+        return found
+
 
 class Triangles(ABC):
     """A surface of triangles, with its components."""
@@ -226,6 +232,13 @@ class WindowEngine(TriangleEngine):
         found = self._from_vertices.distance(sources.vertices, None, cutoff, threads, self.accuracy)
         return self._with_copies(found)
 
+    def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
+        """As of all engines; the search ends where others are nearer."""
+        found = self._from_vertices.distance(
+            sources.vertices, None, float(than.max()), threads, self.accuracy, than=than
+        )
+        return self._with_copies(found)
+
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Exact distance (n,), and the source (n,) that it is measured from.
 
@@ -355,7 +368,12 @@ class Invariants:
         self._l = _NO_LENGTHS if lengths is None else np.ascontiguousarray(lengths, np.float64)
 
     def contradiction(
-        self, distance: FloatArray, sources: SourceSet, cutoff: float = np.inf, tolerance: float = 0.0
+        self,
+        distance: FloatArray,
+        sources: SourceSet,
+        cutoff: float = np.inf,
+        tolerance: float = 0.0,
+        than: FloatArray | None = None,
     ) -> str | None:
         """How an answer contradicts the bounds, and where; None if it does not.
 
@@ -369,13 +387,16 @@ class Invariants:
             Beyond it distances may be ``inf``.
         tolerance : float
             Violations by this share of the largest distance are no contradiction.
+        than : (n,) float64, optional
+            Distances from other sources; where these are not farther the answer may be ``inf``.
         """
         distance = np.ascontiguousarray(distance, np.float64)
-        slack = (ROUNDING + tolerance) * checking.largest_finite(distance)
+        nearest = distance if than is None else np.minimum(distance, than)
+        slack = (ROUNDING + tolerance) * checking.largest_finite(nearest)
         return (
             self._at_sources(distance, sources, cutoff, slack)
             or self._elsewhere(distance, sources)
-            or self._along_edges(distance, cutoff, slack)
+            or self._along_edges(nearest, cutoff, slack)
             or self._below_lines(distance, sources, slack)
         )
 
@@ -526,6 +547,13 @@ class GuardedEngine(Engine):
         if self.windows.accuracy > 0:
             return self.exact.distance(sources, cutoff, threads)
         return self._replacement(problem, sources, cutoff, threads)[0]
+
+    def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
+        """As of all engines."""
+        found = self.windows.nearer(sources, than, threads)
+        if self._invariants.contradiction(found, sources, np.inf, self._tolerance, than) is None:
+            return found
+        return super().nearer(sources, than, threads)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from."""

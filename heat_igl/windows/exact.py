@@ -375,11 +375,16 @@ class ExactSurface:
         cutoff: float = np.inf,
         threads: int = 1,
         accuracy: float = 0.0,
+        than: FloatArray | None = None,
     ) -> FloatArray:
-        """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths."""
+        """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths.
+
+        With `than`, the distances (n,) from other sources, only what is nearer is searched, and the rest is ``inf``.
+        """
         tables = self.tables
         starts = starts_at(tables, sources, offsets, None, None, None)
-        done = search(tables, starts, cutoff=cutoff, threads=threads, accuracy=accuracy)
+        upper = None if than is None else tables.scaled(than[tables.old_vertex])
+        done = search(tables, starts, cutoff=cutoff, threads=threads, accuracy=accuracy, upper=upper)
         distance = tables.unscaled(done.found.distance[tables.number])
         if cutoff < np.inf:
             distance[distance > cutoff] = np.inf
@@ -480,11 +485,13 @@ def search(
     directed: bool = False,
     threads: int = 1,
     accuracy: float = 0.0,
+    upper: FloatArray | None = None,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`.
 
-    Windows are joined in searches for all vertices, on an intrinsic Delaunay triangulation without edges of more than
-    two faces, and where no source is a segment. Elsewhere the search is exact, which holds every accuracy.
+    Only distances smaller than `upper` (n,) are found, by the numbers of the tables. Windows are joined in searches for
+    all vertices, on an intrinsic Delaunay triangulation without edges of more than two faces, and where no source is a
+    segment. Elsewhere the search is exact, which holds every accuracy.
     """
     n, wanted = tables.n, _targets_at(tables, targets)
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
@@ -501,12 +508,15 @@ def search(
         accuracy = 0.0
     shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all
     if shares and not (tables.kind == FLAT_VERTEX).any():
-        statistics = _beside(tables, starts, found, accuracy, run)
+        statistics = _beside(tables, starts, found, accuracy, upper, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        _require(run(windows.Front(tables, found, TOLERANCE, leaving, None, accuracy), starts, statistics))
+        front = windows.Front(tables, found, TOLERANCE, leaving, None, accuracy)
+        if upper is not None:
+            windows.bound(front, upper)
+        _require(run(front, starts, statistics))
     return Searched(starts, found, wanted, int(statistics[1]), int(statistics[2]), leaving)
 
 
@@ -516,7 +526,9 @@ def _require(is_done: bool) -> None:
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 
-def _beside(tables: Tables, starts: Starts, found: Found, accuracy: float, run: _Run) -> IntArray | None:
+def _beside(
+    tables: Tables, starts: Starts, found: Found, accuracy: float, upper: FloatArray | None, run: _Run
+) -> IntArray | None:
     """Search on two threads; returns the statistics of both, or None if one thread must repeat the search.
 
     Windows are joined by the first thread alone.
@@ -524,7 +536,7 @@ def _beside(tables: Tables, starts: Starts, found: Found, accuracy: float, run: 
     also, statistics, done = Found.of(tables.n, len(found.label)), np.zeros((2, 3), np.int64), []
     first = windows.Front(tables, found, TOLERANCE, None, None, accuracy)
     second = windows.Front(tables, also, TOLERANCE)
-    bounds = np.full((2, tables.n), np.inf)
+    bounds = np.tile(np.full(tables.n, np.inf) if upper is None else upper, (2, 1))
     windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(tables.edges.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [
         lambda: run(first, starts, statistics[0]),

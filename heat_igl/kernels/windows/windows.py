@@ -353,27 +353,33 @@ def pair(
         The two fronts. Each has result arrays of its own; they share `kind` only. The distance of a vertex is the
         smaller of the two that they find.
     upper, other_upper : (n,)
-        Upper bounds on distances; infinity at first.
+        Upper bounds on distances, see `bound`; infinity if there are none.
     round_length : float
         How far the search goes before the threads exchange distances.
     plenty : int
         With about this many windows on the front there is work for two threads. With less than a third, one goes on
         alone.
     """
-    _join(first, upper, second)
-    _join(second, other_upper, first)
+    bound(first, upper)
+    bound(second, other_upper)
+    _join(first, second)
+    _join(second, first)
     first.state.round_length = second.state.round_length = round_length
     first.state.plenty = second.state.plenty = plenty
     first.state.few = second.state.few = plenty // 3
     first.state.is_first, second.state.is_first = True, False
 
 
+def bound(front: Front, upper: cython.double[::1]) -> None:
+    """Let a search find only distances that are smaller than `upper` (n,), which takes those that it finds."""
+    front.arrays += (upper.base,)
+    front.state.upper = cython.address(upper[0])
+
+
 @cython.cfunc
-def _join(one: Front, upper: cython.double[::1], other: Front) -> None:
+def _join(one: Front, other: Front) -> None:
     s: cython.pointer(Search) = cython.address(one.state)
-    one.arrays += (upper.base,)
     s.other = cython.address(other.state)
-    s.upper = cython.address(upper[0])
     s.parity = 0
     for i in range(2):
         s.news[i] = cython.NULL
