@@ -69,10 +69,10 @@ def flat_perturbed(mesh: heat_igl.Mesh, amount: float = 0.3, seed: int = 0) -> h
 
 
 def two_halves(n: int) -> heat_igl.Mesh:
-    """A square of n by n cells, its inner vertices moved, but those at x = 1/2 only along that line."""
+    """A square of n by n cells, its inner vertices moved in the plane, but for those at x = 1/2."""
     grid = heat_igl.shapes.grid(n)
-    V = flat_perturbed(grid).V.copy()
-    V[grid.V[:, 0] == 0.5, 0] = 0.5
+    V, inner = grid.V.copy(), ~grid.boundary & (grid.V[:, 0] != 0.5)
+    V[inner, :2] += np.random.default_rng(0).uniform(-0.25 / n, 0.25 / n, (int(inner.sum()), 2))
     return heat_igl.Mesh(V, grid.F)
 
 

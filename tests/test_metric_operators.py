@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import flat_perturbed, mean_error, perturbed
+from conftest import flat_perturbed, mean_error, perturbed, two_halves
 
 import heat_igl
 from heat_igl import fibre_metric, metric_operators, shapes
@@ -51,9 +51,7 @@ def test_metrics_in_the_plane_of_each_face_and_in_space():
 
 def test_a_piecewise_constant_metric_that_fits_together():
     """Half of a square is stretched across the border, along which both halves agree: a rectangle."""
-    mesh = shapes.grid(24)
-    moved = flat_perturbed(mesh, 0.25).V
-    mesh = Mesh(np.where(mesh.V[:, :1] == 0.5, mesh.V, moved), mesh.F)
+    mesh = two_halves(24)
     V = mesh.V.copy()
     V[:, 0] += 2 * np.maximum(V[:, 0] - 0.5, 0)
     is_right = mesh.V[mesh.F][:, :, 0].mean(axis=1) > 0.5
