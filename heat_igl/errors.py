@@ -160,11 +160,13 @@ def names_guessed(function: Callable[P, R]) -> Callable[P, R]:
     @wraps(function)
     def checked(*args: P.args, **named: P.kwargs) -> R:
         if len(args) > most:
-            order = ", ".join(name for name in known if name not in by_name)
+            names = [name for name in known if name not in by_name]
+            order = ", ".join(names) + (" in this order" if len(names) > 1 else "")
             others = ", ".join(f"{name}=" for name in (["distance"] if takes_any else by_name))
             remedy = f"the others go by name ({others})" if others else "there are no others"
             pair = "; positions V and faces F are one mesh, (V, F)" if "mesh" in known else ""
-            raise TypeError(f"{function.__qualname__}() takes {order} in this order; {remedy}{pair}")
+            called = function.__qualname__.removesuffix(".__init__")
+            raise TypeError(f"{called}() takes {order}; {remedy}{pair}")
         for name in named:
             if name not in known and not takes_any:
                 close = "".join(f" Did you mean {guess!r}?" for guess in get_close_matches(name, known, n=1))

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 
 __all__ = ["attached"]
 
 
-def attached(package: str, file: str) -> tuple[list[str], Callable[[str], object], Callable[[], list[str]]]:
+def attached(
+    package: str, file: str, other_words: Mapping[str, str] = MappingProxyType({})
+) -> tuple[list[str], Callable[[str], object], Callable[[], list[str]]]:
     """`__all__`, `__getattr__` and `__dir__` of a package (PEP 562), from the stub beside its ``__init__.py``.
 
     The stub ``__init__.pyi``, which type checkers read as well, is the one list of the package's names: a line
     ``from module import name as name`` for each. No name may be that of another module of the package, which would
-    take its place once it is imported.
+    take its place once it is imported. The error for a name that is not there suggests what `other_words` has for it,
+    or one like it.
     """
     stub = Path(file).with_suffix(".pyi").read_text(encoding="utf8")
     homes = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as \2$", stub, re.MULTILINE)}
@@ -38,7 +42,8 @@ def attached(package: str, file: str) -> tuple[list[str], Callable[[str], object
 
             stubs = sorted(Path(file).parent.glob("*/__init__.pyi"))
             rooms = [stub.parent.name for stub in stubs if f" as {name}\n" in stub.read_text(encoding="utf8")]
-            close = [f"; did you mean {guess!r}?" for guess in get_close_matches(name, names, n=1)]
+            words = [other_words[name]] if name in other_words else get_close_matches(name, names, n=1, cutoff=0.7)
+            close = [f"; did you mean {word}?" for word in words]
             message += "".join([f": it is in {package}.{room}" for room in rooms[:1]] or close)
         # With a name but no object, the interpreter adds no second suggestion.
         raise AttributeError(message, name=name)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
@@ -113,8 +114,12 @@ def test_names_loaded_on_first_use_are_those_of_their_modules():
     assert set(heat_igl.__all__) <= set(dir(heat_igl))
     with pytest.raises(AttributeError, match=r"no attribute 'handle_loops': it is in heat_igl\.curves$"):
         heat_igl.handle_loops  # noqa: B018
-    with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'; did you mean 'validate'"):
+    with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'; did you mean validate"):
         _ = heat_igl.valdate
+    with pytest.raises(AttributeError, match=r"did you mean geodesic_distance, or compat\.igl\.exact_geodesic\?$"):
+        _ = heat_igl.exact_geodesic
+    for words in heat_igl._OTHER_WORDS.values():
+        assert all(resolve_name(f"heat_igl.{word}") for word in words.split(", or "))
     assert not {"Any", "TYPE_CHECKING", "import_module", "re", "Path"} & set(dir(heat_igl))
 
 

@@ -349,7 +349,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: SOLVER.distances([[0]], radius=1.0), "It takes source_sets, out, progress, dtype, cutoff$"),
     (lambda m: heat_igl.shortest_paths(m, target=3, sources=0), r"Did you mean 'targets'\?"),
     (lambda m: heat_igl.geodesic_distance(m.V, m.F, 0), r"takes mesh, sources in .* \(method=.* one mesh, \(V, F\)$"),
-    (lambda _: SOLVER.distance(0, 40), r"takes sources in this order; the others go by name \(cutoff=\)$"),
+    (lambda _: SOLVER.distance(0, 40), r"distance\(\) takes sources; the others go by name \(cutoff=\)$"),
     (lambda m: heat_igl.write_mesh("a.ply", m, m.V), r"takes path, mesh in .* go by name \(distance=\)"),
     (lambda m: heat_igl.shortest_paths(m, 42, 0), r"^targets\[0\] = 42 is no vertex"),
     (lambda m: heat_igl.shortest_paths(m, [], 0), "^targets is empty"),
