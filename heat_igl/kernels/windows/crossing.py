@@ -388,15 +388,18 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
 
 @cython.cfunc
 @cython.nogil
-def _goes_on(u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double) -> cython.bint:
+def _goes_on(
+    u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double, is_many: cython.bint
+) -> cython.bint:
     """Whether w continues u: two halves that passed a flat vertex.
 
     Halves that passed a vertex beside the root, one on either side, may have the same root to rounding while they left
     it in directions that differ by the curvature of the vertex: then their half-edge is turned against the corner.
+    Where more than two faces meet (`is_many`), they cannot be oriented alike, and directions have no meaning.
     """
     if fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth) or is_joined(u) or is_joined(w):
         return False
-    if u.corner == w.corner and fabs(u.turn_x - w.turn_x) + fabs(u.turn_y - w.turn_y) > TURNED:
+    if not is_many and u.corner == w.corner and fabs(u.turn_x - w.turn_x) + fabs(u.turn_y - w.turn_y) > TURNED:
         return False
     return (
         u.root == w.root
@@ -439,7 +442,7 @@ def _insert(
     sliver: cython.double = 0.0 if is_many else SLIVER * length
     while j > 0:
         u = windows + (j - 1)
-        if (is_many or (j == k and u.start <= w.start)) and _goes_on(u, w, length):
+        if (is_many or (j == k and u.start <= w.start)) and _goes_on(u, w, length, is_many):
             u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
             return k
         outcome = _settle(s, u, w, sliver)
