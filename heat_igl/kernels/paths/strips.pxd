@@ -117,7 +117,6 @@ cdef class Detour:
     cdef int find(
         self, FaceTable s, int v, int h, Sides before, int goal, int end, Sides after, double limit
     ) noexcept nogil
-    cdef int turn_back(self, FaceTable s, int v, int h, double before, int end, double after, double limit) noexcept nogil
     cdef bint _is_entered(self, int g, int n_steps) noexcept nogil
     cdef int _crossings(self, int last) noexcept nogil
 
@@ -149,7 +148,7 @@ cdef class Funnel:
 
     cdef int lay_out(self, FaceTable s, int face, const Place* start, Strip strip) except -1 nogil
     cdef void pull_tight(self, double x, double y) noexcept nogil
-    cdef void _bend_at(self, int count, int side, int at) noexcept nogil
+    cdef FunnelCorner corner(self, int at, int side) noexcept nogil
     cdef double length(self) noexcept nogil
     cdef double share(self, int j, int i) noexcept nogil
 

@@ -11,6 +11,7 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.paths.strips import (
     Corners,
     Crossing,
+    FunnelCorner,
     Place,
     Sides,
     corner_of,
@@ -92,8 +93,6 @@ class Detour:
         room = 4 * n_corners + 4
         self.step, self.tip, self.way = np.empty(room, _AROUND), np.empty(room, _TIP), np.empty(room, _CROSSING)
 
-    @cython.cfunc
-    @cython.nogil
     def find(
         self,
         s: FaceTable,
@@ -157,36 +156,6 @@ class Detour:
                 self.tip[nearest].length, self.tip[nearest].step = length + angle, n_steps
                 n_tips += 1
                 n_steps += 1
-        return -1
-
-    def turn_back(
-        self,
-        s: FaceTable,
-        v: cython.int,
-        h: cython.int,
-        before: cython.double,
-        end: cython.int,
-        after: cython.double,
-        limit: cython.double,
-    ) -> cython.int:
-        """The way around v from the face of half-edge h, away from h, to that of half-edge `end`, not through that one.
-
-        As `find` with the angles `before` and `after` in the first and the last face on this side. Returns how many
-        crossings, -1 if there is no way or none below `limit`, and -2 if an edge of more than two faces comes first.
-        """
-        leave: cython.int = other_side(s, h, v)
-        total: cython.double = before + after
-        count: cython.int = 0
-        while total < limit and count < self.way.shape[0]:
-            enter: cython.int = s.twin[leave]
-            if enter < 0:
-                return enter
-            self.way[count].leave, self.way[count].enter = leave, enter
-            count += 1
-            if enter // 3 == end // 3:
-                return count
-            total += s.triangle[enter // 3].angle[corner_of(s, enter // 3, v)]
-            leave = other_side(s, enter, v)
         return -1
 
     def _is_entered(self, g: cython.int, n_steps: cython.int) -> cython.bint:
@@ -279,8 +248,7 @@ class Funnel:
         limit_y: cython.double[2]
         by: cython.int[2]
         by[0] = by[1] = -1
-        self.bend[0].x, self.bend[0].y = ax, ay
-        self.bend[0].side = self.bend[0].first = self.bend[0].last = -1
+        self.bend[0] = FunnelCorner(ax, ay, -1, -1, -1)
         j: cython.int = 0
         while j <= k:
             is_turned: cython.bint = False
@@ -292,8 +260,11 @@ class Funnel:
                     continue  # opens the funnel
                 opposite: cython.int = 1 - side
                 if by[opposite] >= 0 and sign * (limit_x[opposite] * py - limit_y[opposite] * px) < 0.0:
-                    self._bend_at(count, opposite, by[opposite])
-                    ax, ay, j = self.bend[count].x, self.bend[count].y, self.bend[count].last + 1
+                    bend: FunnelCorner = self.corner(by[opposite], opposite)
+                    # Crossings before the last bend come before it, though this vertex may be in sight already.
+                    bend.first = max(bend.first, self.bend[count - 1].last)
+                    ax, ay, j = bend.x, bend.y, bend.last + 1
+                    self.bend[count] = bend
                     count += 1
                     by[0] = by[1] = -1
                     is_turned = True
@@ -301,26 +272,19 @@ class Funnel:
                 limit_x[side], limit_y[side], by[side] = px, py, j
             if not is_turned:
                 j += 1
-        end = cython.address(self.bend[count])
-        end.x, end.y, end.side, end.first, end.last = x, y, -1, k, k
+        self.bend[count] = FunnelCorner(x, y, -1, k, k)
         self.n_bends = count + 1
 
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def _bend_at(self, count: cython.int, side: cython.int, at: cython.int) -> cython.void:
-        """Make an end of the crossing `at` the next bend."""
-        v: cython.int = self.gate[at].vertex[side]
+    def corner(self, at: cython.int, side: cython.int) -> FunnelCorner:
+        """An end of the crossing `at`, with all crossings there that share it."""
+        gate = cython.address(self.gate[at])
         first: cython.int = at
         last: cython.int = at
-        while first > 0 and self.gate[first - 1].vertex[side] == v:
+        while first > 0 and self.gate[first - 1].vertex[side] == gate.vertex[side]:
             first -= 1
-        while last + 1 < self.n_gates and self.gate[last + 1].vertex[side] == v:
+        while last + 1 < self.n_gates and self.gate[last + 1].vertex[side] == gate.vertex[side]:
             last += 1
-        bend = cython.address(self.bend[count])
-        bend.x, bend.y, bend.side = self.gate[at].x[side], self.gate[at].y[side], side
-        # Crossings before the last bend come before it, though this vertex may be in sight already.
-        bend.first, bend.last = max(first, self.bend[count - 1].last), last
+        return FunnelCorner(gate.x[side], gate.y[side], side, first, last)
 
     def length(self) -> cython.double:
         """Length of the shortest path."""
