@@ -32,7 +32,7 @@ from heat_igl import GeodesicSolver, Mesh, read_mesh, shapes
 from heat_igl.cli.demo import sample_mesh
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
-from heat_igl.validation.zoo.registry import hull
+from heat_igl.validation.zoo import hull
 
 from harness import METHODS, Method, Row, Table, collected, drawn, errors, ours, parsed, publish, seconds
 from harness import subdivided as finer

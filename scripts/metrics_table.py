@@ -56,7 +56,7 @@ from heat_igl.operators import MetricSimplices, Operators
 from heat_igl.sweep import LineEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.closed_forms import around_the_edge, by_fermat, straight
-from heat_igl.validation.zoo.registry import carved, compact, tetrahedra
+from heat_igl.validation.zoo import carved, compact, tetrahedra
 
 from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds
 

@@ -10,7 +10,7 @@ from conftest import perturbed
 
 from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
 from heat_igl.typing import ArrayLike
-from heat_igl.validation.zoo.registry import joined
+from heat_igl.validation.zoo import joined
 
 
 def twice(mesh: Mesh, apart: float | np.ndarray = 5.0) -> Mesh:

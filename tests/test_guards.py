@@ -18,8 +18,7 @@ from heat_igl.sources import SourceSet, source_set
 from heat_igl.steps import PoissonProblem
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import FloatArray
-from heat_igl.validation.zoo import FAMILIES
-from heat_igl.validation.zoo.registry import joined
+from heat_igl.validation.zoo import FAMILIES, joined
 from heat_igl.windows import Engine, ExactSurface, GuardedEngine, Invariants, WindowEngine, from_vertex
 
 SOURCE, FAR = 40, 399

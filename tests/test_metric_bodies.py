@@ -21,7 +21,7 @@ from heat_igl.operators import MetricSimplices
 from heat_igl.sweep import HopfLaxEngine
 from heat_igl.typing import FloatArray
 from heat_igl.validation.closed_forms import straight
-from heat_igl.validation.zoo.registry import tetrahedra
+from heat_igl.validation.zoo import tetrahedra
 
 
 def solver(mesh: Mesh, metric: FloatArray) -> GeodesicSolver:

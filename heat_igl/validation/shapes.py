@@ -21,7 +21,7 @@ import numpy as np
 from heat_igl.errors import is_number, shown
 from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths
 from heat_igl.mesh import Mesh
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = [
     "blob",
@@ -65,16 +65,20 @@ def lattice_faces(rows: int, columns: int, wrap_rows: bool = False, wrap_columns
     return np.concatenate([lower, upper])
 
 
+def lattice_mesh(x: AnyArray, y: AnyArray, z: AnyArray | float = 0.0, **wraps: bool) -> Mesh:
+    """The triangles of `lattice_faces` on coordinates (rows, columns), or on arrays that broadcast to these."""
+    x, y, z = np.broadcast_arrays(x, y, z)
+    return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), lattice_faces(*x.shape, **wraps))
+
+
 def grid(n: int) -> Mesh:
     """The unit square with n by n cells of side 1 / n, the mesh of the paper's section 4.2.
 
     Vertex ``row * (n + 1) + column`` lies at (column / n, row / n, 0). Diagonals run from (0, 1) to (1, 0) of each
     cell, as in the paper. Distance is Euclidean.
     """
-    n = _at_least("n", n, 1)
-    y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
-    V = np.stack([x / n, y / n, np.zeros(len(x))], axis=1)
-    return Mesh(V, lattice_faces(n + 1, n + 1))
+    steps = np.arange(_at_least("n", n, 1) + 1) / n
+    return lattice_mesh(steps, steps[:, None])
 
 
 def strip(length: int, width: int) -> Mesh:
@@ -83,9 +87,7 @@ def strip(length: int, width: int) -> Mesh:
     Vertex ``row * (length + 1) + column`` lies at (column, row, 0). Distance is Euclidean.
     """
     length, width = _at_least("length", length, 1), _at_least("width", width, 1)
-    y, x = np.divmod(np.arange((width + 1) * (length + 1)), length + 1)
-    V = np.stack([x, y, np.zeros(len(x))], axis=1)
-    return Mesh(V, lattice_faces(width + 1, length + 1))
+    return lattice_mesh(np.arange(length + 1), np.arange(width + 1)[:, None])
 
 
 def disk(n: int) -> Mesh:
@@ -144,10 +146,8 @@ def cylinder(around: int, along: int, length: float = 2 * np.pi) -> Mesh:
     Vertex ``ring * around + k`` lies at the angle 2 pi k / around. Distance is Euclidean on the unrolled cylinder.
     """
     around, along = _at_least("around", around, 3), _at_least("along", along, 1)
-    ring, k = np.divmod(np.arange(around * (along + 1)), around)
-    angle = 2 * np.pi * k / around
-    V = np.stack([np.cos(angle), np.sin(angle), ring * (length / along)], axis=1)
-    return Mesh(V, lattice_faces(along + 1, around, wrap_columns=True))
+    angle, height = 2 * np.pi * np.arange(around) / around, np.arange(along + 1) * (length / along)
+    return lattice_mesh(np.cos(angle), np.sin(angle), height[:, None], wrap_columns=True)
 
 
 def book(pages: int, n: int) -> Mesh:
