@@ -790,7 +790,7 @@ def _tetrahedra_surface(points: FloatArray, T: IntArray) -> Mesh:
     return compact(points, F)
 
 
-def _plate(rng: Generator, around: int, n_inside: int) -> tuple[FloatArray, IntArray]:
+def _holed_rectangle(rng: Generator, around: int, n_inside: int) -> tuple[FloatArray, IntArray]:
     """Points (k, 2) and triangles of a rectangle of 10 by 6 with round holes, few vertices between them."""
     holes: list[tuple[float, float, float]] = []
     for _ in range(200):
@@ -890,16 +890,16 @@ def maze(rng: Generator) -> Mesh:
 
 
 @family("CAD plate")
-def cad_plate(rng: Generator) -> Mesh:
+def cad_holed_rectangle(rng: Generator) -> Mesh:
     """A flat plate with round holes, vertices on the rims and few elsewhere."""
-    points, F = _plate(rng, int(rng.integers(12, 96)), int(rng.integers(0, 60)))
+    points, F = _holed_rectangle(rng, int(rng.integers(12, 96)), int(rng.integers(0, 60)))
     return compact(raised(points), F)
 
 
 @family("thin plate")
-def thin_plate(rng: Generator) -> Mesh:
+def thin_holed_rectangle(rng: Generator) -> Mesh:
     """The same as a body: two sheets a small thickness apart, joined along the rims."""
-    points, F = _plate(rng, int(rng.integers(8, 40)), int(rng.integers(0, 60)))
+    points, F = _holed_rectangle(rng, int(rng.integers(8, 40)), int(rng.integers(0, 60)))
     return extruded(points, F, 10 ** rng.uniform(-2.5, -0.3))
 
 
