@@ -98,33 +98,10 @@ class Flipped(NamedTuple):
 
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
         """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
-        moved, edge, in_second = self.moved(faces)
-        if not len(moved):
-            return faces, barycentric
-        sides, side = np.concatenate([self.half_edge, self.mate]), edge + len(self.mate) * in_second
-        ab, pa, bp, aq, qb = self.lengths[:, edge]
-        # a at the origin, b on the first axis, p above the axis and q below.
-        (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
-        corner = (sides[side, None] + np.arange(3)) % 3
-        at_apex, at_tail, at_head = np.take_along_axis(barycentric[moved], corner, axis=1).T
-        at_a, at_b = np.where(in_second, at_head, at_tail), np.where(in_second, at_tail, at_head)
-        # Twice the signed areas of the triangles of pq with a, b and the point: positive on the side of a.
-        of_a, of_b = (px - qx) * qy + (py + qy) * qx, (px - qx) * qy - (py + qy) * (ab - qx)
-        of_point = at_a * of_a + at_b * of_b
-        in_first = of_point >= 0
-        # The coordinate of the corner beyond pq goes to p and q, in sums of positive numbers: a point beside a corner
-        # keeps its direction from there.
-        of_third = np.where(in_first, of_a, of_b)
-        third = np.clip(of_point / of_third, 0.0, 1.0)
-        beyond = np.where(in_first, at_b, -at_a) / of_third * ((of_a - of_b) / (py + qy))
-        at_p = np.where(in_second, 0.0, at_apex) + beyond * qy
-        at_q = np.where(in_second, at_apex, 0.0) + beyond * py
-        corner = (np.where(in_first, self.half_edge[edge], self.mate[edge])[:, None] + np.arange(3)) % 3
-        faces, barycentric = faces.copy(), barycentric.copy()
-        faces[moved] = np.where(in_first, self.half_edge[edge], self.mate[edge]) // 3
-        barycentric[moved[:, None], corner] = np.stack(
-            [np.where(in_first, at_p, at_q), third, np.where(in_first, at_q, at_p)], axis=1
-        )
+        moved, edge, _ = self.moved(faces)
+        faces, barycentric = np.array(faces, np.int64), np.array(barycentric, np.float64, order="C")
+        lengths = np.ascontiguousarray(self.lengths.T)
+        carrying.carry_flipped(self.half_edge, self.mate, lengths, edge, moved, faces, barycentric)
         return faces, barycentric
 
     def turn(self, before: IntArray, after: IntArray) -> FloatArray:

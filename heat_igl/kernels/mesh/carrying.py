@@ -1,26 +1,15 @@
-"""Points on a triangulation that is refined: the triangles that they are in after all splits and flips."""
+"""Points on a triangulation that is changed: the triangles that they are in after splits and flips."""
 
 import cython
 import numpy as np
-from cython.cimports.libc.math import sqrt
+from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot
 
 
 def index_moves(kind: cython.longlong[:, ::1], n_faces):
-    """Which move is the first to change each face, and which is the next to change each face that a move makes.
+    """Which move is the first to change each face, and the next to change each face that a move makes; -1 for none.
 
-    Parameters
-    ----------
-    kind : (k, 3) int64
-        The moves in order: 0, face, first of the two new faces for a split; 1, half-edge, mate for a flip.
-    n_faces : int
-        Number of faces after all moves.
-
-    Returns
-    -------
-    first : (n_faces,) int64
-        The first move that changes each face; -1 for none.
-    following : (k, 3) int64
-        For each move, the next one that changes the first, second and third face.
+    `kind` (k, 3) are the moves, as `Refined` has them, and there are `n_faces` after all of them. Returns an array
+    (n_faces,), and (k, 3) for the first, second and third face of each move.
     """
     k = kind.shape[0]
     first_array, following_array = np.full(n_faces, -1), np.full((k, 3), -1)
@@ -55,9 +44,26 @@ def carry(
                     piece: cython.longlong = _split(numbers[move], barycentric[i])
                     face[i] = kind[move, 1] if piece == 0 else kind[move, 2] + piece - 1
                 else:
-                    piece = _flip(kind[move], numbers[move], face[i], barycentric[i])
+                    piece = _flip(kind[move, 1], kind[move, 2], numbers[move], face[i], barycentric[i])
                     face[i] = kind[move, 1 + piece] // 3
                 move = following[move, piece]
+
+
+def carry_flipped(
+    half_edge: cython.const[cython.longlong][::1],
+    mate: cython.const[cython.longlong][::1],
+    lengths: cython.double[:, ::1],
+    edge: cython.const[cython.longlong][::1],
+    point: cython.const[cython.longlong][::1],
+    face: cython.longlong[::1],
+    barycentric: cython.double[:, ::1],
+):
+    """Carry points through flips, as `Flipped` has them, in place: ``point[i]`` through flip ``edge[i]``."""
+    for i in range(point.shape[0]):
+        e: cython.longlong = edge[i]
+        p: cython.longlong = point[i]
+        in_second: cython.longlong = _flip(half_edge[e], mate[e], lengths[e], face[p], barycentric[p])
+        face[p] = (mate[e] if in_second else half_edge[e]) // 3
 
 
 @cython.cfunc
@@ -82,37 +88,39 @@ def _split(at: cython.double[::1], b: cython.double[::1]) -> cython.longlong:
 @cython.cfunc
 @cython.nogil
 def _flip(
-    edge: cython.longlong[::1], lengths: cython.double[::1], face: cython.longlong, b: cython.double[::1]
+    half_edge: cython.longlong,
+    mate: cython.longlong,
+    lengths: cython.double[::1],
+    face: cython.longlong,
+    b: cython.double[::1],
 ) -> cython.longlong:
     """Whether the first (0) or the second (1) face holds a point after a flip; the coordinates are changed.
 
-    As `Flipped.carry`: before, the faces are pab and qba; after, the first is paq and the second qbp.
+    As `Flipped` has it: before, the faces are pab and qba; after, the first is paq and the second qbp.
     """
+    # a at the origin, b on the first axis, p above the axis and q below.
     ab: cython.double = lengths[0]
-    x_p: cython.double = 0.5 * (ab + (lengths[1] - lengths[2]) * ((lengths[1] + lengths[2]) / ab))
-    x_q: cython.double = 0.5 * (ab + (lengths[3] - lengths[4]) * ((lengths[3] + lengths[4]) / ab))
-    y_p: cython.double = sqrt(max(lengths[1] * lengths[1] - x_p * x_p, 0.0))
-    y_q: cython.double = sqrt(max(lengths[3] * lengths[3] - x_q * x_q, 0.0))
-    side: cython.longlong = edge[1]
-    in_second: cython.bint = face == edge[2] // 3
-    if in_second:
-        side = edge[2]
-    c: cython.int = side % 3
+    x_p: cython.double = foot(ab, lengths[1], lengths[2])
+    x_q: cython.double = foot(ab, lengths[3], lengths[4])
+    y_p: cython.double = 2.0 * area(ab, lengths[1], lengths[2]) / ab
+    y_q: cython.double = 2.0 * area(ab, lengths[3], lengths[4]) / ab
+    in_second: cython.bint = face == mate // 3
+    c: cython.int = (mate if in_second else half_edge) % 3
     at_apex: cython.double = b[c]
     at_a: cython.double = b[(c + 2) % 3] if in_second else b[(c + 1) % 3]
     at_b: cython.double = b[(c + 1) % 3] if in_second else b[(c + 2) % 3]
-    # a at the origin, b on the first axis, p above the axis and q below.
     # Twice the signed areas of the triangles of pq with a, b and the point: positive on the side of a.
     of_a: cython.double = (x_p - x_q) * y_q + (y_p + y_q) * x_q
     of_b: cython.double = (x_p - x_q) * y_q - (y_p + y_q) * (ab - x_q)
     of_point: cython.double = at_a * of_a + at_b * of_b
     goes_on: cython.longlong = 0 if of_point >= 0.0 else 1
     third: cython.double = min(max(of_point / (of_b if goes_on else of_a), 0.0), 1.0)
-    # The coordinate of the corner beyond pq goes to p and q.
+    # The coordinate of the corner beyond pq goes to p and q, in sums of positive numbers: a point beside a corner keeps
+    # its direction from there.
     beyond: cython.double = -at_a / of_b if goes_on else at_b / of_a
     beyond *= (of_a - of_b) / (y_p + y_q)
     at_p: cython.double = beyond * y_q + (0.0 if in_second else at_apex)
     at_q: cython.double = beyond * y_p + (at_apex if in_second else 0.0)
-    c = edge[1 + goes_on] % 3
+    c = (mate if goes_on else half_edge) % 3
     b[c], b[(c + 1) % 3], b[(c + 2) % 3] = (at_q, third, at_p) if goes_on else (at_p, third, at_q)
     return goes_on

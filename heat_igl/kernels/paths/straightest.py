@@ -16,14 +16,11 @@ class _Tracer:
     def trace_one(
         self,
         face: cython.longlong,
-        at: cython.p_double,
+        at: cython.pointer[cython.const[cython.double]],
         turn: cython.double,
         length: cython.double,
-        end_face: cython.p_longlong,
-        end: cython.p_double,
-        travelled: cython.p_double,
     ) -> cython.int:
-        """One geodesic.
+        """One geodesic, to ``leave`` in ``end_face``.
 
         It begins at barycentric coordinates `at` in `face`, at the angle `turn` from the direction of corner 0 to
         corner 1.
@@ -33,36 +30,32 @@ class _Tracer:
         left: cython.double = length
         for c in range(3):
             self.entry[c] = self.leave[c] = at[c]
-        end_face[0], travelled[0] = face, 0.0
+        self.end_face, self.travelled = face, 0.0
         goes_on: cython.bint = length > 0.0 and self.start(face, turn)
         while goes_on and idle <= MOST_IDLE:
             f: cython.longlong = self.ray.h // 3
             self.exit = cross(cython.address(self.l[0, 0]), 2.0 * self.area[f], cython.address(self.ray))
-            step: cython.double = self.find_exit(travelled[0])
+            step: cython.double = self.find_exit()
             ends: cython.bint = step >= left
             if ends:
                 share: cython.double = left / step
                 for c in range(3):
                     self.leave[c] = self.entry[c] + share * (self.leave[c] - self.entry[c])
-                travelled[0] = length
+                self.travelled = length
             else:
                 left -= step
-                travelled[0] = length - left
-            end_face[0] = f
+                self.travelled = length - left
+            self.end_face = f
+            idle += 1
             if step > 0.0 or ends:
                 self.store(f)
-                has_segments = True
-                idle = 0
-            else:
-                idle += 1
+                has_segments, idle = True, 0
             is_at_vertex: cython.bint = self.share == 0.0 or self.share == 1.0
             goes_on = not ends and (self.pass_vertex() if is_at_vertex else self.cross_side())
-        for c in range(3):
-            end[c] = self.leave[c]
         if not has_segments:
             for c in range(3):
                 self.entry[c] = self.leave[c]
-            self.store(end_face[0])
+            self.store(self.end_face)
         return 0
 
     def start(self, f: cython.longlong, turn: cython.double) -> cython.bint:
@@ -134,16 +127,16 @@ class _Tracer:
         self.ray = Heading(h, OUT_OF_TAIL, 0.0, 0.0, cos(turn), sin(turn))
         return True
 
-    def find_exit(self, travelled: cython.double) -> cython.double:
+    def find_exit(self) -> cython.double:
         """Find the point at which the ray leaves the face; returns the length of the segment up to there.
 
-        `travelled` is the length up to this face. The point is the share `share` of the half-edge ``exit.h``.
+        The point is the share `share` of the half-edge ``exit.h``.
         """
         p = cython.address(self.exit)
         length: cython.double = self.l[p.h // 3, p.h % 3]
         # Rounding moves a ray by a share of its length: what it misses by less, it meets, also if it grazes the side.
-        meets_tail: cython.bint = p.right < ON_RAY * min(travelled + p.tail_ahead, length)
-        meets_head: cython.bint = p.left < ON_RAY * min(travelled + p.head_ahead, length)
+        meets_tail: cython.bint = p.right < ON_RAY * min(self.travelled + p.tail_ahead, length)
+        meets_head: cython.bint = p.left < ON_RAY * min(self.travelled + p.head_ahead, length)
         if meets_tail == meets_head and (meets_tail or p.right + p.left == 0.0):
             # It runs along the side, and takes the end that lies farther ahead.
             self.share = 1.0 if p.head_ahead > p.tail_ahead else 0.0
@@ -222,13 +215,8 @@ def trace(
     tracer.segments = Segments() if stores else None
     with cython.nogil:
         for i in range(face.shape[0]):
-            tracer.trace_one(
-                face[i],
-                cython.address(at[i, 0]),
-                turn[i],
-                length[i],
-                cython.address(end_face[i]),
-                cython.address(end[i, 0]),
-                cython.address(travelled[i]),
-            )
+            tracer.trace_one(face[i], cython.address(at[i, 0]), turn[i], length[i])
+            end_face[i], travelled[i] = tracer.end_face, tracer.travelled
+            for c in range(3):
+                end[i, c] = tracer.leave[c]
     return tracer.segments.arrays() if stores else None
