@@ -11,21 +11,10 @@ def edge_excess(
     j: cython.longlong[::1],
     length: cython.double[::1],
 ):
-    """By how much differences along edges exceed the lengths of the edges.
+    """By how much differences of distances (n,) along edges i, j (e,) exceed the lengths (e,) of the edges.
 
-    Parameters
-    ----------
-    distance : (n,) float64
-        Distances; edges with one that is not finite are left out.
-    i, j, length : (e,) int64, (e,) int64, (e,) float64
-        Edges, each with the vertices at the ends.
-
-    Returns
-    -------
-    total, excess : float
-        Sum of the lengths, and of the excess of the differences over them.
-    worst : int
-        Edge with the largest excess; -1 if there is none.
+    Edges with a distance that is not finite are left out. Returns the sum of the other lengths, that of the excess of
+    the differences over them, and the edge with the largest excess, -1 if there is none.
     """
     worst: cython.Py_ssize_t = -1
     total: cython.double = 0.0
@@ -92,27 +81,11 @@ def steepest_edge(
     cutoff: cython.double,
     slack: cython.double,
 ):
-    """An end of the first edge of simplices along which distance grows by more than the length of the edge.
+    """The far and the near end of the first edge along which distance grows by more than the length of the edge.
 
-    Parameters
-    ----------
-    distance : (n,) float64
-        Distances.
-    F : (m, 3) or (m, 4) int64
-        Triangles or tetrahedra.
-    V : (n, 3) float64
-        Positions, from which lengths follow; (0, 3) if `l` has them.
-    l : (m, 3) float64
-        Lengths of the sides of triangles, each opposite its corner; (0, 3) if V has them.
-    cutoff : float
-        Beyond it distances may be ``inf``, at any vertex.
-    slack : float
-        An excess that is rounding.
-
-    Returns
-    -------
-    far, near : int
-        Both ends of the edge; -1 if there is none.
+    Both are -1 if there is none. Edges are those of triangles or tetrahedra F (m, 3) or (m, 4). Their lengths follow
+    from positions V (n, 3); or, if V is (0, 3), they are the sides `l` (m, 3) of triangles, opposite each corner.
+    Beyond the `cutoff` distances may be ``inf``, at any vertex; an excess up to `slack` is rounding.
     """
     n_corners: cython.int = F.shape[1]
     has_lengths: cython.bint = l.shape[0] > 0
@@ -182,29 +155,11 @@ def line_shortfall(
     line: cython.const[cython.double][::1],
     start: cython.double,
 ):
-    """By how much distances fall short of straight lines.
+    """By how much distances (n,) fall short of the straight line (p,) from the nearest source to each `vertex` (p,).
 
-    Parameters
-    ----------
-    distance : (n,) float64
-        Distances; those that are not finite are left out.
-    vertex, line : (p,) int64, (p,) float64
-        Vertices, and the straight line from each to the nearest source.
-    start : float
-        The smallest value that distance begins at: all are taken from there.
-
-    Returns
-    -------
-    count : int
-        Vertices looked at.
-    shortfall : float
-        Sum of ``(line - distance) / (line - start)`` over the vertices at which it is positive.
-    largest : float
-        Largest ``line - distance``.
-    farthest : float
-        Largest distance.
-    worst : int
-        Position in `vertex` of the largest; -1 if no distance falls short.
+    All lengths count from `start`, the smallest value that distance begins at. Returns the number of vertices with a
+    finite distance; of these the sum of ``(line - distance) / (line - start)`` where that is positive, the largest
+    ``line - distance``, and the largest distance; and the position of the largest shortfall, -1 if none falls short.
     """
     worst: cython.Py_ssize_t = -1
     count: cython.longlong = 0
@@ -237,30 +192,13 @@ def wrong_rows(
     distance: cython.double[::1],
     share: cython.double,
 ):
-    """Which of k answers contradict edges or straight lines; each holds the distances of some vertices.
+    """Mask (k,) of the answers that contradict edges or straight lines; each has the distances of some vertices.
 
-    Parameters
-    ----------
-    tables : Tables
-        The triangles, along whose edges there are paths.
-    position : (n, 3) float64
-        Of their vertices, in the same unit.
-    source : (k,) int32
-        The vertex that each answer is measured from.
-    count : (k,) int64
-        Number of vertices in each.
-    found, value : (r,) int32, (r,) float64
-        These vertices, answer after answer, and their distances.
-    limit : (k,) float64
-        Up to here all vertices are there, the source too.
-    distance : (n,) float64
-        Working memory, ``inf`` before and after.
-    share : float
-        An excess by this share of the largest distance is rounding.
-
-    Returns
-    -------
-    (k,) bool
+    Answer i is measured from vertex ``source[i]`` and has ``count[i]`` vertices: they stand in `found` (r,), answer
+    after answer, with their distances in `value` (r,). Up to ``limit[i]`` all vertices are there, the source too.
+    `tables` are the triangles along whose edges there are paths, and `position` (n, 3) their vertices in the same unit.
+    `distance` (n,) is working memory, ``inf`` before and after. An excess by this `share` of the largest distance is
+    rounding.
     """
     marks = np.zeros(source.shape[0], np.uint8)
     is_wrong: cython.uchar[::1] = marks

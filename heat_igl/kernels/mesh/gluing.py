@@ -11,21 +11,9 @@ from cython.cimports.libc.math import INFINITY, sqrt
 
 
 def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double][:, ::1], scale: cython.double):
-    """Glue faces along the edges that they share.
+    """The fields of `heat_igl.intrinsic.HalfEdges` of faces F (m, 3), glued along the edges that they share.
 
-    Parameters
-    ----------
-    F : (m, 3) int64
-        Vertices of each face, no face with the same vertex twice.
-    V : (n, 3) float64
-        Positions.
-    scale : float
-        Lengths are multiplied by this.
-
-    Returns
-    -------
-    vertex, twin, ring, aligned, length : (3 m,)
-        The fields of `heat_igl.intrinsic.HalfEdges`.
+    No face has the same vertex twice. Lengths are those between positions V (n, 3), times `scale`.
     """
     m: cython.int = F.shape[0]
     n: cython.int = V.shape[0]

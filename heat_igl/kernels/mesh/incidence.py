@@ -5,23 +5,10 @@ import numpy as np
 
 
 def edges_of_triangles(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
-    """The distinct edges of triangles, in lexicographic order.
+    """The distinct edges of triangles F (m, 3) on n vertices, in lexicographic order.
 
-    Parameters
-    ----------
-    F : (m, 3) int64
-        Vertices of each triangle.
-    n : int
-        Number of vertices.
-
-    Returns
-    -------
-    vertices : (k, 2) int64
-        The ends of each edge, ascending.
-    of_face : (m, 3) int64
-        The edge opposite each corner.
-    n_faces : (k,) int64
-        Number of sides of triangles at each edge.
+    Returns the ends (k, 2) of each edge, ascending; the edge (m, 3) opposite each corner; and the number (k,) of sides
+    of triangles at each edge.
     """
     size: cython.Py_ssize_t = 3 * F.shape[0]
     by_upper, by_both, number = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size, np.int64)

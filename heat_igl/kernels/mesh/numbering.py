@@ -17,25 +17,10 @@ def breadth_first(edges, n: cython.int, start: cython.int):
     """Number vertices and faces in the order in which a breadth-first search over the faces meets them.
 
     The data of a front is then contiguous in memory. The search begins at face `start`; each further component begins
-    at the first face that is left.
+    at the first face that is left. `edges` are `HalfEdges` on n vertices, of which those of no face come last.
 
-    Parameters
-    ----------
-    edges : HalfEdges
-        m triangles.
-    n : int
-        Number of vertices; those of no face come last.
-    start : int
-        Face.
-
-    Returns
-    -------
-    vertex, twin, ring, aligned, length
-        By the new numbers.
-    number : (n,) int32
-        New number of each vertex.
-    face : (m,) int32
-        Old number of each face; corners stay in place.
+    Returns the fields of `HalfEdges` by the new numbers, the new number (n,) of each vertex, and the old number (m,) of
+    each face, whose corners stay in place.
     """
     m: cython.int = len(edges.twin) // 3
     vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)

@@ -221,40 +221,15 @@ def _circumcenter(t: Flips, f: cython.int) -> Location:
     return Location(-1, 0.0, 0.0, 0.0)
 
 
-def refine(
-    edges,
-    n,
-    unit,
-    least_angle,
-    largest_radius,
-    most_vertices: cython.longlong,
-    tolerance,
-):
-    """Refine triangles without a boundary until none is bad.
+def refine(edges, n, unit, least_angle, largest_radius, most_vertices: cython.longlong, tolerance):
+    """Refine triangles until none is bad, or there are `most_vertices`.
 
-    Parameters
-    ----------
-    edges : HalfEdges
-        m triangles: intrinsic Delaunay, closed and oriented.
-    n : int
-        Number of vertices.
-    unit : (m,) float64
-        A length for each face, which the faces that are made of it inherit.
-    least_angle : float
-        A triangle with a smaller angle, in radians, is bad.
-    largest_radius : float
-        A triangle with a larger circumradius, in the unit of the face, is bad.
-    most_vertices : int
-        No vertex is added when there are so many.
-    tolerance : float
-        As for `flipping.flip`.
+    A triangle is bad if an angle is smaller than `least_angle`, in radians, or if the circumradius is larger than
+    `largest_radius` times the `unit` (m,) of the face, which the faces that are made of it inherit. `edges` are
+    `HalfEdges` on n vertices: intrinsic Delaunay, closed and oriented. `tolerance` is that of `flipping.flip`.
 
-    Returns
-    -------
-    vertex, twin, length, n
-        The result.
-    kind, numbers : (k, 3) int64, (k, 5) float64
-        The moves, as `Refined` has them.
+    Returns the vertices, twins and lengths of the new half-edges, the number of vertices, and the moves as `Refined`
+    has them.
     """
     one = _Refinement(edges, n, max(most_vertices - n, 0), tolerance)
     np.asarray(one.unit)[: len(unit)] = unit
