@@ -14,6 +14,7 @@ import numpy as np
 
 from heat_igl.geodesic import geodesic_distance
 from heat_igl.heat import HeatMethodSolver
+from heat_igl.intrinsic import checked_indices
 from heat_igl.mesh import Mesh
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
@@ -124,11 +125,9 @@ def exact_geodesic(
     Raises
     ------
     MeshError
-        If V and F are no triangle mesh.
+        If V and F are no triangle mesh, or an index is out of range.
     SourceError
-        If there are targets and no source, or a source is no vertex.
-    ValueError
-        If another index is out of range.
+        If there are targets and no source.
 
     Notes
     -----
@@ -138,12 +137,13 @@ def exact_geodesic(
     if not np.size(VT) + np.size(FT):
         # The older form; the present igl makes face sources of it, and returns no distances.
         FS, VT = (), FS
-    vertex_sources, vertex_targets = _indices("VS", VS, mesh.n_vertices), _indices("VT", VT, mesh.n_vertices)
-    face_sources, face_targets = _indices("FS", FS, mesh.n_faces), _indices("FT", FT, mesh.n_faces)
+    n, m = mesh.n_vertices, mesh.n_faces
+    vertex_sources, vertex_targets = checked_indices("VS", VS, n), checked_indices("VT", VT, n)
+    face_sources, face_targets = checked_indices("FS", FS, m), checked_indices("FT", FT, m)
     if not len(vertex_targets) + len(face_targets):
         return np.empty(0)
     divided, place = np.unique(np.concatenate([face_sources, face_targets]), return_inverse=True)
-    centroids = mesh.n_vertices + place
+    centroids = n + place
     sources = np.concatenate([vertex_sources, centroids[: len(face_sources)]])
     targets = np.concatenate([vertex_targets, centroids[len(face_sources) :]])
     return np.asarray(geodesic_distance(_with_centroids(mesh, divided), sources, method="exact")[targets])
@@ -156,17 +156,3 @@ def _with_centroids(mesh: Mesh, faces: IntArray) -> Mesh:
     parts = np.stack([corners, np.roll(corners, -1, axis=1), center], axis=2).reshape(-1, 3)
     V = np.concatenate([mesh.V, mesh.V[corners].mean(axis=1)])
     return Mesh(V, np.concatenate([np.delete(mesh.F, faces, axis=0), parts]))
-
-
-def _indices(name: str, indices: ArrayLike, n: int) -> IntArray:
-    """The indices as an array (k,) of int64; empty input has no type."""
-    found = np.atleast_1d(np.asarray(indices))
-    if not found.size:
-        return np.empty(0, np.int64)
-    if found.ndim != 1 or found.dtype.kind not in "iu":
-        raise ValueError(f"{name} must be indices (k,), not {found.dtype} of shape {found.shape}")
-    outside = (found < 0) | (found >= n)
-    if outside.any():
-        first = int(np.argmax(outside))
-        raise ValueError(f"{name}[{first}] = {found[first]} is out of range: indices run from 0 to {n - 1}")
-    return found.astype(np.int64)

@@ -1,5 +1,6 @@
 from heat_igl.intrinsic.delaunay import intrinsic_delaunay as intrinsic_delaunay
 from heat_igl.intrinsic.frames import TangentFrames as TangentFrames
+from heat_igl.intrinsic.frames import checked_indices as checked_indices
 from heat_igl.intrinsic.frames import checked_vectors as checked_vectors
 from heat_igl.intrinsic.frames import tangent_frames as tangent_frames
 from heat_igl.intrinsic.gluing import each_face_once as each_face_once

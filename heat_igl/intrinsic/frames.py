@@ -241,11 +241,11 @@ class TangentFrames:
 
     def _vertices(self, vertices: ArrayLike | None) -> IntArray:
         n = len(self.x)
-        return np.arange(n) if vertices is None else _indices("vertices", vertices, n)
+        return np.arange(n) if vertices is None else checked_indices("vertices", vertices, n)
 
     def _corners(self, faces: ArrayLike, corners: ArrayLike) -> IntArray:
-        face = _indices("faces", faces, len(self.face_normals))
-        corner = _indices("corners", corners, 3)
+        face = checked_indices("faces", faces, len(self.face_normals))
+        corner = checked_indices("corners", corners, 3)
         if len(face) != len(corner):
             raise MeshError(f"corners must be as many as faces, {len(face)}, not {len(corner)}")
         return 3 * face + corner
@@ -378,8 +378,11 @@ def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> 
     return found
 
 
-def _indices(name: str, indices: ArrayLike, n: int) -> IntArray:
+def checked_indices(name: str, indices: ArrayLike, n: int) -> IntArray:
+    """`indices` (k,) as int64; a MeshError if one is not from 0 to n - 1, or they are something else."""
     given = np.atleast_1d(as_array(name, indices, MeshError))
+    if not given.size:
+        return np.empty(0, np.int64)  # what is empty has no type
     if given.ndim != 1 or given.dtype.kind not in "iu":
         raise MeshError(f"{name} must be indices (k,), not {given.dtype} of shape {given.shape}")
     outside = (given < 0) | (given >= n)
