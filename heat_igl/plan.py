@@ -122,21 +122,7 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
         return Plan("sweep", None, "between points the triangles are an estimate themselves")
     if method == "exact" or tolerance == 0:
         return Plan("windows", 0.0, "exact distance was asked for")
-    how = "are joined within the tolerance" if joining_accuracy(tolerance) else "are exact: none are joined below .001"
-    return Plan("windows", float(tolerance), f"windows need no factor, and {how}")
-
-
-# Windows are joined while they lose no more than this fraction of distance. At 2e-5 one of 2000 random members of all
-# kinds had a vertex .15 % too long, which the check of answers does not see.
-_JOINING_ACCURACY = 4e-6
-# Below this tolerance nothing is joined, and distance is exact: of 800 queries on bunny at 4e-6 three had a vertex that
-# was too long by up to 4e-4 of the largest distance, unseen by the check.
-_FINEST_JOINED = 1e-3
-
-
-def joining_accuracy(tolerance: float) -> float:
-    """The fraction of distance that windows may lose by joining for a tolerance; 0 for exact distance."""
-    return _JOINING_ACCURACY if tolerance >= _FINEST_JOINED else 0.0
+    return Plan("windows", float(tolerance), "windows are exact, which holds every tolerance, and need no factor")
 
 
 def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:

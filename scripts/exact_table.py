@@ -7,7 +7,7 @@
 
 Where the variable HEAT_IGL_VTP names the program of VTP (Qin et al. 2016), it takes turns with exact distance from
 arrays; its seconds are those of the propagation alone, as it prints them, ours those of the processor with validation
-and preparation (one thread with HEAT_IGL_NUM_THREADS=1). "at" a tolerance is a query's share of an exact one.
+and preparation (one thread with HEAT_IGL_NUM_THREADS=1).
 ``benchmark.py --peers`` has memory and other exact solvers. Local queries are a share of a full query. The shapes are
 smooth, where a window is carried far, and rough, where there are few windows and preparation counts most. The matrix is
 that of a torus of 100 000 vertices.
@@ -20,7 +20,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -37,20 +36,17 @@ from heat_igl import (
     write_distances_within,
 )
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.plan import joining_accuracy
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import hull
 from heat_igl.windows.exact import ExactSurface
 
-from harness import METHODS, Row, Table, collected, drawn, named, on_sphere, paired, parsed, publish, ratio, seconds
+from harness import METHODS, Row, Table, collected, drawn, named, on_sphere, paired, parsed, publish, seconds
 from harness import vtp as run_vtp
 
 # Local queries: how many, the share of the vertices that a radius holds, mean edges between the ends of a pair, and how
 # many nearest vertices.
 LOCAL, SHARE, APART, NEAREST = 1000, 0.01, 2.0, 32
-# Of queries whose time is given as a share of that of an exact one.
-TOLERANCES = (1e-4, 1e-5, 1e-6)
 # The share of the vertices in each row of a matrix.
 IN_ROW = 0.05
 
@@ -105,12 +101,7 @@ def measured(name: str, mesh: Mesh, n_sources: int, repeats: int) -> Row:
     row: Row = {"mesh": name, "n": mesh.n_vertices, "windows": np.mean(windows)}
     calls = {"from arrays": lambda: from_arrays(mesh, sources[0])}
     calls["query"] = lambda: surface.solve(np.array([sources[0]]))
-    for tolerance in TOLERANCES:
-        query = partial(surface.solve, np.array([sources[0]]), accuracy=joining_accuracy(tolerance))
-        calls[f"{tolerance:.0e}"] = query
-    turns = paired(calls, repeats)
-    row |= {key: np.median(turns[key]) for key in ("from arrays", "query")}
-    row |= {key: ratio(turns[key], turns["query"]) for key in calls if key not in row}
+    row |= {key: np.median(times) for key, times in paired(calls, repeats).items()}
     if METHODS["VTP"].is_there:
         # It ends in an error at edges of more than two faces.
         with contextlib.suppress(subprocess.CalledProcessError):
@@ -172,7 +163,7 @@ def streamed(n_rows: int) -> str:
 
 EXACT = {
     "mesh": "mesh", "vertices": "{n}", "windows per edge": "{windows:.2f}", "from arrays, s": "{from arrays:.4f}",
-    "per query, s": "{query:.4f}", **{f"at {t:g}": f"{{{t:.0e}:.2f}}" for t in TOLERANCES},
+    "per query, s": "{query:.4f}",
     "VTP, s": "{vtp:.3g}", "from arrays / VTP": "{share:.2f}", "largest": "{largest share:.2f}",
     "difference to VTP": "{to VTP:.1e}", "VTP without distance": "{lost}",
 }  # fmt: skip

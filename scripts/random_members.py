@@ -1,7 +1,6 @@
 """Random members of families that once were answered wrongly, each determined by its seed.
 
     python scripts/random_members.py exact --members 2000           # those of the seeds 0 to 1999
-    python scripts/random_members.py tolerance --members 100 --docs docs/engines_theory.md
     python scripts/random_members.py many-faced
     python scripts/random_members.py cuts --members 100 --first 500
     python scripts/random_members.py log-maps
@@ -15,11 +14,6 @@ exact: distance by windows on nearly flat surfaces (validation/zoo.py) and on co
 vertices, on the intrinsic Delaunay triangulation and on the triangles as given. "edges": by how much distance grows
 faster than along an edge, inf where a vertex has none. "triangulations": the difference of both. "straight lines": on
 at most 60 vertices, the difference to `straight_lines`. All as shares of the largest distance.
-
-tolerance: those of exact, all kinds of the zoo, and smooth surfaces of some ten thousand vertices, from one vertex: for
-each tolerance the largest error over the tolerance and the largest distance, before answers are checked, inf where
-windows leave out a vertex; members where nothing is joined are one kind. "silent": the largest of those that the check
-of answers does not find.
 
 many-faced: heat on boundaries of random tetrahedra, whose edges have up to a dozen faces. "times exact": the time of
 the slowest of ten queries, over the median one of exact distance from the same vertices.
@@ -73,11 +67,9 @@ from heat_igl.intrinsic import intrinsic_triangulation, mollify
 from heat_igl.mesh import region_boundary
 from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.operators import operators
-from heat_igl.plan import joining_accuracy
-from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES, hull
-from heat_igl.windows import ExactSurface, Invariants, exact_distance
+from heat_igl.windows import ExactSurface, exact_distance
 from heat_igl.windows.tables import MARGIN, from_mesh
 
 from harness import Row, Table, on_sphere, parsed, publish, seconds
@@ -85,8 +77,7 @@ from harness import Row, Table, on_sphere, parsed, publish, seconds
 Random = np.random.Generator
 # Kind, figures, and what of them the rounding of lengths explains.
 Member = tuple[str, dict[str, float], float]
-LARGEST = {"exact": 1e-9, "tolerance": 1.0, "many-faced": 20.0, "cuts": 1e-12, "log-maps": 1e-8, "signed": 1e-12}
-TOLERANCES = (1e-3,)  # below, nothing is joined
+LARGEST = {"exact": 1e-9, "many-faced": 20.0, "cuts": 1e-12, "log-maps": 1e-8, "signed": 1e-12}
 _MOST_COMPARED, _COARSE = 60, 30
 
 
@@ -221,50 +212,6 @@ def exact(seed: int) -> Member:
     if mesh.n_vertices <= _MOST_COMPARED:
         off["straight lines"] = float(np.abs(straight_lines(mesh, sources) - found).max())
     return name, {key: max(each / float(found.max()), 0.0) for key, each in off.items()}, rounding(mesh)
-
-
-# Windows within a tolerance.
-
-
-def waves(P: FloatArray, rng: Random) -> FloatArray:
-    """Smooth values at points."""
-    k, phase = rng.normal(size=(5, P.shape[1])) * rng.uniform(1, 6), rng.uniform(0, 2 * np.pi, 5)
-    return np.sin(P @ k.T + phase).mean(axis=1)
-
-
-def hills(rng: Random) -> Mesh:
-    P = rng.random((10_000, 2))
-    return Mesh(np.column_stack([P, rng.uniform(0, 0.3) * waves(P, rng)]), Delaunay(P).simplices)
-
-
-SPHERE = shapes.icosphere(5)
-SMOOTH = seeded(
-    {
-        "sphere": lambda rng: hull(on_sphere(10_000, rng)),
-        "ellipsoid": lambda rng: Mesh(SPHERE.V * rng.uniform(0.3, 1, 3), SPHERE.F),
-        "blob": lambda rng: Mesh(SPHERE.V * (1 + rng.uniform(0, 0.5) * waves(SPHERE.V, rng))[:, None], SPHERE.F),
-        "torus": lambda rng: shapes.torus(*(int(n) for n in rng.integers(80, 200, 2))),
-        "hills": hills,
-    }
-)
-ALL = SMOOTH | COARSE | FAMILIES
-
-
-def tolerance(seed: int) -> Member:
-    name = list(ALL)[seed % len(ALL)]
-    mesh = ALL[name](seed)
-    source = np.random.default_rng(seed).choice(np.unique(mesh.F), 1)
-    surface, check = ExactSurface(from_mesh(mesh, 0)), Invariants(mesh.F, mesh.components, mesh.V)
-    truth, chosen = surface.distance(source), source_set(source, mesh.n_vertices, mesh.F)
-    reached, largest = np.isfinite(truth), float(truth[np.isfinite(truth)].max())
-    figures = dict.fromkeys([*(f"{t:.0e}" for t in TOLERANCES), "silent"], 0.0)
-    for t in TOLERANCES:
-        found = surface.distance(source, accuracy=joining_accuracy(t))
-        off = float(np.abs(found[reached] - truth[reached]).max() / (t * largest))
-        figures[f"{t:.0e}"] = off
-        if check.contradiction(found, chosen, tolerance=t) is None:
-            figures["silent"] = max(figures["silent"], off)
-    return name if any(figures.values()) else "others, exact", figures, 0.0
 
 
 # Heat at edges of many faces.
@@ -481,7 +428,6 @@ def signed(seed: int) -> Member:
 
 TABLES: dict[str, Callable[[int], Member]] = {
     "exact": exact,
-    "tolerance": tolerance,
     "many-faced": many_faced,
     "cuts": cuts,
     "log-maps": log_maps,

@@ -32,9 +32,8 @@ def table(cells: list[tuple[str, str]] = CELLS) -> pytest.MarkDecorator:
 
 
 def is_exact(name: str, method: str) -> bool:
-    """Windows without a tolerance and lines are straight; sweeps, heat and the Hopf-Lax formula are approximations."""
-    plan = solver(name, method).plan
-    return plan.engine == "lines" or (plan.engine == "windows" and plan.tolerance == 0)
+    """Windows and lines are straight; sweeps, heat and the Hopf-Lax formula are approximations."""
+    return solver(name, method).plan.engine in ("windows", "lines")
 
 
 def largest_mean_error(name: str, method: str) -> float:
@@ -56,8 +55,7 @@ def assert_close(found: np.ndarray, expected: np.ndarray, name: str, method: str
     A sweep takes vertices at equal distances in the order of their numbers, which single values show.
     """
     heat = 2e-4 if name == "speeds on triangles" else 1e-6
-    within = solver(name, method).plan.tolerance or 1e-2
-    most = 1e-10 if is_exact(name, method) else heat if method == "heat" else within
+    most = 1e-10 if is_exact(name, method) else heat if method == "heat" else 1e-2
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
     there = np.isfinite(expected)
     assert np.abs(found[there] - expected[there]).max() <= most * expected[there].max()
@@ -99,9 +97,8 @@ def test_near_the_truth(name, method):
     for source in sources(name):
         truth = at.truth(source) if at.truth else pygeodesic_distance(at.made(), source)
         error = np.abs(np.delete(distance(name, method, source) - truth, source)) / np.delete(truth, source)
-        tolerance = 0 if is_exact(name, method) else solver(name, method).plan.tolerance
-        if tolerance is not None and not is_of_sphere:
-            assert error.max() < max(1e-9, tolerance)
+        if is_exact(name, method) and not is_of_sphere:
+            assert error.max() < 1e-9
         else:
             assert error.mean() < largest_mean_error(name, method)
 
@@ -142,7 +139,7 @@ def test_distance_does_not_depend_on_the_place(name, method):
     at = domain(name)
     found = at.moved(TURN, shift=[1e6, -2e6, 5e5]).solver(method).distance(3)  # leaves nine digits of the coordinates
     before = distance(name, method, 3)
-    most = 1e-2 if method == "sweep" else max(1e-6, solver(name, method).plan.tolerance or 0)
+    most = 1e-2 if method == "sweep" else 1e-6
     assert np.abs(found - before).max() <= most * before.max()
 
 

@@ -50,6 +50,14 @@ FLAT = {
 }
 
 
+def test_windows_are_exact_whatever_the_tolerance():
+    mesh = bumpy()
+    truth = geodesic_distance(mesh, 3, method="exact")
+    for tolerance in (0, 1e-5, 1e-3, 0.5):
+        assert np.array_equal(geodesic_distance(mesh, 3, tolerance=tolerance), truth)
+        assert np.array_equal(GeodesicSolver(mesh, method="windows", tolerance=tolerance).distance(3), truth)
+
+
 @pytest.mark.parametrize("name", FLAT)
 @pytest.mark.parametrize("surface", SURFACES)
 def test_flat_convex_domains(name, surface):

@@ -19,7 +19,7 @@ from heat_igl.steps import PoissonProblem
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES, joined
-from heat_igl.windows import Engine, ExactSurface, GuardedEngine, Invariants, WindowEngine, from_vertex
+from heat_igl.windows import Engine, GuardedEngine, Invariants, WindowEngine, from_vertex
 
 SOURCE, FAR = 40, 399
 
@@ -97,9 +97,7 @@ def test_tetrahedra_and_edge_lengths_have_edges_too():
 
 
 class Broken(Engine):
-    """An engine that is wrong at one vertex, though exact."""
-
-    accuracy = 0.0
+    """An engine that is wrong at one vertex."""
 
     def __init__(self, distance: FloatArray, value: float) -> None:
         self._wrong = distance.copy()
@@ -118,13 +116,13 @@ def test_another_engine_answers_for_a_broken_one_and_none_is_an_error():
     mesh, distance = two_squares()
     sources = source_set(SOURCE, mesh.n_vertices, mesh.F)
     broken, right = Broken(distance, np.inf), Broken(distance, distance[FAR])
-    guarded = GuardedEngine(broken, invariants(mesh), 0.0, (lambda: broken, lambda: right))
+    guarded = GuardedEngine(broken, invariants(mesh), (lambda: broken, lambda: right))
     with pytest.warns(AccuracyWarning, match=f"inf at vertex {FAR}.* replaced .* report"):
         assert np.array_equal(guarded.distance(sources), distance)
     with pytest.warns(AccuracyWarning, match="report"):
         assert np.array_equal(guarded.labelled(sources)[0], distance)
     with pytest.raises(RuntimeError, match=r"contradicts itself .* whatever method"):
-        GuardedEngine(broken, invariants(mesh), 0.0, (lambda: broken,)).distance(sources)
+        GuardedEngine(broken, invariants(mesh), (lambda: broken,)).distance(sources)
 
 
 @pytest.mark.parametrize("factor", [0.7, 1.6, np.inf])
@@ -139,10 +137,10 @@ def test_windows_that_are_wrong_do_not_leave_the_solver(monkeypatch, factor):
 
     monkeypatch.setattr(WindowEngine, "distance", wrong)
     ask = [
-        lambda: GeodesicSolver(mesh, tolerance=0).distance(SOURCE),
+        lambda: GeodesicSolver(mesh).distance(SOURCE),
         lambda: GeodesicSolver(mesh, method="exact").distances([SOURCE])[0],
-        lambda: heat_igl.geodesic_distance(mesh, SOURCE, method="exact"),
-        lambda: pickle.loads(pickle.dumps(GeodesicSolver(mesh, tolerance=0))).distance(SOURCE),
+        lambda: heat_igl.geodesic_distance(mesh, SOURCE),
+        lambda: pickle.loads(pickle.dumps(GeodesicSolver(mesh))).distance(SOURCE),
     ]
     for each in ask:
         with pytest.warns(AccuracyWarning, match=f"{FAR}.*report"):
@@ -179,20 +177,6 @@ def test_local_answers_that_are_wrong_are_found_again(monkeypatch, query, wrong)
     with pytest.warns(AccuracyWarning, match="contradicted themselves .* found again"):
         found = LOCAL[query](mesh)
     np.testing.assert_allclose(found, right, rtol=1e-6)
-
-
-@pytest.mark.parametrize("factor", [0.7, 1.6, np.inf])
-def test_windows_within_a_tolerance_that_are_wrong_give_way_to_exact_ones(monkeypatch, factor):
-    mesh, distance = two_squares()
-    solve = ExactSurface.distance
-
-    def wrong(self, sources, offsets, cutoff, threads, accuracy):
-        found = solve(self, sources, offsets, cutoff, threads, accuracy)
-        found[FAR] *= factor if accuracy > 0 else 1
-        return found
-
-    monkeypatch.setattr(ExactSurface, "distance", wrong)
-    np.testing.assert_allclose(GeodesicSolver(mesh, tolerance=1e-3).distance(SOURCE), distance, rtol=1e-12)
 
 
 @pytest.mark.parametrize("factor", [0.5, np.nan, np.inf])

@@ -98,7 +98,7 @@ TimeStepOption = Annotated[
     float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)
 ]
 BoundaryOption = Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")]
-ToleranceOption = Annotated[float, typer.Option(help="Largest error over the distance, of windows; 0 is exact.")]
+ToleranceOption = Annotated[float, typer.Option(help="Largest error over the distance; windows are exact.")]
 
 
 def values_of(mesh: Path, option: str, text: str) -> AnyArray:

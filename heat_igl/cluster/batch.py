@@ -63,7 +63,7 @@ def distances(
     method : {"auto", "windows", "exact", "sweep", "heat"}, optional
         As for `geodesic_distance`; "auto" by default, and "heat" with an option of heat.
     tolerance : float
-        Largest error over the distance, for windows; 0 is exact.
+        Largest error over the distance. Windows are exact, which holds every tolerance.
     dtype : {"float16", "float32", "float64"}
         Type to which the distances are rounded.
     normalize : bool

@@ -26,7 +26,7 @@ class SolverChoice:
     method : {"auto", "windows", "exact", "sweep", "heat"}
         "heat" is `HeatMethodSolver`, the others are those of `GeodesicSolver`.
     tolerance : float
-        For windows.
+        As for `GeodesicSolver`.
     heat : SolverOptions
         For heat.
     """

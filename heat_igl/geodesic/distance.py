@@ -41,7 +41,7 @@ def geodesic_distance(
     method : {"auto", "windows", "exact", "sweep", "heat"}
         As for `GeodesicSolver`; "heat" is the heat method as `HeatMethodSolver` has it by default.
     tolerance : float
-        Largest error over the distance, for windows; below 1e-3, as by default, they are exact.
+        Largest error over the distance. Windows are exact, which holds every tolerance.
     cutoff : float, optional
         Distances beyond this are ``inf``, and a search by windows looks at no part of the mesh that is farther away.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional
@@ -92,7 +92,7 @@ def geodesic_distance(
     if limit < np.inf and is_plain and isinstance(given, Mesh) and not given.has_copies:
         near = _within_reach(given, sources, limit)
         if near is not None:
-            return _on_part(given, near, sources, tolerance if method != "exact" else 0.0, limit)
+            return _on_part(given, near, sources, tolerance, limit)
     solver = GeodesicSolver(given, method=method, tolerance=tolerance, region=region)
     if targets is None:
         return solver.distance(sources, cutoff=limit)

@@ -27,19 +27,19 @@ if TYPE_CHECKING:
 
 
 class GeodesicSolver(BatchedSolver):
-    """Geodesic distance, exact or to a tolerance: prepare once, ask many times. Nothing is factored.
+    """Geodesic distance, exact on triangles: prepare once, ask many times. Nothing is factored.
 
     Parameters
     ----------
     mesh : mesh or Operators
         Whatever `as_mesh` takes, polygons by their triangles; or the operators of a metric, a speed or edge lengths.
     method : {"auto", "windows", "exact", "sweep"}
-        "windows" finds distance within `tolerance`, "exact" the polyhedral distance. "sweep" unfolds two triangles at a
-        time: 0.06 to 0.3 % mean error on scans, without a bound, in a fraction of the time on large meshes. "auto" is
-        windows on triangles, and a sweep on a `PointCloud`. Tetrahedra are passed by straight lines, and simplices that
-        see their common edges at different lengths by the Hopf-Lax formula. `plan` says what was taken, and why.
+        "windows" and "exact" find the polyhedral distance. "sweep" unfolds two triangles at a time: 0.06 to 0.3 % mean
+        error on scans, without a bound, in a fraction of the time on large meshes. "auto" is windows on triangles, and
+        a sweep on a `PointCloud`. Tetrahedra are passed by straight lines, and simplices that see their common edges at
+        different lengths by the Hopf-Lax formula. `plan` says what was taken, and why.
     tolerance : float
-        Largest error over the distance; below 1e-3, as by default, windows are exact.
+        Largest error over the distance. Windows are exact, which holds every tolerance.
     region : (n,) or (m,) array_like of bool, optional
         What paths may enter, of a mesh: faces all of whose vertices are selected, or selected faces. Elsewhere distance
         is ``inf``, and sources are an error; all numbers stay those of the whole mesh. Angles of `directions` are those
@@ -55,8 +55,7 @@ class GeodesicSolver(BatchedSolver):
     Notes
     -----
     The solver is immutable; threads may share it, and a pickled copy gives the same bits. A single query may use
-    several threads, and `distances` uses all of them. Cells, directions, paths and derivatives are exact whatever
-    the tolerance.
+    several threads, and `distances` uses all of them.
 
     Examples
     --------
@@ -169,7 +168,7 @@ class GeodesicSolver(BatchedSolver):
         domain = self._domain.triangles if isinstance(self._domain, PointCloud) else self._domain
         # Noisy points are measured where they were moved to.
         V = None if isinstance(domain, Operators) else domain.V
-        return chosen, guarded_windows(triangles, V, chosen.tolerance or 0.0, originals)
+        return chosen, guarded_windows(triangles, V, originals)
 
     def __repr__(self) -> str:
         tolerance = "" if self._plan.tolerance is None else f", tolerance={self._plan.tolerance:g}"
@@ -307,15 +306,15 @@ class GeodesicSolver(BatchedSolver):
             raise ValueError("directions need the positions of a mesh, which this solver does not have")
         surface = tangent_surface(domain)
         if isinstance(domain, PointCloud) and surface is not domain.triangles:
-            engine = guarded_windows(MeshTriangles(surface), surface.V, 0.0, None)
+            engine = guarded_windows(MeshTriangles(surface), surface.V)
         return engine, tangent_frames(surface)
 
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative | SimplexDerivative]:
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
         Arguments and errors as for `distance`; a ValueError also if the engine is a sweep, and for what has no
-        derivative, see `differentiable_surface`. Both are those of the exact paths, whatever the tolerance. Of the
-        Hopf-Lax formula, the derivative is that of its fixed point, which ``phi`` is to rounding: `SimplexDerivative`.
+        derivative, see `differentiable_surface`. Both are those of the exact paths. Of the Hopf-Lax
+        formula, the derivative is that of its fixed point, which ``phi`` is to rounding: `SimplexDerivative`.
         """
         from heat_igl.sweep.simplex_engine import SimplexEngine
 
@@ -334,7 +333,7 @@ class GeodesicSolver(BatchedSolver):
         sides = SideLengths(domain) if isinstance(domain, Mesh) else None
         if isinstance(domain, Operators):
             sides = domain.metric
-        distance = engine.exact.distance(chosen, np.inf, n_threads())
+        distance = engine.distance(chosen, np.inf, n_threads())
         return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.paths(chosen))
 
     def _windows(self, what: str) -> GuardedEngine:

@@ -14,7 +14,6 @@ from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.mesh import checking
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
-from heat_igl.plan import joining_accuracy
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
@@ -196,19 +195,10 @@ class TriangleEngine(Engine):
 
 
 class WindowEngine(TriangleEngine):
-    """Distance by windows, exact or within a tolerance; directions and paths, all exact.
+    """Distance by windows, directions and paths: all exact."""
 
-    Parameters
-    ----------
-    triangles, originals
-        As for `TriangleEngine`.
-    accuracy : float
-        Windows are joined as far as distances keep this fraction of themselves; 0 for exact.
-    """
-
-    def __init__(self, triangles: Triangles, originals: IntArray | None = None, accuracy: float = 0.0) -> None:
+    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
         super().__init__(triangles, originals)
-        self.accuracy = accuracy
         # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
         self._from_vertices = ExactSurface(triangles.tables())
 
@@ -228,29 +218,18 @@ class WindowEngine(TriangleEngine):
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
         """Distance (n,)."""
         if not sources.on_vertices_alone or sources.vertex_offset.any():
-            return self._labelled(sources, cutoff, threads, self.accuracy)[0]
-        found = self._from_vertices.distance(sources.vertices, None, cutoff, threads, self.accuracy)
-        return self._with_copies(found)
+            return super().distance(sources, cutoff, threads)
+        return self._with_copies(self._from_vertices.distance(sources.vertices, None, cutoff, threads))
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
         """As of all engines; the search ends where others are nearer."""
-        found = self._from_vertices.distance(
-            sources.vertices, None, float(than.max()), threads, self.accuracy, than=than
-        )
+        found = self._from_vertices.distance(sources.vertices, None, float(than.max()), threads, than=than)
         return self._with_copies(found)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
-        """Exact distance (n,), and the source (n,) that it is measured from.
-
-        Within a tolerance cells would not be connected.
-        """
-        return self._labelled(sources, cutoff, threads, 0.0)
-
-    def _labelled(
-        self, sources: SourceSet, cutoff: float, threads: int, accuracy: float
-    ) -> tuple[FloatArray, IntArray]:
+        """Distance (n,), and the source (n,) that it is measured from."""
         query = Query.of(sources, self._triangles)
-        found = self.solution(query, query.cutoff(cutoff), threads=threads, accuracy=accuracy)
+        found = self.solution(query, query.cutoff(cutoff), threads=threads)
         labels = labels_of(sources)[found.origin.label]
         return self._with_copies(query.with_begin(found.distance)), self._with_copies(labels)
 
@@ -263,7 +242,6 @@ class WindowEngine(TriangleEngine):
         targets: SurfacePoints | None = None,
         goals: IntArray | None = None,
         threads: int = 1,
-        accuracy: float = 0.0,
     ) -> ExactSolution:
         """Distance and the paths from the sources of a query; see `ExactSurface.solve`."""
         if query.has_curves:
@@ -272,20 +250,7 @@ class WindowEngine(TriangleEngine):
             surface = self._on_delaunay
         else:
             surface = self._from_vertices
-        return query.solve(
-            surface,
-            cutoff=cutoff,
-            directed=directed,
-            targets=targets,
-            goals=goals,
-            threads=threads,
-            accuracy=accuracy,
-        )
-
-    @cached_property
-    def exact(self) -> WindowEngine:
-        """The same engine without a tolerance."""
-        return WindowEngine(self._triangles, self._originals)
+        return query.solve(surface, cutoff=cutoff, directed=directed, targets=targets, goals=goals, threads=threads)
 
     def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
         """Distance (t,) of points or vertices; the search ends when all are known."""
@@ -372,7 +337,6 @@ class Invariants:
         distance: FloatArray,
         sources: SourceSet,
         cutoff: float = np.inf,
-        tolerance: float = 0.0,
         than: FloatArray | None = None,
     ) -> str | None:
         """How an answer contradicts the bounds, and where; None if it does not.
@@ -385,14 +349,12 @@ class Invariants:
             What it is measured from.
         cutoff : float
             Beyond it distances may be ``inf``.
-        tolerance : float
-            Violations by this share of the largest distance are no contradiction.
         than : (n,) float64, optional
             Distances from other sources; where these are not farther the answer may be ``inf``.
         """
         distance = np.ascontiguousarray(distance, np.float64)
         nearest = distance if than is None else np.minimum(distance, than)
-        slack = (ROUNDING + tolerance) * checking.largest_finite(nearest)
+        slack = ROUNDING * checking.largest_finite(nearest)
         return (
             self._at_sources(distance, sources, cutoff, slack)
             or self._elsewhere(distance, sources)
@@ -509,11 +471,8 @@ class GuardedEngine(Engine):
         Asked first.
     invariants : Invariants
         What its answers keep.
-    tolerance : float
-        Violations by this share of the largest distance are no contradiction.
     others : sequence of callables
-        Engines to ask instead, each made when it is needed. Before them, windows within a tolerance are asked for exact
-        distance, which replaces an answer without a warning.
+        Engines to ask instead, each made when it is needed.
 
     Raises
     ------
@@ -526,32 +485,19 @@ class GuardedEngine(Engine):
         On a query that another engine answered.
     """
 
-    def __init__(
-        self, windows: WindowEngine, invariants: Invariants, tolerance: float, others: tuple[Callable[[], Engine], ...]
-    ) -> None:
-        self.windows, self._invariants, self._tolerance, self._others = windows, invariants, tolerance, others
-
-    @cached_property
-    def exact(self) -> GuardedEngine:
-        """The same engine without a tolerance."""
-        if self.windows.accuracy == 0:
-            return self
-        return GuardedEngine(self.windows.exact, self._invariants, 0.0, self._others)
+    def __init__(self, windows: WindowEngine, invariants: Invariants, others: tuple[Callable[[], Engine], ...]) -> None:
+        self.windows, self._invariants, self._others = windows, invariants, others
 
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
         """Distance (n,)."""
         found = self.windows.distance(sources, cutoff, threads)
         problem = self.problem(found, sources, cutoff)
-        if problem is None:
-            return found
-        if self.windows.accuracy > 0:
-            return self.exact.distance(sources, cutoff, threads)
-        return self._replacement(problem, sources, cutoff, threads)[0]
+        return found if problem is None else self._replacement(problem, sources, cutoff, threads)[0]
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
         """As of all engines."""
         found = self.windows.nearer(sources, than, threads)
-        if self._invariants.contradiction(found, sources, np.inf, self._tolerance, than) is None:
+        if self._invariants.contradiction(found, sources, np.inf, than) is None:
             return found
         return super().nearer(sources, than, threads)
 
@@ -581,7 +527,7 @@ class GuardedEngine(Engine):
 
     def problem(self, distance: FloatArray, sources: SourceSet, cutoff: float = np.inf) -> str | None:
         """How an answer (n,) contradicts the invariants; None if it does not."""
-        return self._invariants.contradiction(distance, sources, cutoff, self._tolerance)
+        return self._invariants.contradiction(distance, sources, cutoff)
 
     def _replacement(
         self, problem: str, sources: SourceSet, cutoff: float, threads: int
@@ -598,9 +544,7 @@ class GuardedEngine(Engine):
         raise contradicted(f"{problem}, whatever method finds it")
 
 
-def guarded_windows(
-    triangles: Triangles, V: FloatArray | None, tolerance: float = 0.0, originals: IntArray | None = None
-) -> GuardedEngine:
+def guarded_windows(triangles: Triangles, V: FloatArray | None, originals: IntArray | None = None) -> GuardedEngine:
     """Windows on triangles with positions V (n, 3), if known; a sweep answers where they contradict themselves.
 
     Other arguments as for `WindowEngine`.
@@ -610,8 +554,8 @@ def guarded_windows(
         invariants = Invariants(triangles.faces.F, components, lengths=triangles.faces.l)
     else:
         invariants = Invariants(triangles.given_faces, components, V)
-    windows = WindowEngine(triangles, originals, joining_accuracy(tolerance))
-    return GuardedEngine(windows, invariants, tolerance, (partial(_sweep, triangles, originals),))
+    windows = WindowEngine(triangles, originals)
+    return GuardedEngine(windows, invariants, (partial(_sweep, triangles, originals),))
 
 
 def _sweep(triangles: Triangles, originals: IntArray | None) -> Engine:

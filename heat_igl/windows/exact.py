@@ -304,7 +304,6 @@ class ExactSurface:
         goals: IntArray | None = None,
         directed: bool = False,
         threads: int = 1,
-        accuracy: float = 0.0,
     ) -> ExactSolution:
         """Distances from vertices and points.
 
@@ -333,8 +332,6 @@ class ExactSurface:
         threads : int
             With more than one, two threads share the search for distances of all vertices, on large surfaces. The
             distances are the same; of paths that are equally long, another may be found.
-        accuracy : float
-            Windows are joined as far as distances keep this fraction of themselves, see `search`; 0 for exact.
 
         Returns
         -------
@@ -357,7 +354,6 @@ class ExactSurface:
             goals=goals,
             directed=directed,
             threads=threads,
-            accuracy=accuracy,
         )
         which = done.nearest_copy(0 if targets is None else len(targets))
         return ExactSolution(
@@ -374,7 +370,6 @@ class ExactSurface:
         offsets: FloatArray | None = None,
         cutoff: float = np.inf,
         threads: int = 1,
-        accuracy: float = 0.0,
         than: FloatArray | None = None,
     ) -> FloatArray:
         """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths.
@@ -384,7 +379,7 @@ class ExactSurface:
         tables = self.tables
         starts = starts_at(tables, sources, offsets, None, None, None)
         upper = None if than is None else tables.scaled(than[tables.old_vertex])
-        done = search(tables, starts, cutoff=cutoff, threads=threads, accuracy=accuracy, upper=upper)
+        done = search(tables, starts, cutoff=cutoff, threads=threads, upper=upper)
         distance = tables.unscaled(done.found.distance[tables.number])
         if cutoff < np.inf:
             distance[distance > cutoff] = np.inf
@@ -484,14 +479,11 @@ def search(
     goals: IntArray | None = None,
     directed: bool = False,
     threads: int = 1,
-    accuracy: float = 0.0,
     upper: FloatArray | None = None,
 ) -> Searched:
     """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`.
 
-    Only distances smaller than `upper` (n,) are found, by the numbers of the tables. Windows are joined in searches for
-    all vertices, on an intrinsic Delaunay triangulation without edges of more than two faces, and where no source is a
-    segment. Elsewhere the search is exact, which holds every accuracy.
+    Only distances smaller than `upper` (n,) are found, by the numbers of the tables.
     """
     n, wanted = tables.n, _targets_at(tables, targets)
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
@@ -504,16 +496,14 @@ def search(
     statistics = None
     # Vertices are found flat by the first search.
     asks_for_all = not len(wanted.place.faces) and goals is None and not directed
-    if not (asks_for_all and tables.is_delaunay and not len(starts.segments.faces)):
-        accuracy = 0.0
     shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all
     if shares and not (tables.kind == FLAT_VERTEX).any():
-        statistics = _beside(tables, starts, found, accuracy, upper, run)
+        statistics = _beside(tables, starts, found, upper, run)
         if statistics is None:
             found = Found.of(n, n_labels)
     if statistics is None:
         statistics = np.zeros(3, np.int64)
-        front = windows.Front(tables, found, TOLERANCE, leaving, None, accuracy)
+        front = windows.Front(tables, found, TOLERANCE, leaving)
         if upper is not None:
             windows.bound(front, upper)
         _require(run(front, starts, statistics))
@@ -526,16 +516,10 @@ def _require(is_done: bool) -> None:
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 
-def _beside(
-    tables: Tables, starts: Starts, found: Found, accuracy: float, upper: FloatArray | None, run: _Run
-) -> IntArray | None:
-    """Search on two threads; returns the statistics of both, or None if one thread must repeat the search.
-
-    Windows are joined by the first thread alone.
-    """
+def _beside(tables: Tables, starts: Starts, found: Found, upper: FloatArray | None, run: _Run) -> IntArray | None:
+    """Search on two threads; returns the statistics of both, or None if one thread must repeat the search."""
     also, statistics, done = Found.of(tables.n, len(found.label)), np.zeros((2, 3), np.int64), []
-    first = windows.Front(tables, found, TOLERANCE, None, None, accuracy)
-    second = windows.Front(tables, also, TOLERANCE)
+    first, second = windows.Front(tables, found, TOLERANCE), windows.Front(tables, also, TOLERANCE)
     bounds = np.tile(np.full(tables.n, np.inf) if upper is None else upper, (2, 1))
     windows.pair(first, second, bounds[0], bounds[1], _ROUND * float(tables.edges.length.mean()), _PLENTY)
     calls: list[Callable[[], bool]] = [

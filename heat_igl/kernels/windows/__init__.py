@@ -11,7 +11,6 @@ out in the plane before the half-edge gives the distance of every point of the w
 - `sources`: windows begin at sources, and at vertices where paths bend.
 - `crossing`: a list crosses its face. Windows are cut to the points that no other path reaches sooner, and to the lines
   that cross no shorter path to the corner ahead; the corner gets its distance, and windows go on over two sides.
-- `joining`: within a tolerance, neighbouring windows become one, and gaps between windows are closed.
 - `search`: takes one entry after the other from the queue, on one thread or on two.
 - `windows`: what Python calls, one search for all vertices or many local ones.
 - `paths`: shortest paths back from where windows arrived, by `kernels.mesh.straight`.

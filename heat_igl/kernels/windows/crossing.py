@@ -8,15 +8,9 @@ import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, release, take
-from cython.cimports.heat_igl.kernels.windows.joining import (
-    carry_joined,
-    cut_joined_by_ends,
-    join,
-)
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
     BESIDE,
-    CROSSED_AROUND_APEX,
     JOINS,
     LEFT_OF_APEX,
     MARGIN,
@@ -41,8 +35,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     at_corner,
     backward,
     bent,
-    direction,
-    is_joined,
     is_within,
     keep_root,
     lateral,
@@ -58,27 +50,15 @@ from cython.cimports.libc.string import memcpy, memmove
 @cython.nogil
 def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
     """Derivative, along the half-edge, of the length `reached` that a window adds to its offset."""
-    if is_joined(w):
-        return w.turn_x + (at - w.x) / (reached - w.turn_x * at)
     return w.x if w.is_plane else (at - w.x) / reached
 
 
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _has_one_root(w: cython.pointer(Window)) -> cython.bint:
-    """Whether all lines come from one point, at the same offset."""
-    return not (w.is_plane or is_joined(w))
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _bend(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
+def _bend(w: cython.pointer(Window), reached: cython.double) -> cython.double:
     """A bound of the derivative of `_slope` over a quarter of the distance of the root."""
-    if w.is_plane:
-        return 0.0
-    return 2.0 / fabs(reached - w.turn_x * at if is_joined(w) else reached)
+    return 0.0 if w.is_plane else 2.0 / reached
 
 
 @cython.cfunc
@@ -88,7 +68,7 @@ def _change(
     u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, a: cython.double, b: cython.double
 ) -> cython.double:
     """The sign of the derivative of distance by u less that by w, which add a and b to their offsets."""
-    if not (_has_one_root(u) and _has_one_root(w)):
+    if u.is_plane or w.is_plane:
         return _slope(u, at, a) - _slope(w, at, b)
     return (at - u.x) * b - (at - w.x) * a
 
@@ -126,7 +106,7 @@ def _meeting(
             high = x
         slope = _slope(u, x, a) - _slope(w, x, b)
         # At most twice the second derivative while the step is below a quarter of both distances.
-        bend = _bend(u, x, a) + _bend(w, x, b)
+        bend = _bend(u, a) + _bend(w, b)
         step = -y / slope if slope != 0.0 else INFINITY
         x += step
         if 4.0 * bend * fabs(step) <= fabs(slope) and low <= x <= high:
@@ -195,7 +175,7 @@ def _ordered(
         a = u.x - w.x
         b = u.depth - w.depth
         is_farther: cython.bint = u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2
-        return U_NEARER if is_farther and _has_one_root(u) and _has_one_root(w) else UNDECIDED
+        return U_NEARER if is_farther and not (u.is_plane or w.is_plane) else UNDECIDED
     if at_low < -margin and at_high > margin:
         b = margin
         a = _meeting(u, w, low, high, at_low, at_high, 0.0, cython.address(b))
@@ -230,7 +210,7 @@ def _compare(
 
     If one is nearer at one end and the other at the other, `until` takes the points up to which u and w are needed.
     """
-    if u.offset == w.offset and _has_one_root(u) and _has_one_root(w):
+    if u.offset == w.offset and not (u.is_plane or w.is_plane):
         return _compare_squares(u, w, low, high, until)
     a, b, c, d = reach(u, low), reach(w, low), reach(u, high), reach(w, high)
     at_low, at_high = (u.offset - w.offset) + a - b, (u.offset - w.offset) + c - d
@@ -251,37 +231,17 @@ def _gives_way(
     w: cython.pointer(Window),
     low: cython.double,
     high: cython.double,
-    has_errors: cython.bint,
 ) -> cython.int:
-    """Cut w between two points where u is nearer. 2: w is gone, 4: what is left comes before u, 0: or behind.
-
-    Within a tolerance, u may be nearer as far as it goes by its error alone, while its lines and those of w separate
-    behind its end. Then w keeps its lines between.
-    """
+    """Cut w between two points where u is nearer. 2: w is gone, 4: what is left comes before u, 0: or behind."""
     if low <= w.start:
         if high >= w.stop:
             return 2
-        at = high
-        if has_errors and direction(w, high) > direction(u, high):
-            at = w.start if w.is_plane or w.depth < 0.0 else w.x + w.depth * direction(u, high)
-        w.start = min(max(at, w.start), high)
+        w.start = high
         return 0
     if high >= w.stop:
-        at = low
-        if has_errors and direction(w, low) < direction(u, low):
-            at = w.stop if w.is_plane or w.depth < 0.0 else w.x + w.depth * direction(u, low)
-        w.stop = max(min(at, w.stop), low)
+        w.stop = low
         return 4
     return 4 if w.start < u.start and w.stop < u.stop else 0
-
-
-@cython.cfunc
-@cython.nogil
-def _separate(
-    u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, has_errors: cython.bint
-) -> cython.bint:
-    """Whether lines of u, to the left of a point, and of w, to the right, separate behind it, within a tolerance."""
-    return has_errors and direction(u, at) < direction(w, at)
 
 
 @cython.cfunc
@@ -300,9 +260,7 @@ def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window), sliver
 
 @cython.cfunc
 @cython.nogil
-def _settle(
-    s: cython.pointer(Search), u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double
-) -> cython.int:
+def _settle(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.int:
     """Cut two windows of one half-edge where the other is nearer. 1: u is gone, 2: w is gone, 4: w comes before u."""
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
@@ -311,25 +269,20 @@ def _settle(
     if _overlap_little(u, w, sliver):
         return first
     order = _compare(u, w, low, high, until)
-    has_errors: cython.bint = s.is_joining
     if order == U_NEARER:
-        return _gives_way(u, w, low, high, has_errors)
+        return _gives_way(u, w, low, high)
     if order == W_NEARER:
-        order = _gives_way(w, u, low, high, has_errors)
+        order = _gives_way(w, u, low, high)
         if order == 2:
             return 1
         # What is left of u comes before w, unless w comes first.
         return 4 if order == 0 and w.start < u.start else 0
     if order == U_THEN_W:
-        if _separate(u, w, until[0], has_errors):
-            return first
         if high >= u.stop:
             u.stop = until[0]
         if low <= w.start:
             w.start = until[1]
     elif order == W_THEN_U:
-        if _separate(w, u, until[1], has_errors):
-            return first
         if high >= w.stop:
             w.stop = until[1]
         if low <= u.start:
@@ -354,8 +307,6 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
         if w.x * w.stop > b - w.stop:
             w.stop = b / (w.x + 1.0)
         return True
-    if is_joined(w):
-        return cut_joined_by_ends(w, a, b)
     square = w.depth * w.depth
     p = (w.start - w.x) * (w.start - w.x) + square
     q = (w.stop - w.x) * (w.stop - w.x) + square
@@ -397,7 +348,7 @@ def _goes_on(
     it in directions that differ by the curvature of the vertex: then their half-edge is turned against the corner.
     Where more than two faces meet (`is_many`), they cannot be oriented alike, and directions have no meaning.
     """
-    if fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth) or is_joined(u) or is_joined(w):
+    if fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
         return False
     if not is_many and u.corner == w.corner and fabs(u.turn_x - w.turn_x) + fabs(u.turn_y - w.turn_y) > TURNED:
         return False
@@ -428,7 +379,6 @@ def _insert(
     w: cython.pointer(Window),
     length: cython.double,
     is_many: cython.bint,
-    s: cython.pointer(Search),
 ) -> cython.int:
     """Add a window to k, after cutting all where another is nearer; how many there are then.
 
@@ -445,7 +395,7 @@ def _insert(
         if (is_many or (j == k and u.start <= w.start)) and _goes_on(u, w, length, is_many):
             u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
             return k
-        outcome = _settle(s, u, w, sliver)
+        outcome = _settle(u, w, sliver)
         if outcome == 1 or u.stop - u.start <= narrow:
             if j < k:
                 memmove(u, u + 1, (k - j) * cython.sizeof(Window))
@@ -495,17 +445,9 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     is_many: cython.bint = s.twin[h] == -2
     from_tail: cython.double = _bound_over(s, s.vertex[next_half_edge(h)], length)
     from_head: cython.double = _bound_over(s, s.vertex[previous_half_edge(h)], length) + length
-    # What an error may make of the comparison with an end.
-    margin: cython.double = 0.0
-    has_errors: cython.bint = s.is_joining
-    if has_errors:
-        from_tail += s.error[s.vertex[next_half_edge(h)]]
-        from_head += s.error[s.vertex[previous_half_edge(h)]]
     for i in range(n):
         w = windows + i
-        if has_errors:
-            margin = w.turn_y
-        if not _cut_by_ends(w, from_tail + margin - w.offset, from_head + margin - w.offset):
+        if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
             continue
         if w.stop - w.start <= NARROW * length:
             continue
@@ -515,7 +457,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
                 windows[k] = w[0]
             k += 1
         else:
-            k = _insert(windows, k, w, length, is_many, s)
+            k = _insert(windows, k, w, length, is_many)
     return k
 
 
@@ -584,10 +526,7 @@ def _arrive(
     leaving_y: cython.double = x * w.turn_y + y * w.turn_x
     if w.is_plane:
         leaving_x, leaving_y = w.turn_x + w.turn_y * w.depth * at, w.turn_y
-    is_nearer: cython.bint = distance < s.upper[s.vertex[h]]
     relax(s, s.vertex[h], distance, w.root, h, at, w.corner, leaving_x, leaving_y)
-    if is_nearer and s.is_joining:
-        s.error[s.vertex[h]] = w.turn_y
 
 
 @cython.cfunc
@@ -599,11 +538,7 @@ def _straight(w: cython.pointer(Window), apex: cython.pointer(Apex)) -> cython.d
     y: cython.double = apex.y + w.depth
     if w.is_plane:
         return w.offset + (w.x * apex.x + w.depth * apex.y)
-    distance: cython.double = sqrt(x * x + y * y)
-    if is_joined(w):
-        # Behind where the lines meet they count forwards again, whatever the sign of the depth.
-        distance = w.turn_x * backward(w, apex.x, apex.y) + (distance if y > 0.0 else -distance)
-    return w.offset + distance
+    return w.offset + sqrt(x * x + y * y)
 
 
 @cython.cfunc
@@ -622,11 +557,9 @@ def _reach_apex(
     b: cython.double
     at: cython.double
     distance: cython.double
-    is_crossed: cython.bint
     w: cython.pointer(Window)
     for i in range(n):
         w = windows + i
-        is_crossed = False
         if w.is_plane:
             x = backward(w, apex.x, apex.y)
             m = 1.0
@@ -637,25 +570,18 @@ def _reach_apex(
             m = apex.y + w.depth
             a = (w.start - w.x) * m - w.depth * x
             b = (w.stop - w.x) * m - w.depth * x
-            if w.depth < 0.0:
-                # Joined lines that meet ahead; if before they come to the height of the apex, in reverse order there.
-                is_crossed = m > 0.0
-                a, b = (-b, -a) if is_crossed else (-a, -b)
-                m = fabs(m)
         if b < 0.0:
             w.side = LEFT_OF_APEX
             if b < -NEAR * apex.length * m:
                 continue
-            b = w.start if is_crossed else w.stop
+            b = w.stop
         elif a > 0.0:
             w.side = RIGHT_OF_APEX
             if a > NEAR * apex.length * m:
                 continue
-            b = w.stop if is_crossed else w.start
+            b = w.start
         else:
-            w.side = CROSSED_AROUND_APEX if is_crossed else AROUND_APEX
-            if m == 0.0:
-                continue
+            w.side = AROUND_APEX
             distance = _straight(w, apex)
             if distance < apex.nearest:
                 apex.nearest = distance
@@ -673,8 +599,6 @@ def _reach_apex(
     if apex.best >= 0:
         w = windows + apex.best
         apex.best_at = backward(w, apex.x, apex.y)
-        if is_joined(w):
-            apex.best_at = min(max(apex.best_at, w.start), w.stop)
         _arrive(s, h, w, apex, apex.nearest, apex.best_at)
 
 
@@ -682,8 +606,6 @@ def _reach_apex(
 @cython.nogil
 def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
     """Make the window over the side between the tail and the apex; true if there is one."""
-    if is_joined(w):
-        return carry_joined(w, apex, True, out)
     keep_root(w, out)
     if w.is_plane:
         out.x = w.x * apex.cos_left + w.depth * apex.sin_left
@@ -713,8 +635,6 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
 def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
     """Make the window over the side between the apex and the head; true if there is one."""
     x: cython.double = apex.length - w.x
-    if is_joined(w):
-        return carry_joined(w, apex, False, out)
     keep_root(w, out)
     if w.is_plane:
         out.offset = w.offset + w.x * apex.x + w.depth * apex.y
@@ -844,7 +764,6 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     apex: Apex
     w: cython.pointer(Window)
     is_best: cython.bint
-    margin: cython.double = 0.0
     prefetch(s.upper + s.vertex[h])
     _fetch(s, s.twin[previous_half_edge(h)])
     _fetch(s, s.twin[next_half_edge(h)])
@@ -859,16 +778,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     assert memcpy(s.to_left, windows, n * cython.sizeof(Window)) != cython.NULL
     i = n
     n = trim(s, windows, n, h)
-    assert s.is_joining or is_covered(s, s.to_left, i, windows, n, h)
-    if s.accuracy > 0.0 and n > 1:
-        n = join(s, one, n, h)
-        if s.failed:
-            return
-        windows = one.windows
-        if n > s.n_out:
-            more_room(s, n)
-            if s.failed:
-                return
+    assert is_covered(s, s.to_left, i, windows, n, h)
     apex = _opposite(s, h)
     _reach_apex(s, h, windows, n, cython.address(apex))
     if s.first_target != cython.NULL and s.first_target[h // 3] >= 0:
@@ -876,38 +786,27 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     for i in range(n):
         w = windows + i
         # Windows whose lines would cross a shorter path to the apex go no further.
-        # Those that meet ahead may cross that path twice.
-        is_best = (apex.best < 0) | (i == apex.best) | (w.depth < 0.0)
-        if s.is_joining:
-            margin = s.error[s.vertex[h]] + w.turn_y
+        is_best = (apex.best < 0) | (i == apex.best)
         if w.side != RIGHT_OF_APEX and (
             is_best
             or w.start < apex.best_at
-            or (w.side == LEFT_OF_APEX and not apex.nearest + margin <= bent(w, w.stop, apex.x, apex.y))
+            or (w.side == LEFT_OF_APEX and not apex.nearest <= bent(w, w.stop, apex.x, apex.y))
         ):
             if _to_left(w, cython.address(apex), s.to_left + n_left):
-                assert s.is_joining or _continues(w, cython.address(apex), s.to_left + n_left, True)
+                assert _continues(w, cython.address(apex), s.to_left + n_left, True)
                 n_left += 1
         else:
-            assert (
-                s.is_joining
-                or w.side == RIGHT_OF_APEX
-                or _is_behind(w, cython.address(apex), windows + apex.best, True)
-            )
+            assert w.side == RIGHT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, True)
         if w.side != LEFT_OF_APEX and (
             is_best
             or w.stop > apex.best_at
-            or (w.side == RIGHT_OF_APEX and not apex.nearest + margin <= bent(w, w.start, apex.x, apex.y))
+            or (w.side == RIGHT_OF_APEX and not apex.nearest <= bent(w, w.start, apex.x, apex.y))
         ):
             if _to_right(w, cython.address(apex), s.to_right + n_right):
-                assert s.is_joining or _continues(w, cython.address(apex), s.to_right + n_right, False)
+                assert _continues(w, cython.address(apex), s.to_right + n_right, False)
                 n_right += 1
         else:
-            assert (
-                s.is_joining
-                or w.side == LEFT_OF_APEX
-                or _is_behind(w, cython.address(apex), windows + apex.best, False)
-            )
+            assert w.side == LEFT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, False)
     release(s, place)
     if n_left > 0:
         add(s, previous_half_edge(h), s.to_left, n_left, True)

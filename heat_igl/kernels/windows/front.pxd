@@ -26,5 +26,4 @@ cdef inline void release(Search* s, int place) noexcept nogil:
     s.lists[place].count = s.free_list
     s.lists[place].half_edge = -1
     s.free_list = place
-cdef bint has_room(List* one, int n) noexcept nogil
 cdef void add(Search* s, int e, Window* run, int n, bint in_front) noexcept nogil

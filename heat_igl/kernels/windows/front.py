@@ -13,14 +13,12 @@ import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import (
     FLAT,
-    OFTEN,
     PASSED,
     UNKNOWN,
     Entry,
     List,
     Search,
     Window,
-    is_joined,
     reach,
     straight,
 )
@@ -38,8 +36,6 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
     s.failed = s.meets_flat = s.is_shared = False
     s.n_windows = s.n_lists_done = s.n_waiting = 0
     s.n_nearest = s.n_all_ranked = 0
-    s.is_joining, s.join_every = False, OFTEN
-    s.n_long, s.n_pairs, s.n_joined = 0, 0, 0
     s.ranked = cython.NULL
     s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
     s.heap = cython.cast(cython.pointer(Entry), malloc(s.n_all_heap * cython.sizeof(Entry)))
@@ -213,8 +209,6 @@ def relax(
     s.label[v] = s.label[root]
     s.entered[v] = entered
     s.crossing[v] = crossing
-    if s.is_joining:
-        s.error[v] = s.error[root] if root < s.n else 0.0
     if s.corner != cython.NULL:
         s.corner[v] = corner
         s.leaving[2 * v] = x
@@ -264,19 +258,6 @@ def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> c
 
 
 @cython.cfunc
-@cython.nogil
-def _joined_key(w: cython.pointer(Window), length: cython.double, bulge: cython.double) -> cython.double:
-    """As of other windows. Where lines meet ahead, outside of the circle, the root is its reflection in infinity."""
-    power: cython.double = w.x * (w.x - length) + w.depth * (w.depth + bulge)
-    offset: cython.double = w.offset + min(w.turn_x * w.start, w.turn_x * w.stop)
-    if w.depth > 0.0:
-        return offset + sqrt(max(power, 0.0))
-    if power > 0.0:
-        return offset - sqrt(power)
-    return w.offset + min(reach(w, w.start), reach(w, w.stop))
-
-
-@cython.cfunc
 @cython.inline
 @cython.nogil
 def _key(
@@ -289,8 +270,6 @@ def _key(
     if w.is_plane:
         x = w.x * length + w.depth * bulge
         return w.offset + (0.5 * x if s.is_delaunay else w.x * (w.start if w.x > 0.0 else w.stop))
-    if is_joined(w):
-        return _joined_key(w, length, bulge)
     if s.is_delaunay:
         square = w.x * (w.x - length) + w.depth * (w.depth + bulge)
     else:
@@ -299,7 +278,10 @@ def _key(
     return w.offset + sqrt(max(square, 0.0))
 
 
-def has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
     """Make room for n more windows of a list; false without memory."""
     if one.count + n > one.capacity:
         capacity: cython.int = 2 * (one.count + n) + 4
@@ -324,9 +306,6 @@ def _mirrored(w: Window, length: cython.double) -> Window:
         w.x = -w.x
     else:
         w.x = length - w.x
-        if w.corner < 0:
-            w.offset += w.turn_x * length
-            w.turn_x = -w.turn_x
     w.start = length - w.stop
     w.stop = length - start
     return w
@@ -355,7 +334,7 @@ def append(
         s.lists[place].count = 0
         s.lists[place].key = INFINITY
     one: cython.pointer(List) = cython.address(s.lists[place])
-    if not has_room(one, n):
+    if not _has_room(one, n):
         s.failed = True
         return
     to = one.windows + one.count

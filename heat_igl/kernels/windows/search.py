@@ -18,7 +18,6 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.signals import is_interrupted
 from cython.cimports.heat_igl.kernels.windows.crossing import cross, over_corners
 from cython.cimports.heat_igl.kernels.windows.front import append, empty_front, pop, push, release
-from cython.cimports.heat_igl.kernels.windows.joining import may_join
 from cython.cimports.heat_igl.kernels.windows.sources import emit_point, emit_segment, emit_vertex
 from cython.cimports.heat_igl.kernels.windows.structures import (
     FLAT,
@@ -179,13 +178,10 @@ def forget(s: cython.pointer(Search)) -> cython.void:
 @cython.cfunc
 @cython.nogil
 def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
-    """Carry lists with keys below `until`; if that is infinite, until there is work for two threads.
-
-    Joined windows depend on those beside them, which are not the same on two threads: one carries them all.
-    """
+    """Carry lists with keys below `until`; if that is infinite, until there is work for two threads."""
     entry: Entry
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
-        if until == INFINITY and _load(s) > s.plenty and not s.meets_flat and not may_join(s):
+        if until == INFINITY and _load(s) > s.plenty and not s.meets_flat:
             return
         entry = _first(s)
         carry(s, entry)

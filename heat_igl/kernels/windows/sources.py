@@ -16,7 +16,6 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge
 from cython.cimports.heat_igl.kernels.windows.front import add, push, relax, take, tell
 from cython.cimports.heat_igl.kernels.windows.structures import (
     BENDS,
-    BENT_MORE,
     FLATNESS,
     JOINS,
     NARROW,
@@ -26,7 +25,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     Search,
     Window,
     apart,
-    as_joined,
     at_corner,
     nearest_on,
     twice_product,
@@ -88,8 +86,6 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         one.turn_x = (place_x[(c + 1) % 3] - place_x[(c + 2) % 3]) / length
         one.turn_y = (place_y[(c + 1) % 3] - place_y[(c + 2) % 3]) / length
         one.side = one.is_plane = 0
-        if s.is_joining:
-            as_joined(s, cython.address(one))
         if one.depth > 0.0:
             add(s, h, cython.address(one), 1, False)
     j: cython.int = s.first_target[f] if s.first_target != cython.NULL else -1
@@ -188,37 +184,21 @@ def _emit_from_bend(
     one.corner = k
     one.turn_x, one.turn_y = 0.5 * twice_product(length, right, left) / (length * right), -one.depth / right
     one.side = one.is_plane = 0
-    if s.is_joining:
-        as_joined(s, cython.address(one))
     if one.depth > 0.0:
         add(s, k, cython.address(one), 1, False)
 
 
 @cython.cfunc
 @cython.nogil
-def _reach_ends(
-    s: cython.pointer(Search),
-    k: cython.int,
-    v: cython.int,
-    offset: cython.double,
-    bends_before: cython.bint,
-    bends_behind: cython.bint,
-) -> cython.void:
-    """Distances along the two sides of corner k from its vertex v.
-
-    Before the first line from a bend, and behind the last, a path along a side bends where straight ones pass the
-    vertex. Among joined windows such a path may seem to be shorter than these, which would leave the directions between
-    without a window, so it is taken for longer by more than the tolerance.
-    """
+def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
+    """Distances along the two sides of corner k from its vertex v."""
     head: cython.int = next_half_edge(k)
     tail: cython.int = previous_half_edge(k)
     a: cython.double = s.length[tail]
     b: cython.double = s.length[head]
-    more: cython.double = BENT_MORE * s.accuracy * offset if s.is_joining else 0.0
-    relax(s, s.vertex[head], offset + a + (more if bends_before else 0.0), v, head, b, k, 1.0, 0.0)
+    relax(s, s.vertex[head], offset + a, v, head, b, k, 1.0, 0.0)
     x: cython.double = 0.5 * twice_product(a, b, s.length[k]) / a
-    length: cython.double = offset + b + (more if bends_behind else 0.0)
-    relax(s, s.vertex[tail], length, v, tail, 0.0, k, x, s.double_area[k // 3] / a)
+    relax(s, s.vertex[tail], offset + b, v, tail, 0.0, k, x, s.double_area[k // 3] / a)
 
 
 @cython.cfunc
@@ -282,12 +262,10 @@ def _fill(
     while k >= 0:
         length: cython.double = s.length[k]
         far: cython.double = length
-        is_first: cython.bint = k == first.corner and side == first.side
         is_last: cython.bint = last != cython.NULL and k == last.corner
-        is_tail: cython.bint = side == previous_half_edge(k)
         if is_last:
             far = length - _reach(s, last)
-        _reach_ends(s, k, v, offset, is_first if is_tail else is_last, is_last if is_tail else is_first)
+        _reach_ends(s, k, v, offset)
         if near < far:
             if side == previous_half_edge(k):
                 _emit_from_bend(s, k, near, far, v, offset)
@@ -311,7 +289,7 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
     if h < 0 or s.kind[v] == JOINS:
         k: cython.int = s.corner_of_vertex[v]
         while k >= 0:
-            _reach_ends(s, k, v, s.distance[v], False, False)
+            _reach_ends(s, k, v, s.distance[v])
             _emit_from_bend(s, k, 0.0, s.length[k], v, s.distance[v])
             k = s.next_corner[k]
         return

@@ -20,19 +20,16 @@ cdef extern from *:
     """
     # The part of a half-edge that straight lines from one root cross, in the frame of the half-edge: its tail is the
     # origin, its head lies at (length, 0), the face that the lines enter above. If it is a plane, the lines are
-    # parallel, and the root is a segment all of whose points are sources (Bommes and Kobbelt 2007). If it is joined from
-    # several, `corner` is -1, and its lines are those between the first and the last line of these: they meet in one
-    # point, before the half-edge or, with a negative depth, behind it (see `joining`).
+    # parallel, and the root is a segment all of whose points are sources (Bommes and Kobbelt 2007).
     ctypedef struct Window:
         double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
         # The half-edge as a unit vector in the frame of `corner`; of a plane, how far along the segment the line
-        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right. If joined, how fast the
-        # offset grows along the half-edge, and the largest error of distance.
+        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right.
         double turn_x, turn_y
         double start, stop   # from where to where along the half-edge
-        double offset        # distance of the root, if joined at the tail; of a plane, the distance that it gives the tail
+        double offset        # distance of the root; of a plane, the distance that it gives the tail
         int root             # vertex, n + p for source point p, or after those, n + p + i for source segment i
-        int corner           # of the root, out of which the lines leave it: see `relax`; -1 if joined
+        int corner           # of the root, out of which the lines leave it: see `relax`
         unsigned int side    # of the apex: see the sides below
         unsigned int is_plane
 
@@ -135,12 +132,6 @@ cdef struct Search:
     bint failed
     long long n_windows, n_lists_done
     double tolerance
-    # Windows are joined as far as distance keeps this fraction of itself; 0 for never. `error` is that of each vertex.
-    double accuracy
-    double* error
-    bint is_joining      # once lists are long
-    int n_long, join_every  # long lists so far; crossings
-    long long n_pairs, n_joined  # neighbours since that was decided
     # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
     double cutoff
     double last_key      # what has a larger key can change nothing that is asked for
@@ -183,7 +174,6 @@ cdef enum Side:
     RIGHT_OF_APEX = 0
     LEFT_OF_APEX = 1
     AROUND_APEX = 2
-    CROSSED_AROUND_APEX = 3  # joined lines that have met before they come to the height of the apex
 
 
 cdef extern from *:
@@ -215,23 +205,6 @@ cdef extern from *:
     #define SLIVER 1e-5
     // What a list costs beside its windows, in windows.
     #define PER_LIST 4
-    // Lines of a joined window meet farther away than this many sides ahead, and nearer than so many times its width.
-    #define NEAREST_FOCUS 4.0
-    #define FARTHEST_MEETING 1e5
-    // Windows are joined at one of so many crossings at least, at most: what was not joined at one seldom is at the next.
-    #define OFTEN 4
-    #define SELDOM 64
-    // Joining begins when more than so many lists, and more than one in so many, had so many windows, within the first
-    // crossings, one for so many half-edges: it costs time in shorter lists, and on two threads.
-    #define LONG_LISTS 256
-    #define ONE_IN 8
-    #define LONG 20
-    #define FIRST 3
-    // How often is decided after so many pairs: less often if fewer than one in so many were joined.
-    #define PAIRS 4096
-    #define FEW_JOINED 16
-    // By how much more than the tolerance a path that bends along a side is taken for longer.
-    #define BENT_MORE 2.0
     """
     double ROUNDING
     double WIDEST
@@ -246,17 +219,6 @@ cdef extern from *:
     double FLATNESS
     int TRIES
     int PER_LIST
-    double NEAREST_FOCUS
-    double FARTHEST_MEETING
-    int OFTEN
-    int SELDOM
-    int LONG_LISTS
-    int ONE_IN
-    int LONG
-    int FIRST
-    int PAIRS
-    int FEW_JOINED
-    double BENT_MORE
 
 
 # Twice the scalar product of two sides p and q of a triangle, by the third side. The difference of squares is that of
@@ -317,36 +279,16 @@ cdef inline double straight(const Search* s, int v) noexcept nogil:
     return sqrt(x * x + y * y + z * z)
 
 
-cdef inline bint is_joined(const Window* w) noexcept nogil:
-    return w.corner < 0
-
-
 # What a window adds to its offset at a point of its half-edge.
 cdef inline double reach(const Window* w, double at) noexcept nogil:
     if w.is_plane:
         return w.x * at
-    cdef double found = sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
-    if is_joined(w):
-        return w.turn_x * at + (found if w.depth > 0.0 else -found)
-    return found
+    return sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
 
 
 # Length of the path of a window through a point of its half-edge to a point of the face.
 cdef inline double bent(const Window* w, double at, double x, double y) noexcept nogil:
     return w.offset + reach(w, at) + sqrt((at - x) * (at - x) + y * y)
-
-
-# While windows are joined, all have the form of joined ones, so that no branch depends on which are: the offset of one
-# with a root does not grow, and its error is that of the root.
-cdef inline void as_joined(const Search* s, Window* w) noexcept nogil:
-    w.turn_x = 0.0
-    w.turn_y = s.error[w.root] if w.root < s.n else 0.0
-    w.corner = -1
-
-
-# The direction of the line of a window through a point of its half-edge: how far it goes along while it rises by 1.
-cdef inline double direction(const Window* w, double at) noexcept nogil:
-    return w.x / w.depth if w.is_plane else (at - w.x) / w.depth
 
 
 # Whether a length exceeds another by no more than rounding, of that and of the sides of its last face.

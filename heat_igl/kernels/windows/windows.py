@@ -34,9 +34,6 @@ class Front:
     position : (3 n,), optional
         Positions of the vertices, in the unit of the lengths. With one goal for a source, `search_each` uses them to
         leave out vertices that are too far from the goal along straight lines.
-    accuracy : float
-        Windows are joined as far as distances keep this fraction of themselves, see `joining`; 0 for never. Not with
-        `leaving`, segments or edges of more than two faces, and on an intrinsic Delaunay triangulation alone.
     """
 
     def __init__(
@@ -46,7 +43,6 @@ class Front:
         tolerance: cython.double,
         leaving=None,
         position: cython.const[cython.double][::1] = None,
-        accuracy: cython.double = 0.0,
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
         emitted, touched = np.full(tables.n, np.inf), np.empty(tables.n, np.int32)
@@ -65,12 +61,7 @@ class Front:
         if position is not None:
             s.position = cython.cast(cython.p_double, cython.address(position[0]))
         s.aim = -1
-        s.tolerance, s.accuracy = tolerance, accuracy
-        s.error = cython.NULL
-        if accuracy > 0.0:
-            error = np.zeros(tables.n)
-            self.arrays += (error,)
-            s.error = _doubles(error)
+        s.tolerance = tolerance
         s.n_points = s.n_segments = s.n_targets = s.n_goals = 0
         s.first_target = cython.NULL
 
