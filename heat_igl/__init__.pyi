@@ -69,7 +69,7 @@ from heat_igl.sources import OrientedPoints as OrientedPoints
 from heat_igl.validation import ValidationReport as ValidationReport
 from heat_igl.validation import shapes as shapes
 from heat_igl.validation import validate as validate
-from heat_igl.validation.samples import sample_mesh as sample_mesh
+from heat_igl.validation.shapes import sample_mesh as sample_mesh
 from heat_igl.windows import distances_within as distances_within
 from heat_igl.windows import nearest_vertices as nearest_vertices
 from heat_igl.windows import pair_distances as pair_distances

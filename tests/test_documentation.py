@@ -59,7 +59,7 @@ def _folder(tmp_path, monkeypatch):
     if importlib.util.find_spec("matplotlib"):
         monkeypatch.setattr("heat_igl.drawing.figure.DPI", 40)
     # The sample without the pymeshlab wheel, which has the fewer vertices of the two.
-    monkeypatch.setattr("heat_igl.validation.samples.bunny_path", lambda: None)
+    monkeypatch.setattr("heat_igl.validation.shapes.bunny_path", lambda: None)
 
 
 @pytest.mark.parametrize("block", list(blocks()))

@@ -146,7 +146,7 @@ def test_a_mesh_that_everybody_has(monkeypatch):
     mesh = heat_igl.sample_mesh()
     assert mesh.n_vertices > 2500
     assert not mesh.is_tetrahedral
-    monkeypatch.setattr(heat_igl.validation.samples, "bunny_path", lambda: None)
+    monkeypatch.setattr(heat_igl.validation.shapes, "bunny_path", lambda: None)
     blob = heat_igl.sample_mesh()
     np.testing.assert_array_equal(blob.V, shapes.blob(4).V)
     report = blob.report()

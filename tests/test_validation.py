@@ -28,7 +28,7 @@ from heat_igl import (
 from heat_igl.operators import Operators, operators
 from heat_igl.steps import NormalizedDivergence
 from heat_igl.validation import closed_forms, draw_sources, metrics
-from heat_igl.validation.plots import error_figure
+from heat_igl.validation.report import error_figure
 
 # --- The report tells good methods from broken ones, survives methods that fail, and says the same in every format
 

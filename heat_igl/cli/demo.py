@@ -15,7 +15,7 @@ from heat_igl.io import read_mesh, write_mesh
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 from heat_igl.validation import shapes
-from heat_igl.validation.samples import bunny_path as sample_mesh
+from heat_igl.validation.shapes import bunny_path as sample_mesh
 
 __all__ = ["demonstrate", "sample_mesh"]
 

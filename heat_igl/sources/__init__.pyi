@@ -1,4 +1,3 @@
-from heat_igl.sources.curve_samples import samples as samples
 from heat_igl.sources.oriented import Oriented as Oriented
 from heat_igl.sources.oriented import OrientedPoints as OrientedPoints
 from heat_igl.sources.oriented import OrientedSet as OrientedSet
@@ -12,5 +11,6 @@ from heat_igl.sources.source_sets import are_positions as are_positions
 from heat_igl.sources.source_sets import named_vertices as named_vertices
 from heat_igl.sources.source_sets import nearest_first as nearest_first
 from heat_igl.sources.source_sets import require_resolved as require_resolved
+from heat_igl.sources.source_sets import samples as samples
 from heat_igl.sources.source_sets import source_set as source_set
 from heat_igl.sources.source_sets import vertex_sources as vertex_sources

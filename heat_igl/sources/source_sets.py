@@ -9,7 +9,8 @@ from typing import Any, TypeGuard, cast
 import numpy as np
 
 from heat_igl.errors import SourceError, real_numbers, refuse_masked
-from heat_igl.mesh import ON_SIDE, Mesh, MeshPart, SurfaceCurve, SurfacePoints
+from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
+from heat_igl.mesh import ON_SIDE, Mesh, MeshPart, SurfaceCurve, SurfacePoints, grouping
 from heat_igl.mesh.projection import points_beside
 from heat_igl.mesh.surface_points import require_faces
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -359,3 +360,22 @@ def on_simplex(barycentric: FloatArray) -> FloatArray:
 
 def _concatenated(rows: list[tuple[Any, ...]], none: tuple[AnyArray, ...]) -> tuple[AnyArray, ...]:
     return rows[0] if len(rows) == 1 else tuple(np.concatenate(column) for column in zip(none, *rows, strict=True))
+
+
+def samples(
+    triangulation: IntrinsicTriangulation, segments: SourceSegments, spacing: float | FloatArray
+) -> tuple[SourcePoints, FloatArray]:
+    """Points along segments, at most `spacing` apart on a triangulation, and the length of the piece around each.
+
+    A point lies in the middle of its piece: there a linear function takes the mean over the piece.
+    """
+    faces, start = triangulation.locate(segments.faces, segments.start)
+    _, end = triangulation.locate(segments.faces, segments.end)
+    along = np.einsum("kc,kcx->kx", end - start, lay_out(triangulation.l[faces]))
+    lengths = np.linalg.norm(along, axis=1)
+    counts = np.ceil(lengths / spacing).astype(np.int64)
+    which, piece = grouping.enumerate_runs(counts)
+    share = (piece + 0.5) / counts[which]
+    barycentric = (1 - share)[:, None] * segments.start[which] + share[:, None] * segments.end[which]
+    points = SourcePoints(segments.faces[which], barycentric, segments.label[which], segments.offset[which])
+    return points, lengths[which] / counts[which]

@@ -1,11 +1,11 @@
 from heat_igl.validation import closed_forms as closed_forms
 from heat_igl.validation import metrics as metrics
+from heat_igl.validation.comparison import METHODS as METHODS
+from heat_igl.validation.comparison import Method as Method
+from heat_igl.validation.comparison import Progress as Progress
+from heat_igl.validation.comparison import Solver as Solver
 from heat_igl.validation.comparison import draw_sources as draw_sources
 from heat_igl.validation.comparison import validate as validate
-from heat_igl.validation.methods import METHODS as METHODS
-from heat_igl.validation.methods import Method as Method
-from heat_igl.validation.methods import Progress as Progress
-from heat_igl.validation.methods import Solver as Solver
 from heat_igl.validation.metrics import BoundViolations as BoundViolations
 from heat_igl.validation.metrics import ErrorSummary as ErrorSummary
 from heat_igl.validation.metrics import TriangleViolations as TriangleViolations

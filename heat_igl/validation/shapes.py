@@ -13,14 +13,16 @@ Examples
 
 from __future__ import annotations
 
+import importlib.util
 from itertools import permutations
+from pathlib import Path
 
 import igl
 import numpy as np
 
 from heat_igl.errors import is_number, shown
 from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, as_simplices
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 __all__ = [
@@ -38,7 +40,6 @@ __all__ = [
     "torus",
     "with_slivers",
 ]
-
 
 # An icosphere of more subdivisions has more half-edges than indices of 32 bits can count.
 _MOST_SUBDIVISIONS = 12
@@ -255,3 +256,33 @@ def with_slivers(mesh: Mesh, seed: int) -> Mesh:
             w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
             added += [[w, a, new], [w, new, b]]
     return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))
+
+
+def bunny_path() -> Path | None:
+    """Path of the bunny in the pymeshlab wheel, or None without pymeshlab. pymeshlab is not imported."""
+    found = importlib.util.find_spec("pymeshlab")
+    for folder in (found.submodule_search_locations or []) if found else []:
+        for path in (Path(folder, "tests/sample_meshes/bunny.obj"), Path(folder, "sample_meshes/bunny.obj")):
+            if path.is_file():
+                return path
+    return None
+
+
+def sample_mesh() -> Mesh:
+    """A closed surface to try things on: the Stanford bunny, or without pymeshlab, which ships it, a generated shape.
+
+    Returns
+    -------
+    Mesh
+        Connected triangles, over 2500 vertices; without pymeshlab `blob`.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.sample_mesh()
+    >>> report = mesh.report()
+    >>> report.n_components, report.n_boundary_loops, mesh.n_vertices > 2500
+    (1, 0, True)
+    """
+    path = bunny_path()
+    return blob(4) if path is None else as_simplices(path)

@@ -890,14 +890,14 @@ def maze(rng: Generator) -> Mesh:
 
 
 @family("CAD plate")
-def cad_holed_rectangle(rng: Generator) -> Mesh:
+def cad_plate(rng: Generator) -> Mesh:
     """A flat plate with round holes, vertices on the rims and few elsewhere."""
     points, F = _holed_rectangle(rng, int(rng.integers(12, 96)), int(rng.integers(0, 60)))
     return compact(raised(points), F)
 
 
 @family("thin plate")
-def thin_holed_rectangle(rng: Generator) -> Mesh:
+def thin_plate(rng: Generator) -> Mesh:
     """The same as a body: two sheets a small thickness apart, joined along the rims."""
     points, F = _holed_rectangle(rng, int(rng.integers(8, 40)), int(rng.integers(0, 60)))
     return extruded(points, F, 10 ** rng.uniform(-2.5, -0.3))

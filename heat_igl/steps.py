@@ -1,7 +1,13 @@
-"""The three steps of the heat method: diffuse, normalize, integrate (Algorithm 1 of the paper)."""
+"""The three steps of the heat method, each to be tried alone: diffuse, normalize, integrate.
+
+Algorithm 1 of the paper, on any domain that has `Operators`. The two steps that solve a system also exist as a class
+that factors once, `HeatFlow` and `PoissonProblem`. Fields are arrays (n,) over vertices, or (n, k) for k right-hand
+sides at once; vector fields are stacked by coordinate like the rows of G: (d m,) or (d m, k).
+"""
 
 from __future__ import annotations
 
+from math import factorial
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -9,11 +15,90 @@ import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
 from heat_igl.kernels.heat.divergence import divergence_of_descent
-from heat_igl.linear import Analysis, Backend, Factorization, analyse
-from heat_igl.operators import Operators, TriangleElements
+from heat_igl.linear import Analysis, Backend, Factorization, analyse, factorize
+from heat_igl.operators import Operators, TriangleElements, with_rotations
 from heat_igl.runtime import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT
-from heat_igl.steps.fitted import fitted_laplacian
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+
+def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
+    """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.
+
+    If (1 - t Laplace) u = 0, the mean of u over a circle of radius r is I0(r / sqrt(t)) times the value in the
+    centre, I0 the modified Bessel function. Linear elements know the first terms of that series alone, 1 + r^2 / (4 t):
+    along an edge much longer than sqrt(t) heat falls by too little, and the front runs ahead there and bends. So an
+    edge of length r gets the weight times (r^2 / (4 t)) / (I0(r / sqrt(t)) - 1), which is 1 for short ones. Negative
+    weights are left out, so that heat is positive and keeps its digits on any triangles.
+
+    Parameters
+    ----------
+    domain : Operators
+        One whose `lengths` are known.
+    t : float or (n_components,) float64
+        Time step, a squared length.
+
+    Returns
+    -------
+    (n, n) csc_matrix
+        Symmetric, negative semidefinite, rows sum to 0; no entry off the diagonal is negative. In the pattern of L.
+
+    Raises
+    ------
+    ValueError
+        If the lengths are not known, or not that of an entry of L.
+
+    Notes
+    -----
+    The weights are those of L and the lengths those of the edges, and they have to agree: t is a squared length in the
+    metric of L and M. Twice L and twice M are the same metric. Twice L alone is that of edges shorter by sqrt(2): in
+    M - t L it counts like 2 t, so heat falls like exp(-d / sqrt(2 t)) over short edges, but long ones would still be
+    fitted at t. Give `Operators.lengths` for such an L, or keep L and pass 2 t.
+    """
+    L, n = domain.L, domain.n
+    edges = domain.edge_lengths()
+    if edges is None:
+        raise ValueError("weights are fitted to the lengths of edges, which this domain does not have")
+    i, j, length = edges
+    fitted = _fit(length / np.sqrt(t[domain.components[i]] if isinstance(t, np.ndarray) else t))
+    # Entry 0 takes the pairs that L does not couple.
+    entry = sp.csc_matrix((np.arange(1, L.nnz + 1, dtype=L.indices.dtype), L.indices, L.indptr), shape=L.shape)
+    factor = np.zeros(L.nnz + 1)
+    for rows, columns in ((i, j), (j, i)):
+        # L has one entry for all edges between the same two vertices. The largest factor is that of the shortest: heat
+        # arrives along it first, and it has most of the weight, which is the length of the dual edge over the length of
+        # the edge.
+        np.maximum.at(factor, np.asarray(entry[rows, columns]).ravel(), fitted)
+    column = np.repeat(np.arange(n), np.diff(L.indptr))
+    on_diagonal = np.flatnonzero(L.indices == column)
+    weight = np.maximum(L.data, 0.0)
+    weight[on_diagonal] = 0
+    unknown = (weight > 0) & (factor[1:] == 0)
+    if unknown.any():
+        first = int(np.argmax(unknown))
+        raise ValueError(
+            f"L[{L.indices[first]}, {column[first]}] couples vertices whose distance is not known "
+            f"({int(unknown.sum())} entries do): give lengths for all that L couples, or do not fit (magnitude='unit')"
+        )
+    weight *= factor[1:]
+    weight[on_diagonal] = -np.bincount(column, weight, n)[column[on_diagonal]]
+    return sp.csc_matrix((weight, L.indices, L.indptr), shape=L.shape)
+
+
+def _fit(x: FloatArray) -> FloatArray:
+    """(x^2 / 4) / (I0(x) - 1): the factor of a weight whose edge has length x in units of sqrt(t)."""
+    # I0 is the sum of y^k / (k!)^2, and 13 terms give it to 1e-12 up to x = 4; beyond, nothing cancels.
+    y = np.minimum(x, 4.0) ** 2 / 4
+    over_y = np.zeros_like(x)
+    for k in range(13, 0, -1):
+        over_y *= y
+        over_y += 1 / factorial(k) ** 2
+    fitted = 1 / over_y
+    far = x > 4
+    # exp(-600) is as good as no heat, and leaves the weight a number.
+    beyond = np.minimum(x[far], 600.0)
+    fitted[far] = beyond**2 / 4 / (np.i0(beyond) - 1)
+    return np.asarray(fitted)
+
 
 Boundary = Literal["neumann", "dirichlet", "average"]
 
@@ -425,3 +510,66 @@ def integrate(operators: Operators, X: FloatArray) -> FloatArray:
         phi, determined up to a constant on each component: 0 at the first vertex of each.
     """
     return PoissonProblem(operators).solve(operators.D @ X)
+
+
+class VectorHeatFlow:
+    """One backward Euler step of the heat flow of tangent vectors, (M - t L) Y = mean_mass * b, factored.
+
+    L is the connection Laplacian. The complex matrix A + i B is Hermitian and factored as a real symmetric one of twice
+    the size, [[A, -B], [B, A]], in which the two components of a vertex are next to each other.
+
+    Parameters
+    ----------
+    operators : Operators
+        The domain.
+    rotations : (n, n) csc_matrix of complex128
+        Factors of transport along the edges, as `edge_rotations` gives it for triangles.
+    t : float or (n_components,) float64
+        Time step, a squared length; one for all components, or one for each.
+    backend : {"auto", "scipy", "multifrontal"}
+        See `factorize`.
+    fitted : bool
+        As for `HeatFlow`. No weight is negative then, and Y is nowhere longer than heat that starts with the lengths
+        of b.
+    mass : (n,) float64, optional
+        In place of the diagonal of M.
+
+    Raises
+    ------
+    FactorizationError
+        If M - t L is not positive definite.
+    """
+
+    def __init__(
+        self,
+        operators: Operators,
+        rotations: sp.csc_matrix,
+        t: float | FloatArray,
+        backend: Backend = "auto",
+        fitted: bool = False,
+        mass: FloatArray | None = None,
+    ) -> None:
+        self.t, self.mean_mass, self._n = t, operators.mean_mass, operators.n
+        L = fitted_laplacian(operators, t) if fitted else operators.L
+        lumped = operators.M.diagonal() if mass is None else mass
+        step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t
+        matrix = shifted(with_rotations(L, rotations), -step / self.mean_mass, lumped / self.mean_mass)
+        self.factor = factorize(_real(matrix), backend, np.repeat(operators.referenced, 2))
+
+    def solve(self, b: AnyArray) -> AnyArray:
+        """Vectors Y after the time step, complex (n,) or (n, k), for initial vectors `b` in units of `mean_mass`."""
+        columns = np.ascontiguousarray(b.reshape(self._n, -1).T).astype(np.complex128, copy=False)
+        parts: FloatArray = columns.view(np.float64).T
+        Y = self.factor.solve(parts[:, 0] if parts.shape[1] == 1 else np.ascontiguousarray(parts))
+        return np.ascontiguousarray(Y.reshape(2 * self._n, -1).T).view(np.complex128).T.reshape(b.shape)
+
+
+def _real(A: sp.csc_matrix) -> sp.csc_matrix:
+    """A Hermitian matrix (n, n) as a real symmetric one (2 n, 2 n), with the block [[a, -b], [b, a]] for a + i b."""
+    rows = A.tocsr()
+    blocks = np.empty((rows.nnz, 2, 2))
+    blocks[:, 0, 0] = blocks[:, 1, 1] = rows.data.real
+    blocks[:, 1, 0], blocks[:, 0, 1] = rows.data.imag, -rows.data.imag
+    real = sp.bsr_matrix((blocks, rows.indices, rows.indptr), shape=(2 * A.shape[0], 2 * A.shape[1])).tocsc()
+    real.sort_indices()
+    return real
