@@ -164,7 +164,7 @@ def browser(chromium):
 
 
 def assert_agree(found: np.ndarray, expected: np.ndarray) -> None:
-    """The same, but for single vertices that depend on which of two is visited first, in heat's order or Dijkstra's.
+    """The same, but for single vertices that depend on which of two is visited first.
 
     Python's sweep does not pass on changes below 3e-4 either, and the page's all above 1e-7.
     """

@@ -1,8 +1,8 @@
 """An interactive view of a distance as one HTML file, without a server, network access or libraries.
 
 The page draws the surface with WebGL. After a click on a new source it computes the distance by the algorithm of
-`heat_igl.sweep`, implemented in JavaScript in page/sweep.js, and the logarithmic map by page/polar.js. The
-extra ``view`` is needed for the colours.
+`heat_igl.sweep`, implemented in JavaScript in page/sweep.js, and the logarithmic map with it. The extra ``view`` is
+needed for the colours.
 """
 
 from __future__ import annotations
@@ -41,20 +41,6 @@ from heat_igl.typing import AnyArray, ArrayLike
 _AS_GIVEN = "Distance as given."
 _LOG_MAP = "log map"
 _SIGNED_COLOURS = "RdBu_r"
-# One script in the end: each file uses names of those before it.
-_SCRIPTS = (
-    "sweep.js",
-    "polar.js",
-    "geometry.js",
-    "shaders.js",
-    "arrays.js",
-    "camera.js",
-    "picking.js",
-    "renderer.js",
-    "colour_scale.js",
-    "pointer.js",
-    "view.js",
-)
 _FRAME = (
     '<iframe srcdoc="{}" sandbox="allow-scripts allow-downloads" '
     'style="width: 100%; height: 520px; border: 1px solid #ccc"></iframe>'
@@ -191,12 +177,14 @@ def page(
         (name, "float" if array.dtype.kind == "f" else "int", array.size) for name, array in arrays.items()
     ]
     folder = files("heat_igl.drawing") / "page"
+    names = sorted(file.name for file in folder.iterdir() if file.name.endswith(".js"))
     return Page(
         Template((folder / "page.html").read_text(encoding="utf8")).substitute(
             title=html.escape(title),
             meta=_in_script(meta),
             data=base64.b64encode(_packed(list(arrays.values()))).decode(),
-            scripts="\n".join((folder / name).read_text(encoding="utf8") for name in _SCRIPTS),
+            # One script in the end: view.js, the last by name, uses what the others define.
+            scripts="\n".join((folder / name).read_text(encoding="utf8") for name in names),
         )
     )
 

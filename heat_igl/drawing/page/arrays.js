@@ -1,4 +1,5 @@
 // The arrays of the page, from the text that `heat_igl.drawing.html_view` packs them in.
+"use strict";
 
 // Arrays by name; `layout` has the name, the kind ("float" or "int", of 4 bytes) and the size of each.
 async function unpacked(base64, layout) {

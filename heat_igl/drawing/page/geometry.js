@@ -1,6 +1,4 @@
 // What is drawn, from positions V and triangles F: normals, sizes of discs, needles in the directions in which values grow.
-"use strict";
-
 function vertexNormals(V, F) {
   const normals = new Float32Array(V.length);
   for (let f = 0; f < F.length; f += 3) {

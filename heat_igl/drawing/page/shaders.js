@@ -1,6 +1,4 @@
 // Programs for the graphics card: surfaces, discs for points, needles for directions, and dots for sources.
-"use strict";
-
 const SURFACE_VERTEX = `#version 300 es
   uniform mat3 turn; uniform vec2 zoom, pan;
   in vec3 position, normal, value;

@@ -21,7 +21,8 @@
 
   // ---- what is shown
 
-  let values, sources, dots, isComputed, map, tables = null;
+  // `computed` is what the sweep found after a click, null before.
+  let values, sources, dots, computed, map, tables = null;
   const camera = new Camera(canvas, meta), renderer = new Renderer(canvas, gl, V, F, meta);
   // One panel, or two side by side: the field that each shows, and the scale of the colours.
   const panel = (field) => ({ field, low: 0, high: 1, spacing: 1, row: 0, isMap: false, ...renderer.panelBuffers() });
@@ -33,7 +34,7 @@
   function numbers(field) {
     if (field === "distance") return values;
     if (field !== "log map") return arrays["field " + field];
-    map = map || logMap(sweep(), isComputed ? values : sweepDistance(sweep(), sources), sources);
+    map = map || logMap(computed || swept(sweep(), sources));
     return map;
   }
   const isMap = (field) => field === "log map" || meta.fields.some(([name, width]) => name === field && width === 2);
@@ -88,14 +89,14 @@
     drawBar(byId("bar" + suffix), at, byId("style").value, meta);
     byId("ticks" + suffix).replaceChildren(...ticks(at, written));
     const names = { distance: meta.label, "log map": "length in the log map" };
-    byId("label" + suffix).textContent = (names[at.field] || at.field) + (isComputed && isGiven(at.field) ? ", as given" : "");
+    byId("label" + suffix).textContent = (names[at.field] || at.field) + (computed && isGiven(at.field) ? ", as given" : "");
   }
 
   function showScales() {
     const [left, right] = shown();
     showScale("", left);
     const follow = right && isGiven(left.field) === isGiven(right.field);
-    byId("scale2").hidden = !right || ((follow || !isComputed) && (right.row === left.row && right.low === left.low && right.high === left.high));
+    byId("scale2").hidden = !right || ((follow || !computed) && (right.row === left.row && right.low === left.low && right.high === left.high));
     if (!byId("scale2").hidden) showScale("2", right);
   }
 
@@ -115,10 +116,10 @@
     const start = performance.now();
     sweep();
     const prepared = performance.now();
-    values = sweepDistance(tables, chosen);
+    computed = swept(tables, chosen);
+    values = computed.d;
     const milliseconds = { prepare: prepared - start, solve: performance.now() - prepared };
     sources = chosen;
-    isComputed = true;
     map = null;
     dots = chosen.flatMap((s) => [V[3 * s], V[3 * s + 1], V[3 * s + 2]]);
     const others = meta.fields.length ? " Other fields keep their own source: " + meta.fields.map(([name]) => name).join(", ") + "." : "";
@@ -169,7 +170,7 @@
   function state() {
     return {
       ...camera.state(), field: panels[0].field, beside: panels[1].field, style: byId("style").value, spacing: byId("spacing").value,
-      directions: byId("directions").checked, points: byId("points").checked, sources: isComputed ? sources : null,
+      directions: byId("directions").checked, points: byId("points").checked, sources: computed ? sources : null,
     };
   }
 
@@ -191,7 +192,7 @@
     values = Float64Array.from(arrays.distance);
     sources = meta.sources.slice();
     dots = meta.dots;
-    [isComputed, map] = [false, null];
+    [computed, map] = [null, null];
     byId("method").textContent = meta.method;
     readout.textContent = n + " vertices, " + F.length / 3 + " triangles.";
     const begin = scene || { ...meta.begin, spacing: meta.spacing === null ? "" : meta.spacing, style: meta.style, sources: null };
