@@ -22,7 +22,7 @@ from heat_igl import (
     edge_curve,
     shapes,
 )
-from heat_igl.mesh import connectivity, grouping
+from heat_igl.mesh import connectivity
 
 # --- Mesh, MeshReport and connectivity on small shapes whose every number can be worked out by hand
 
@@ -312,21 +312,21 @@ def test_distance_along_edges_of_length_zero():
 @pytest.mark.parametrize("count", [0, 1, 300])
 def test_groups_hold_what_has_their_label(count):
     labels = np.random.default_rng(5).integers(0, 40, count) // 2 * 2  # odd labels have no members
-    groups = grouping.group_by_label(labels, 40)
+    groups = connectivity.group_by_label(labels, 40)
     for v in range(40):
         assert groups.members[groups.first[v] : groups.first[v + 1]].tolist() == np.flatnonzero(labels == v).tolist()
     asked = np.array([7, 6, 6, 38])
     members, which = groups.of(asked)
     assert [members[which == i].tolist() for i in range(4)] == [np.flatnonzero(labels == v).tolist() for v in asked]
-    renamed = grouping.group_by_label(labels, 40, 100 + np.arange(count))
+    renamed = connectivity.group_by_label(labels, 40, 100 + np.arange(count))
     assert np.array_equal(renamed.members, 100 + groups.members)
 
 
 def test_places_within_runs_and_the_next_in_each_run():
     counts = np.array([2, 0, 3, 1])
-    run, within = grouping.enumerate_runs(counts)
+    run, within = connectivity.enumerate_runs(counts)
     assert list(zip(run.tolist(), within.tolist(), strict=True)) == [(0, 0), (0, 1), (2, 0), (2, 1), (2, 2), (3, 0)]
-    assert grouping.next_in_run(np.array([5, 6, 7, 8, 9, 4]), counts[counts > 0]).tolist() == [6, 5, 8, 9, 7, 4]
+    assert connectivity.next_in_run(np.array([5, 6, 7, 8, 9, 4]), counts[counts > 0]).tolist() == [6, 5, 8, 9, 7, 4]
 
 
 # --- Arrays (m, 4): quadrilaterals are refused where tetrahedra are expected, and no tetrahedra are

@@ -10,7 +10,7 @@ from surfaces import dual, dual_of_sphere
 import heat_igl
 from heat_igl import shapes
 from heat_igl.mesh import PolygonFans, PolygonMesh
-from heat_igl.mesh.polygon_fans import virtual_vertices
+from heat_igl.mesh.polygons import virtual_vertices
 from heat_igl.mesh.triangulation import triangle_fans
 from heat_igl.validation import relative_error
 

@@ -10,9 +10,8 @@ from heat_igl.curves.shortening import as_curve
 from heat_igl.errors import SourceError, names_guessed, positive, truth
 from heat_igl.heat import SignedHeatSolver
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices
-from heat_igl.mesh.grouping import enumerate_runs
-from heat_igl.mesh.projection import ClosestPoints, Projector, checked_points
-from heat_igl.mesh.surface_points import unchecked_curve
+from heat_igl.mesh.connectivity import enumerate_runs
+from heat_igl.mesh.surface_points import ClosestPoints, Projector, checked_points, unchecked_curve
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 

@@ -9,8 +9,7 @@ import scipy.sparse.csgraph as csgraph
 from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.errors import MeshError
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices, edge_curve
-from heat_igl.mesh.connectivity import nonmanifold_vertices
-from heat_igl.mesh.grouping import group_by_label
+from heat_igl.mesh.connectivity import group_by_label, nonmanifold_vertices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 

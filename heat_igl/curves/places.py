@@ -9,8 +9,8 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.mesh import Mesh, SurfacePoints
-from heat_igl.mesh.grouping import group_by_label
-from heat_igl.mesh.projection import points_beside
+from heat_igl.mesh.connectivity import group_by_label
+from heat_igl.mesh.surface_points import points_beside
 from heat_igl.sources import Sources, are_positions, named_vertices
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import FloatArray, IntArray

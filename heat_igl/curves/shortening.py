@@ -12,7 +12,7 @@ from heat_igl.errors import SourceError
 from heat_igl.intrinsic import HalfEdges, corner_angles
 from heat_igl.kernels.paths import shortening, strips
 from heat_igl.mesh import Mesh, SurfaceCurve
-from heat_igl.mesh.grouping import group_by_label
+from heat_igl.mesh.connectivity import group_by_label
 from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray

@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
 from heat_igl.mesh import Mesh, SurfaceCurve, connectivity, level_segments
-from heat_igl.mesh.grouping import next_in_run
+from heat_igl.mesh.connectivity import next_in_run
 from heat_igl.sources import OrientedSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 

@@ -14,7 +14,7 @@ import igl
 import numpy as np
 
 from heat_igl.intrinsic.history import Change, Covered
-from heat_igl.mesh import grouping
+from heat_igl.mesh import connectivity
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 
@@ -121,9 +121,9 @@ class IntrinsicTriangulation:
         return any(isinstance(change, Covered) for change in self.history)
 
     @cached_property
-    def _corners(self) -> grouping.Groups:
+    def _corners(self) -> connectivity.Groups:
         """The corners of faces at each vertex."""
-        return grouping.group_by_label(self.F.ravel(), self.n)
+        return connectivity.group_by_label(self.F.ravel(), self.n)
 
     def corners_at(self, vertices: IntArray) -> tuple[IntArray, IntArray]:
         """The corners (k,) of faces at the given vertices, and for each the position of the vertex in `vertices`."""

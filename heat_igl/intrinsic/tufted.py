@@ -16,7 +16,7 @@ import numpy as np
 from heat_igl.intrinsic.half_edges import mollify
 from heat_igl.intrinsic.history import BACK_CORNERS, Covered
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
-from heat_igl.mesh import Mesh, grouping
+from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import FloatArray
 
 
@@ -56,7 +56,7 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     counterclockwise, clockwise = np.where(along, front, back), np.where(along, back, front)
 
     order = np.lexsort((_angles(mesh), edge))
-    following = grouping.next_in_run(order, mesh.facets.n_faces)
+    following = connectivity.next_in_run(order, mesh.facets.n_faces)
     a, b = counterclockwise[order], clockwise[following]
     twin = np.empty(2 * F.size, np.int64)
     twin[a], twin[b] = b, a

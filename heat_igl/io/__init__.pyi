@@ -1,4 +1,3 @@
-from heat_igl.io.atomic import complete_file as complete_file
 from heat_igl.io.by_nibabel import MAP_SUFFIXES as MAP_SUFFIXES
 from heat_igl.io.curves import CURVE_SUFFIXES as CURVE_SUFFIXES
 from heat_igl.io.curves import Polyline as Polyline
@@ -17,3 +16,4 @@ from heat_igl.io.point_clouds import is_mesh_or_cloud_path as is_mesh_or_cloud_p
 from heat_igl.io.point_clouds import read_mesh_or_cloud as read_mesh_or_cloud
 from heat_igl.io.point_clouds import read_point_cloud as read_point_cloud
 from heat_igl.io.point_clouds import write_point_cloud as write_point_cloud
+from heat_igl.io.storage import complete_file as complete_file

@@ -19,7 +19,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError, MissingExtraError
 from heat_igl.io.contents import Cells, Contents, check, select
-from heat_igl.io.packed import form_suffix
+from heat_igl.io.storage import form_suffix
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
 

@@ -1,7 +1,12 @@
-"""The contents of a mesh file, and checks whose errors name the position in the file."""
+"""The contents of a mesh file: tokens and numbers of text, and checks whose errors name the position in the file.
+
+`Text` stores the positions of lines and tokens as arrays, without a Python object per token, and parses the numbers of
+many lines in one call. Files of a million lines take seconds. Errors name the line of the first bad token.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +17,141 @@ from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.mesh import Mesh, which_repeat_a_vertex
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+_NUMBER = re.compile(rb"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+_SPACE, _SLASH = 32, 47
+
+
+def ragged(start: IntArray, length: IntArray) -> IntArray:
+    """The concatenation of ``range(start[i], start[i] + length[i])``."""
+    before = np.cumsum(length) - length
+    return np.repeat(start - before, length) + np.arange(length.sum())
+
+
+def format_rows(row: str, values: AnyArray) -> str:
+    """Format each row of `values` by the %-format `row`. A float written with ``%r`` is read back exactly."""
+    return (row * len(values)) % tuple(values.ravel().tolist())
+
+
+class Text:
+    """The nonblank lines of a text file, split into tokens at white space.
+
+    `comment` begins a comment, which extends to the end of the line; `continued` says whether a backslash at the end of
+    a line continues it. `first` (k,) is the index of the first token of each nonblank line, and `count` (k,) the number
+    of its tokens. A MeshError if the file is empty or not text.
+    """
+
+    def __init__(self, path: Path, data: bytes, comment: str = "", continued: bool = False) -> None:
+        self.path = path
+        if b"\0" in data:
+            line = data.count(b"\n", 0, data.index(b"\0")) + 1
+            raise MeshError(
+                f"{path}, line {line}: a zero byte, so this is not the plain text its name promises: "
+                "check how the file was made, or save it as UTF-8 text"
+            )
+        if data.startswith(b"\xef\xbb\xbf"):  # the byte order mark of UTF-8
+            data = b"   " + data[3:]
+        if b"\n" not in data:
+            data = data.replace(b"\r", b"\n")
+        self._lines = data  # with all line breaks, for line numbers
+        # Comments are overwritten by blanks, so that positions in the file do not change.
+        if comment and comment.encode() in data:
+            data = re.sub(re.escape(comment).encode() + rb"[^\n]*", _blank, data)
+        if continued and b"\\" in data:
+            data = re.sub(rb"\\[ \t]*\r?\n", _blank, data)
+        self._data = data
+        self._codes = np.frombuffer(data, np.uint8)
+        edge = np.diff((self._codes > _SPACE).view(np.int8), prepend=np.int8(0), append=np.int8(0))
+        self._start = np.flatnonzero(edge == 1)
+        self._end = np.flatnonzero(edge == -1)
+        if not len(self._start):
+            raise MeshError(f"{path}: the file is empty" + (" but for comments" if self._lines.strip() else ""))
+        line_start = np.concatenate([[0], np.flatnonzero(self._codes == ord("\n")) + 1])
+        first = np.searchsorted(self._start, line_start)
+        count = np.diff(first, append=len(self._start))
+        self.first: IntArray = first[count > 0]
+        self.count: IntArray = count[count > 0]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def tokens(self, line: int) -> list[bytes]:
+        """The tokens of a line."""
+        return self._data[self._start[self.first[line]] : self._line_end(line)].split()
+
+    def where(self, line: int) -> str:
+        """Path, line number (counted from 1) and text of a line, for errors."""
+        start = int(self._start[self.first[line]])
+        shown = b" ".join(self.tokens(line)).decode("utf-8", "backslashreplace")
+        shown = shown if len(shown) <= 60 else shown[:57] + "..."
+        return f"{self.path}, line {self._lines.count(10, 0, start) + 1} ({shown})"
+
+    def error(self, line: int, message: str) -> MeshError:
+        """A `MeshError` with `message` that names the line."""
+        return MeshError(f"{self.where(line)}: {message}")
+
+    def words(self, width: int) -> AnyArray:
+        """The first token of each line, cut to `width` bytes, as byte strings."""
+        start, length = self._start[self.first], self._end[self.first] - self._start[self.first]
+        letters = np.zeros((len(start), width), np.uint8)
+        for i in range(min(width, int(length.max(initial=0)))):
+            long = length > i
+            letters[long, i] = self._codes[start[long] + i]
+        return letters.view(f"S{width}").ravel()
+
+    def numbers(self, lines: IntArray, skip: int = 0, up_to_slash: bool = False) -> tuple[FloatArray, IntArray]:
+        """All numbers (t,) in ascending lines (r,), and the index (r,) of the first number of each line.
+
+        `skip` leading tokens of each line are left out; `up_to_slash` reads ``12/3/4`` as 12. A MeshError names the
+        first token that is not a number.
+        """
+        count = np.maximum(self.count[lines] - skip, 0)
+        start = np.cumsum(count) - count
+        filled = lines[count > 0]
+        if not len(filled):
+            return np.empty(0), start
+        # All other tokens are overwritten by blanks; then one call parses the numbers.
+        begin = self._start[self.first[filled] + skip]
+        end = self._end[self.first[filled] + self.count[filled] - 1]
+        codes = self._codes[begin[0] : end[-1]]
+        change = np.zeros(len(codes) + 1, np.int8)
+        change[begin - begin[0]] = 1
+        change[end - begin[0]] = -1
+        codes = np.where(np.cumsum(change[:-1], dtype=np.int8), codes, np.uint8(_SPACE))
+        if up_to_slash and (codes == _SLASH).any():
+            # From the first slash of a token to its end.
+            stop = np.flatnonzero((codes == _SLASH) | (codes <= _SPACE))
+            turn = np.diff((codes[stop] == _SLASH).view(np.int8), prepend=np.int8(0))
+            change = np.zeros(len(codes), np.int8)
+            change[stop] = turn
+            codes[np.cumsum(change, dtype=np.int8).view(bool)] = _SPACE
+        for kind in (np.int64, np.float64)[not up_to_slash :]:  # integers are read in an eighth of the time
+            try:
+                values = np.fromstring(codes.tobytes(), kind, sep=" ")
+            except (ValueError, DeprecationWarning):  # the exception depends on the version of numpy
+                continue
+            if len(values) == count.sum():
+                return values.astype(np.float64, copy=False), start
+        raise self._not_a_number(filled, skip, up_to_slash)
+
+    def all_numbers(self) -> FloatArray:
+        """The numbers of all lines, for formats in which line breaks have no meaning."""
+        return self.numbers(np.arange(len(self)))[0]
+
+    def _line_end(self, line: int) -> int:
+        return int(self._end[self.first[line] + self.count[line] - 1])
+
+    def _not_a_number(self, lines: IntArray, skip: int, up_to_slash: bool) -> MeshError:
+        for line in lines.tolist():
+            for token in self.tokens(line)[skip:]:
+                number = token.split(b"/")[0] if up_to_slash else token
+                if not _NUMBER.fullmatch(number):
+                    return self.error(line, f"'{token[:40].decode('utf-8', 'backslashreplace')}' is not a number")
+        return self.error(int(lines[0]), "this line, or one below, holds something that is not a number")
+
+
+def _blank(match: re.Match[bytes]) -> bytes:
+    return b" " * len(match.group())
 
 
 class Cells(NamedTuple):

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError, MissingExtraError, real_numbers, shown
-from heat_igl.io.atomic import replacing
-from heat_igl.io.text import format_rows
+from heat_igl.io.contents import format_rows
+from heat_igl.io.storage import replacing
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, as_simplices, flat_curves
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 

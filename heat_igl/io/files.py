@@ -17,9 +17,8 @@ import numpy as np
 
 from heat_igl.errors import MeshError, names_guessed
 from heat_igl.io import by_meshio, by_nibabel, obj, off, ply
-from heat_igl.io.atomic import replacing
 from heat_igl.io.contents import Contents
-from heat_igl.io.packed import form_suffix, is_packed, pack, unpacked
+from heat_igl.io.storage import form_suffix, is_packed, pack, replacing, unpacked
 from heat_igl.mesh import Mesh, MeshLike, PolygonMesh, as_simplices, warn_of_seams
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 

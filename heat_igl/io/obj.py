@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError
-from heat_igl.io.contents import Cells, Contents, check, integers, warn_if_cut
-from heat_igl.io.text import Text, format_rows
+from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, integers, warn_if_cut
 from heat_igl.mesh import Mesh
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import FloatArray, IntArray

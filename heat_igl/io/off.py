@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, check, integers, warn_if_cut
-from heat_igl.io.text import Text, format_rows, ragged
+from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, integers, ragged, warn_if_cut
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError, shown
 from heat_igl.io import ply
-from heat_igl.io.atomic import replacing
+from heat_igl.io.contents import Text, format_rows
 from heat_igl.io.files import (
     MESH_SUFFIXES,
     POINT_SUFFIXES,
@@ -21,8 +21,7 @@ from heat_igl.io.files import (
     is_mesh_path,
     read_mesh,
 )
-from heat_igl.io.packed import form_suffix, pack
-from heat_igl.io.text import Text, format_rows
+from heat_igl.io.storage import form_suffix, pack, replacing
 from heat_igl.mesh import Mesh, PointCloud, usable_normals
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 

@@ -18,8 +18,7 @@ from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles
 from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, unique_rows
-from heat_igl.mesh.grouping import group_by_label
+from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, group_by_label, unique_rows
 from heat_igl.mesh.neighbourhoods import Neighbourhoods, PointTree
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray

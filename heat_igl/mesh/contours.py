@@ -1,4 +1,4 @@
-"""The segments at which values cross a level, one for each triangle, and segments joined to curves."""
+"""Curves on a mesh: where values cross a level, along edges, around regions, and segments joined to curves."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.errors import SourceError, as_array, truth
 from heat_igl.mesh.mesh import Mesh
-from heat_igl.mesh.surface_points import SurfaceCurve
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.mesh.objects import MeshLike, as_simplices
+from heat_igl.mesh.surface_points import SurfaceCurve, require_triangles
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 
 class Crossings(NamedTuple):
@@ -151,3 +153,128 @@ def _chains(ends: IntArray) -> list[tuple[IntArray, bool]]:
             seen[segment // 2] = 1
         chains.append((chain, is_closed))
     return chains
+
+
+def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> SurfaceCurve:
+    """The curve along edges of a triangle mesh from vertex to vertex.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles.
+    vertices : (k,) array_like of int
+        Each joined with the next by an edge.
+    closed : bool
+        Whether an edge leads from the last back to the first.
+
+    Returns
+    -------
+    SurfaceCurve
+        With a segment for each edge.
+
+    Raises
+    ------
+    SourceError
+        If no edge joins a vertex with the next; the message names the first such pair.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.strip(5, 1)
+    >>> row = heat_igl.edge_curve(mesh, [0, 1, 2, 3, 4, 5])
+    >>> float(row.lengths(mesh).sum())
+    5.0
+    >>> heat_igl.geodesic_distance(mesh, row)[6:].round(6).tolist()
+    [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+    """
+    mesh, closed = as_simplices(mesh), truth("closed", closed)
+    require_triangles(mesh)
+    path = np.atleast_1d(as_array("vertices", vertices, SourceError))
+    if path.ndim != 1 or path.dtype.kind not in "iu" or len(path) < 2:
+        raise SourceError(f"vertices must be two vertex indices or more, not {path.dtype} of shape {path.shape}")
+    path = np.append(path, path[0]) if closed else path
+    edges, n = mesh.facets.vertices, mesh.n_vertices
+    pairs = np.sort(np.stack([path[:-1], path[1:]], axis=1).astype(np.int64), axis=1)
+    # Rows of `edges` are in lexicographic order.
+    at = np.searchsorted(edges[:, 0] * n + edges[:, 1], pairs[:, 0] * n + pairs[:, 1])
+    at = np.minimum(at, len(edges) - 1)
+    missing = (edges[at] != pairs).any(axis=1)
+    if missing.any():
+        first = int(np.flatnonzero(missing)[0])
+        raise SourceError(
+            f"vertices[{first}] = {path[first]} and the next, {path[first + 1]}, are not joined by an edge: "
+            "name neighbours, or project the polyline with curve_on"
+        )
+    face_of = np.empty(len(edges), np.int64)
+    face_of[mesh.facets.of_face.ravel()] = np.repeat(np.arange(mesh.n_faces), 3)
+    faces = face_of[at]
+    start, end = ((mesh.F[faces] == ends[:, None]).astype(float) for ends in (path[:-1], path[1:]))
+    return SurfaceCurve(faces, start, end, is_closed=closed, mesh=mesh)
+
+
+def region_boundary(
+    mesh: MeshLike, *, faces: ArrayLike | None = None, vertices: ArrayLike | None = None
+) -> list[SurfaceCurve]:
+    """The curves around a region of a triangle mesh, with the region on their left.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles.
+    faces : (m,) array_like of bool, optional
+        The faces of the region. The curves run along edges.
+    vertices : (n,) array_like of bool, optional
+        The vertices of the region. The curves run through the midpoints of the edges that leave it.
+
+    Returns
+    -------
+    list of SurfaceCurve
+        In the order of their first faces. The boundary of the mesh is no part of them: a curve that meets it is open.
+        Curves along edges also end at a vertex at which the region touches itself.
+
+    Raises
+    ------
+    SourceError
+        If not exactly one of the two masks is given, a mask has the wrong length or type, or the region has no
+        boundary inside the mesh; if the mesh is tetrahedral.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> mesh = heat_igl.shapes.grid(8)
+    >>> centre = mesh.V[mesh.F].mean(axis=1)
+    >>> region = (abs(centre[:, :2] - 0.5) < 0.25).all(axis=1)  # a square of side 1/2
+    >>> (curve,) = heat_igl.mesh.region_boundary(mesh, faces=region)
+    >>> curve.is_closed, float(curve.lengths(mesh).sum())
+    (True, 2.0)
+    """
+    triangles = as_simplices(mesh)
+    require_triangles(triangles)
+    if (faces is None) == (vertices is None):
+        raise SourceError("give one mask of the region: faces or vertices")
+    if faces is not None:
+        segments = _along_edges(triangles, _checked_mask("faces", faces, triangles.n_faces))
+    else:
+        mask = _checked_mask("vertices", vertices, triangles.n_vertices)
+        segments = level_segments(triangles, np.where(mask, 0.0, 1.0), 0.5)
+    if not len(segments.faces):
+        raise SourceError("the region has no boundary inside the mesh: it is empty, or consists of whole components")
+    return joined_segments(segments, triangles)
+
+
+def _along_edges(mesh: Mesh, is_inside: BoolArray) -> Segments:
+    """The sides of faces (m,) of a region at which other faces lie, in the direction around the faces."""
+    edges = mesh.facets.of_face
+    n_inside = np.bincount(edges[is_inside].ravel(), minlength=len(mesh.facets.vertices))
+    leaves = (n_inside > 0) & (n_inside < mesh.facets.n_faces)
+    face, corner = np.nonzero(leaves[edges] & is_inside[:, None])
+    tail, head = (corner + 1) % 3, (corner + 2) % 3
+    ends = np.stack([mesh.F[face, tail], mesh.F[face, head]], axis=1)
+    return Segments(face, np.eye(3)[tail], np.eye(3)[head], ends)
+
+
+def _checked_mask(name: str, mask: ArrayLike | None, size: int) -> BoolArray:
+    given = as_array(name, mask, SourceError)
+    if given.dtype.kind != "b" or given.shape != (size,):
+        raise SourceError(f"{name} must be a mask of bool of shape ({size},), not {given.dtype} of shape {given.shape}")
+    return given

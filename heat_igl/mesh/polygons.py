@@ -1,4 +1,4 @@
-"""Meshes of polygons, validated on construction."""
+"""Meshes of polygons, validated on construction, and their triangles around a virtual vertex inside each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from heat_igl.errors import MeshError, shown
-from heat_igl.mesh.grouping import next_in_run
+from heat_igl.mesh.connectivity import enumerate_runs, next_in_run
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -167,3 +167,188 @@ def _check(corners: IntArray, degree: IntArray, n: int) -> None:
             f"{name(int(np.argmax(repeated)))} repeats a vertex ({int(repeated.sum())} of {len(degree)} polygons do): "
             "split such polygons, or remove them if they have no area"
         )
+
+
+# A triangle whose height over a side is below this share of that side has no orientation, and its polygon gets no fan.
+_FLAT = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class PolygonFans:
+    """The triangles between the sides and the virtual vertex of each polygon.
+
+    A triangle stays as it is. A polygon whose virtual vertex does not see every side, as a very concave one, or one
+    without area, is taken as its triangles in ``mesh.triangles``.
+
+    Attributes
+    ----------
+    polygons : PolygonMesh
+        n vertices, m polygons.
+    mesh : Mesh
+        The triangles, in the order of the polygons, on these vertices and the virtual ones after them.
+    first : (m + 1,) int64
+        The triangles of polygon i are ``first[i]`` to ``first[i + 1]``.
+    """
+
+    polygons: PolygonMesh
+    mesh: Mesh
+    first: IntArray
+
+    @classmethod
+    def of(cls, polygons: PolygonMesh) -> PolygonFans:
+        """The fans of all polygons."""
+        degree, points = polygons.degree, virtual_vertices(polygons)
+        has_fan = (degree > 3) & _sees_every_side(polygons, points)
+        row = polygons.n_vertices + np.cumsum(has_fan) - 1
+        owner = np.repeat(np.arange(len(degree)), degree)
+        owner_of_triangle, _ = enumerate_runs(degree - 2)
+        in_fan, apart = has_fan[owner], ~has_fan[owner_of_triangle]
+        fans = np.stack([polygons.corners, polygons.following, row[owner]], axis=1)[in_fan]
+        F = np.concatenate([fans, polygons.triangles.F[apart]])
+        order = np.argsort(np.concatenate([owner[in_fan], owner_of_triangle[apart]]), kind="stable")
+        first = np.concatenate([[0], np.cumsum(np.where(has_fan, degree, degree - 2))])
+        return cls(polygons, Mesh(np.concatenate([polygons.V, points[has_fan]]), F[order]), first)
+
+    def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Points in ``polygons.triangles``, carried to `mesh`.
+
+        A point of a planar polygon stays where it is, and so does one on a side; another moves to the triangle of the
+        fan above or below it.
+
+        Parameters
+        ----------
+        faces, barycentric : (k,) int64, (k, 3) float64
+            Triangles of ``polygons.triangles``, and coordinates in them.
+
+        Returns
+        -------
+        faces, barycentric : (k,) int64, (k, 3) float64
+            Triangles of `mesh`, and coordinates in them.
+        """
+        polygon, moved, is_fanned = self._kept(faces)
+        at = np.flatnonzero(is_fanned)
+        if not len(at):
+            return moved, barycentric
+        X = np.einsum("kc,kcx->kx", barycentric[at], self.polygons.V[self.polygons.triangles.F[faces[at]]])
+        barycentric = barycentric.copy()
+        moved[at], barycentric[at] = self._nearest(polygon[at], X)
+        return moved, barycentric
+
+    def carry_segments(
+        self, faces: IntArray, start: FloatArray, end: FloatArray
+    ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+        """Segments in ``polygons.triangles``, cut where they pass from one triangle of `mesh` to the next.
+
+        Parameters
+        ----------
+        faces, start, end : (s,) int64, (s, 3) float64, (s, 3) float64
+            Triangles of ``polygons.triangles``, and the coordinates of both ends in them.
+
+        Returns
+        -------
+        which : (k,) int64
+            The segment that each piece belongs to.
+        faces, start, end : (k,) int64, (k, 3) float64, (k, 3) float64
+            As the arguments, in `mesh`.
+        """
+        polygon, moved, is_fanned = self._kept(faces)
+        whole, cut = np.flatnonzero(~is_fanned), np.flatnonzero(is_fanned)
+        corners = self.polygons.V[self.polygons.triangles.F[faces[cut]]]
+        begin, along = (np.einsum("kc,kcx->kx", part[cut], corners) for part in (start, end - start))
+        which, low, high = _pieces(begin, along, polygon[cut], self)
+        middle, _ = self._nearest(polygon[cut][which], begin[which] + ((low + high) / 2)[:, None] * along[which])
+        ends = [_barycentric(self.mesh, middle, begin[which] + at[:, None] * along[which]) for at in (low, high)]
+        return (
+            np.concatenate([whole, cut[which]]),
+            np.concatenate([moved[whole], middle]),
+            np.concatenate([start[whole], _inside(ends[0])]),
+            np.concatenate([end[whole], _inside(ends[1])]),
+        )
+
+    def _kept(self, faces: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
+        """Of triangles (k,) of the polygons: their polygons, the same in `mesh`, and whether a fan replaced them."""
+        of_triangle, position = enumerate_runs(self.polygons.degree - 2)
+        polygon = of_triangle[faces]
+        is_fanned = np.diff(self.first)[polygon] == self.polygons.degree[polygon]
+        return polygon, self.first[polygon] + position[faces], is_fanned
+
+    def _nearest(self, polygon: IntArray, X: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Of each polygon (k,), the triangle that points X (k, 3) lie in, or are the least outside of."""
+        which, position = enumerate_runs(self.first[polygon + 1] - self.first[polygon])
+        triangle = self.first[polygon][which] + position
+        barycentric = _barycentric(self.mesh, triangle, X[which])
+        order = np.lexsort((-barycentric.min(axis=1), which))
+        chosen = order[np.diff(which[order], prepend=-1) != 0]
+        return triangle[chosen], _inside(barycentric[chosen])
+
+
+def virtual_vertices(mesh: PolygonMesh) -> FloatArray:
+    """The point (m, 3) of each polygon with the least sum of squared areas of the triangles to the sides.
+
+    Twice the vector area of the triangle on a side e is a + e x p, with a that for p = 0, so p is the solution of three
+    linear equations (Bunge et al. 2020, section 3.2). Any solution, if the polygon lies on a line.
+    """
+    begin = np.cumsum(mesh.degree) - mesh.degree
+    centre = np.add.reduceat(mesh.V[mesh.corners], begin) / mesh.degree[:, None]
+    here, there = (mesh.V[ends] - np.repeat(centre, mesh.degree, axis=0) for ends in (mesh.corners, mesh.following))
+    e, a = there - here, np.cross(here, there)
+    # The cross product with e, squared, is |e|^2 I - e e^T.
+    squares = np.einsum("kx,kx->k", e, e)[:, None, None] * np.eye(3) - e[:, :, None] * e[:, None]
+    inverse = np.linalg.pinv(np.add.reduceat(squares, begin), hermitian=True)
+    return np.asarray(centre + np.einsum("mxy,my->mx", inverse, np.add.reduceat(np.cross(e, a), begin)))
+
+
+def _sees_every_side(mesh: PolygonMesh, points: FloatArray) -> BoolArray:
+    """Whether all triangles of a polygon's fan are turned like the polygon (m,)."""
+    begin = np.cumsum(mesh.degree) - mesh.degree
+    there = np.repeat(points, mesh.degree, axis=0)
+    one, other = mesh.V[mesh.corners] - there, mesh.V[mesh.following] - there
+    normals = np.cross(one, other)
+    total = np.add.reduceat(normals, begin)
+    length = np.linalg.norm(total, axis=1)
+    axis = total / np.where(length > 0, length, 1)[:, None]
+    area = np.einsum("kx,kx->k", normals, np.repeat(axis, mesh.degree, axis=0))
+    side = other - one
+    return np.asarray(np.logical_and.reduceat(area > _FLAT * np.einsum("kx,kx->k", side, side), begin))
+
+
+def _pieces(
+    begin: FloatArray, along: FloatArray, polygon: IntArray, fans: PolygonFans
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Pieces of segments (s, 3) between the edges of fans: which segment (k,), and shares (k,) at which they end.
+
+    An edge is crossed if the segment crosses the plane through it that is normal to the triangle.
+    """
+    which, position = enumerate_runs(3 * np.diff(fans.first)[polygon])
+    triangle, corner = fans.first[polygon][which] + position // 3, position % 3
+    P = fans.mesh.V[fans.mesh.F[triangle]]
+    a, b, c = (P[np.arange(len(which)), (corner + i) % 3] for i in range(3))
+    outward = np.cross(b - a, np.cross(b - a, c - a))
+    height, slope = (np.einsum("kx,kx->k", outward, part) for part in (a - begin[which], along[which]))
+    share = np.divide(height, slope, out=np.full(len(which), -1.0), where=slope != 0)
+    place = np.einsum("kx,kx->k", begin[which] + share[:, None] * along[which] - a, b - a)
+    crossed = (share > _FLAT) & (share < 1 - _FLAT) & (place >= 0) & (place <= np.einsum("kx,kx->k", b - a, b - a))
+    s = np.arange(len(begin))
+    which = np.concatenate([s, which[crossed], s])
+    share = np.concatenate([np.zeros(len(s)), share[crossed], np.ones(len(s))])
+    order = np.lexsort((share, which))
+    which, share = which[order], share[order]
+    # Both triangles at an edge are crossed there.
+    piece = np.flatnonzero((which[1:] == which[:-1]) & (np.diff(share) > _FLAT))
+    return which[piece], share[piece], share[piece + 1]
+
+
+def _barycentric(mesh: Mesh, faces: IntArray, X: FloatArray) -> FloatArray:
+    """Coordinates (k, 3) in `faces` of the points below or above X (k, 3)."""
+    a, b, c = (mesh.V[mesh.F[faces, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    doubled = np.stack([np.cross(c - b, X - b), np.cross(a - c, X - c), np.cross(b - a, X - a)], axis=1)
+    squared = np.einsum("kx,kx->k", normal, normal)
+    parts = np.einsum("kcx,kx->kc", doubled, normal)
+    return np.asarray(np.divide(parts, squared[:, None], out=np.full_like(parts, -1.0), where=squared[:, None] > 0))
+
+
+def _inside(barycentric: FloatArray) -> FloatArray:
+    """Coordinates (k, 3) moved into their triangles."""
+    inside = np.maximum(barycentric, 0)
+    return np.asarray(inside / inside.sum(axis=1, keepdims=True))

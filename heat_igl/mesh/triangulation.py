@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.mesh.grouping import enumerate_runs, next_in_run
+from heat_igl.mesh.connectivity import enumerate_runs, next_in_run
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 # Twice the area of a triangle is rounded by some 1e-16 of the square of the polygon's extent; below this share of it a

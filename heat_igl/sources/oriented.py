@@ -10,8 +10,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
-from heat_igl.mesh.projection import rows_in_space
-from heat_igl.mesh.surface_points import require_faces
+from heat_igl.mesh.surface_points import require_faces, rows_in_space
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from heat_igl.errors import SourceError, real_numbers, refuse_masked
 from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
-from heat_igl.mesh import ON_SIDE, Mesh, MeshPart, SurfaceCurve, SurfacePoints, grouping
-from heat_igl.mesh.projection import points_beside
-from heat_igl.mesh.surface_points import require_faces
+from heat_igl.mesh import ON_SIDE, Mesh, MeshPart, SurfaceCurve, SurfacePoints, connectivity
+from heat_igl.mesh.surface_points import points_beside, require_faces
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 
@@ -374,7 +373,7 @@ def samples(
     along = np.einsum("kc,kcx->kx", end - start, lay_out(triangulation.l[faces]))
     lengths = np.linalg.norm(along, axis=1)
     counts = np.ceil(lengths / spacing).astype(np.int64)
-    which, piece = grouping.enumerate_runs(counts)
+    which, piece = connectivity.enumerate_runs(counts)
     share = (piece + 0.5) / counts[which]
     barycentric = (1 - share)[:, None] * segments.start[which] + share[:, None] * segments.end[which]
     points = SourcePoints(segments.faces[which], barycentric, segments.label[which], segments.offset[which])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.kernels.mesh import bounds
-from heat_igl.mesh.grouping import group_by_label
+from heat_igl.mesh.connectivity import group_by_label
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine
