@@ -381,6 +381,26 @@ def split(refined: Refined, move: int, faces: IntArray, barycentric: FloatArray)
                 break
 
 
+def flip(refined: Refined, move: int, faces: IntArray, barycentric: FloatArray) -> None:
+    """Carry points through one flip: lay out both triangles beside their edge, and solve in the two new ones."""
+    _, ab, ba = refined.kind[move]
+    lengths = refined.numbers[move]
+    (_, b, p), (_, _, q) = lay_out(lengths[[[2, 1, 0], [4, 3, 0]]])
+    place = {"a": np.zeros(2), "b": b, "p": p, "q": q * [1, -1]}
+    # The corner opposite the edge comes first.
+    before, after = {ab: "pab", ba: "qba"}, {ab: "paq", ba: "qbp"}
+    for i in np.flatnonzero((faces == ab // 3) | (faces == ba // 3)):
+        old = ab if faces[i] == ab // 3 else ba
+        at = np.roll(barycentric[i], -(old % 3)) @ [place[corner] for corner in before[old]]
+        for new, corners in after.items():
+            found = np.linalg.solve(
+                np.vstack([np.transpose([place[corner] for corner in corners]), np.ones(3)]), [*at, 1]
+            )
+            if found.min() >= -1e-12:
+                faces[i], barycentric[i] = new // 3, np.roll(found, new % 3)
+                break
+
+
 def test_points_are_carried_move_by_move(coarse):
     rng = np.random.default_rng(0)
     fine = delaunay_refinement(coarse, coarse.n + 60)
@@ -390,15 +410,27 @@ def test_points_are_carried_move_by_move(coarse):
     barycentric = rng.dirichlet([1, 1, 1], 200)
     expected_faces, expected = faces.copy(), barycentric.copy()
     for move in range(len(refined.kind)):
-        if refined.kind[move, 0] == 0:
-            split(refined, move, expected_faces, expected)
-        else:
-            flip = Flipped(refined.kind[move, 1:2], refined.kind[move, 2:3], refined.numbers[move, :, None])
-            expected_faces, expected = flip.carry(expected_faces, expected)
+        (flip if refined.kind[move, 0] else split)(refined, move, expected_faces, expected)
     found_faces, found = refined.carry(faces, barycentric)
     assert np.array_equal(found_faces, expected_faces)
     assert np.abs(found - expected).max() < 1e-9
     assert (found_faces >= len(coarse.F)).mean() > 0.1
+    # Flips in rounds, the same way.
+    mesh = stretched()
+    triangulation = intrinsic_triangulation(mesh)
+    flipped = intrinsic_delaunay(triangulation)
+    assert flipped.n_flips > 10
+    expected_faces, expected = faces, barycentric
+    for change in flipped.history:
+        assert isinstance(change, Flipped)
+        expected_faces, expected = expected_faces.copy(), expected.copy()
+        kind = np.stack([np.ones(len(change.mate), int), change.half_edge, change.mate], axis=1)
+        one = Refined(kind, np.ascontiguousarray(change.lengths.T), faces, kind)
+        for move in range(len(kind)):
+            flip(one, move, expected_faces, expected)
+    found_faces, found = flipped.locate(faces, barycentric)
+    assert np.array_equal(found_faces, expected_faces)
+    assert np.abs(found - expected).max() < 1e-9
 
 
 def test_points_keep_their_distance_from_a_vertex(coarse, fine):

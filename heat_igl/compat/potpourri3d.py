@@ -489,7 +489,7 @@ def _from_vertices(
     return _signed_distance(SignedHeatSolver(mesh, t_coef=t_coef), parts, constraint)
 
 
-class _OnCurves:
+class _FromCurves:
     """What solvers of distance from curves share."""
 
     _mesh: Mesh
@@ -499,7 +499,7 @@ class _OnCurves:
         return _CurveReader(self._mesh)
 
 
-class MeshSignedHeatSolver(_OnCurves):
+class MeshSignedHeatSolver(_FromCurves):
     """Distance with a sign from curves: that of `SignedHeatSolver`, with the opposite sign as in potpourri3d.
 
     Parameters
@@ -558,7 +558,7 @@ class MeshSignedHeatSolver(_OnCurves):
         return self._unsigned.distance(others)
 
 
-class MeshFastMarchingDistanceSolver(_OnCurves):
+class MeshFastMarchingDistanceSolver(_FromCurves):
     """Distance from points and curves without a linear system: `geodesic_distance`, or `SignedHeatSolver` with a sign.
 
     Parameters

@@ -12,6 +12,7 @@ from heat_igl.curves.places import corners
 from heat_igl.errors import MeshError, SourceError
 from heat_igl.intrinsic import lay_out
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, named_entries
+from heat_igl.mesh.surface_points import require_faces
 from heat_igl.typing import FloatArray, IntArray
 
 # Corners of curves are put on a grid of this many steps along each side of a face, so that integers hold them exactly.
@@ -69,13 +70,7 @@ def cut(mesh: MeshLike, curves: NestedCurves) -> CutMesh:
     for name, curve in entries:
         if not isinstance(curve, SurfaceCurve):
             raise SourceError(f"{name} must be a SurfaceCurve, not {type(curve).__name__}")
-        outside = (curve.faces < 0) | (curve.faces >= triangles.n_faces)
-        if outside.any():
-            first = int(np.argmax(outside))
-            raise SourceError(
-                f"{name}.faces[{first}] = {curve.faces[first]} is no face: indices run from 0 to "
-                f"{triangles.n_faces - 1}"
-            )
+        require_faces(curve.faces, triangles.n_faces, f"{name}.")
     return _Cut(triangles, [curve for _, curve in entries]).result()
 
 
@@ -89,7 +84,8 @@ class _Cut:
         count = len(self._faces)
         ends = _on_grid(np.concatenate([curve.start for curve in curves] + [curve.end for curve in curves]))
         self._ends = ends.reshape(2, count, 3)
-        self._place: list[tuple[int, tuple[float, ...]]] = []
+        # Of new vertices, which are numbered in this order: a face, and the barycentric coordinates in it.
+        self._place: list[tuple[int, list[float]]] = []
         self._on_edge: dict[int, list[tuple[int, int]]] = {}
         self._node = self._nodes_on_edges(np.tile(self._faces, 2), ends).reshape(2, count)
         self._edges: list[tuple[int, int]] = []
@@ -146,10 +142,16 @@ class _Cut:
         is_new = np.ones(len(on), bool)
         is_new[1:] = (edge[1:] != edge[:-1]) | (step[1:] - step[:-1] > _SAME * _STEPS)
         node[on[order]] = n + np.cumsum(is_new) - 1
-        for e, s in zip(edge[is_new].tolist(), step[is_new].tolist(), strict=True):
-            number = n + len(self._place)
-            self._on_edge.setdefault(e, []).append((s, number))
-            self._place.append((-1 - e, (1 - s / _STEPS, s / _STEPS)))
+        # In the first face of the edge.
+        first = np.empty(len(mesh.facets.vertices), np.int64)
+        first[mesh.facets.of_face.ravel()[::-1]] = np.arange(mesh.F.size)[::-1]
+        edge, step = edge[is_new], step[is_new]
+        face = first[edge] // 3
+        corner = mesh.F[face][:, :, None] == mesh.facets.vertices[edge][:, None]
+        weights = np.einsum("kce,ke->kc", corner, np.stack([_STEPS - step, step], axis=1) / _STEPS)
+        self._place += zip(face.tolist(), weights.tolist(), strict=True)
+        for i, (e, s) in enumerate(zip(edge.tolist(), step.tolist(), strict=True)):
+            self._on_edge.setdefault(e, []).append((s, n + i))
         return node
 
     def _cut_face(self, face: int, flat: FloatArray, segments: IntArray) -> list[tuple[int, int, int]]:
@@ -204,7 +206,7 @@ class _Cut:
     def _added(self, face: int, point: Point) -> int:
         """A new vertex inside a face."""
         total = sum(point)
-        self._place.append((face, tuple(weight / total for weight in point)))
+        self._place.append((face, [weight / total for weight in point]))
         return self._mesh.n_vertices + len(self._place) - 1
 
     def _places(self) -> SurfacePoints:
@@ -217,17 +219,8 @@ class _Cut:
         faces[used] = corner[used] // 3
         barycentric[:n, 0] = 1
         barycentric[used] = np.eye(3)[corner[used] % 3]
-        first = np.empty(len(mesh.facets.vertices), np.int64)
-        first[mesh.facets.of_face.ravel()[::-1]] = np.arange(mesh.F.size)[::-1]
-        for i, (where, weights) in enumerate(self._place):
-            if where >= 0:
-                faces[n + i], barycentric[n + i] = where, weights
-                continue
-            edge = -1 - where
-            face = first[edge] // 3
-            faces[n + i] = face
-            for vertex, weight in zip(mesh.facets.vertices[edge].tolist(), weights, strict=True):
-                barycentric[n + i, mesh.F[face].tolist().index(vertex)] = weight
+        for i, (face, weights) in enumerate(self._place, n):
+            faces[i], barycentric[i] = face, weights
         return SurfacePoints(faces, barycentric)
 
 

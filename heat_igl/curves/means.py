@@ -89,7 +89,7 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     weight = _checked_weights(weights, len(faces))
     power = _checked_power(p)
     used = weight > 0
-    search = _Search(triangles, Tracer(mesh), faces[used], barycentric[used], weight[used], power)
+    search = _Mean(triangles, Tracer(mesh), faces[used], barycentric[used], weight[used], power)
     return search.found()
 
 
@@ -108,7 +108,7 @@ class _State(NamedTuple):
         return SurfacePoints(np.array([self.face]), self.barycentric[None])
 
 
-class _Search:
+class _Mean:
     """The points, with the weights and the power of their distances."""
 
     def __init__(

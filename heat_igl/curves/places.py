@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.errors import SourceError
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.mesh.connectivity import group_by_label
-from heat_igl.mesh.surface_points import points_beside
+from heat_igl.mesh.surface_points import points_beside, require_faces, require_triangles
 from heat_igl.sources import Sources, are_positions, named_vertices
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import FloatArray, IntArray
@@ -25,10 +25,8 @@ def places(name: str, mesh: Mesh, points: Sources, corner_at: IntArray | None = 
     `name` is the name of the argument, for messages; `corner_at`, the result of `corners`, saves time in many calls.
     """
     if isinstance(points, SurfacePoints):
-        try:
-            points.positions(mesh)  # which checks the faces
-        except SourceError as error:
-            raise SourceError(f"{name}: {error}") from None
+        require_triangles(mesh)
+        require_faces(points.faces, mesh.n_faces, f"{name}: ")
         return points.faces, on_simplex(points.barycentric)
     rows = isinstance(points, np.ndarray | list | tuple) and len(points) > 0 and np.ndim(points[0]) == 1
     if rows or are_positions(points):

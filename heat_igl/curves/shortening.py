@@ -13,7 +13,7 @@ from heat_igl.intrinsic import HalfEdges, corner_angles
 from heat_igl.kernels.paths import shortening, strips
 from heat_igl.mesh import Mesh, SurfaceCurve
 from heat_igl.mesh.connectivity import group_by_label
-from heat_igl.mesh.surface_points import unchecked_curve
+from heat_igl.mesh.surface_points import require_faces, unchecked_curve
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -57,8 +57,7 @@ def course_of(mesh: Mesh, curve: SurfaceCurve) -> FaceSequence:
     A `SourceError` if its segments do not join, a face is none of the mesh, or a closed curve has no length.
     """
     faces = curve.faces
-    if faces.min() < 0 or faces.max() >= mesh.n_faces:
-        curve.positions(mesh)  # which says what is wrong
+    require_faces(faces, mesh.n_faces)
     count = len(curve) if curve.is_closed else len(curve) - 1
     corner = mesh.V[mesh.F[faces]]
     begins, ends = (np.einsum("kc,kcx->kx", place, corner) for place in (curve.start, curve.end))

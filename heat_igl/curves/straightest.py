@@ -12,6 +12,7 @@ from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels.paths import straightest
 from heat_igl.mesh import MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
 from heat_igl.mesh.cloud_orientation import on_one_side
+from heat_igl.mesh.surface_points import require_faces
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.sources.source_sets import on_simplex
@@ -141,25 +142,6 @@ class _Starts(NamedTuple):
     barycentric: FloatArray
     vertices: IntArray
 
-    def repeated(self, k: int) -> _Starts:
-        """The first point k times."""
-        return _Starts(
-            np.repeat(self.faces[:1], k), np.repeat(self.barycentric[:1], k, axis=0), np.repeat(self.vertices[:1], k)
-        )
-
-
-class _Ends(NamedTuple):
-    """Ends of k geodesics: faces and barycentric coordinates, and the lengths."""
-
-    faces: IntArray
-    barycentric: FloatArray
-    lengths: FloatArray
-
-    @classmethod
-    def of(cls, k: int) -> _Ends:
-        """Room for k geodesics."""
-        return cls(np.empty(k, np.int64), np.empty((k, 3)), np.empty(k))
-
 
 class Tracer:
     """Straightest geodesics of one mesh: its frames, and the tables of the kernel.
@@ -190,13 +172,26 @@ class Tracer:
         if not k:
             raise ValueError(f"vectors must be one vector or more, but it has shape {array.shape}")
         if len(begin.faces) == 1:
-            begin = begin.repeated(k)
+            again = np.zeros(k, np.int64)
+            begin = _Starts(begin.faces[again], begin.barycentric[again], begin.vertices[again])
         elif len(begin.faces) != k:
             raise SourceError(f"source must be one point, or one for each of the {k} vectors, not {len(begin.faces)}")
         turn, size = self.directions("vectors", begin, array)
         self.refuse_endless("vectors", size)
-        found = self.ends(begin, turn, size)
-        return SurfacePoints(found.faces, found.barycentric)
+        faces, barycentric, lengths = self._room(k)
+
+        def work(part: slice) -> None:
+            given = (begin.faces[part], begin.barycentric[part], turn[part], size[part])
+            kernel.trace(self._triangles, *given, faces[part], barycentric[part], lengths[part])
+
+        bounds = np.linspace(0, k, (n_threads() if k >= _FEW else 1) + 1).astype(int)
+        side_by_side(work, [slice(*ends) for ends in pairwise(bounds)])
+        return SurfacePoints(*on_one_side(faces, barycentric, self._mesh.n_faces))
+
+    @staticmethod
+    def _room(k: int) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Room for the ends of k geodesics, faces and barycentric coordinates, and for their lengths."""
+        return np.empty(k, np.int64), np.empty((k, 3)), np.empty(k)
 
     def refuse_endless(self, name: str, lengths: FloatArray) -> None:
         """Raise ValueError for lengths (k,) that would take minutes to trace, which another unit is the reason of."""
@@ -215,7 +210,7 @@ class Tracer:
         A point in a vertex is the vertex for components `in_frame`; a vector in space is in the plane of its face.
         """
         if isinstance(points, SurfacePoints):
-            points.positions(self._mesh)  # which checks the faces
+            require_faces(points.faces, self._mesh.n_faces)
             weights = on_simplex(points.barycentric)
             corner = self._surface.F[points.faces, weights.argmax(axis=1)]
             vertices = np.where((weights.max(axis=1) == 1) & in_frame, corner, -1)
@@ -261,25 +256,9 @@ class Tracer:
             turn[at_vertex] = inside + np.choose(c, [np.zeros(len(c)), np.pi - angles[:, 1], angles[:, 0] - np.pi])
         return turn, size
 
-    def ends(self, starts: _Starts, turn: FloatArray, lengths: FloatArray) -> _Ends:
-        """Trace geodesics for their ends, on all processors."""
-        k = len(turn)
-        found = _Ends.of(k)
-
-        def work(part: slice) -> None:
-            given = (starts.faces[part], starts.barycentric[part], turn[part], lengths[part])
-            kernel.trace(self._triangles, *given, *(field[part] for field in found))
-
-        threads = n_threads() if k >= _FEW else 1
-        bounds = np.linspace(0, k, threads + 1).astype(int)
-        if k:
-            side_by_side(work, [slice(*ends) for ends in pairwise(bounds)])
-        faces, barycentric = on_one_side(found.faces, found.barycentric, self._mesh.n_faces)
-        return found._replace(faces=faces, barycentric=barycentric)
-
     def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:
         """Trace one geodesic."""
         given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
-        faces, points = kernel.trace(self._triangles, *given, *_Ends.of(1), True)
+        faces, points = kernel.trace(self._triangles, *given, *self._room(1), True)
         faces, points = on_one_side(faces, points, self._mesh.n_faces)
         return SurfaceCurve(faces, points[:, 0], points[:, 1], mesh=self._mesh)

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import igl
 import numpy as np
 
-from heat_igl.intrinsic.half_edges import mollify
+from heat_igl.intrinsic.gluing import intrinsic_triangulation
 from heat_igl.intrinsic.history import BACK_CORNERS, Covered
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 from heat_igl.mesh import Mesh, connectivity
-from heat_igl.typing import FloatArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 
 def has_nonmanifold_edges(mesh: Mesh) -> bool:
@@ -45,32 +44,10 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     Laplacian is the Laplacian of the mesh. Around an edge, faces are joined in the order of their angles, like the
     boundary of a thin solid around the faces; Sharp and Crane show that any order gives a manifold.
     """
-    F, m = mesh.F, mesh.n_faces
-    lengths = igl.edge_lengths(mesh.V, F)
-    front = np.arange(F.size)
-    face, corner = np.divmod(front, 3)
-    back = 3 * (m + face) + BACK_CORNERS[corner]
+    triangulation = intrinsic_triangulation(mesh)
     edge = mesh.facets.of_face.ravel()
-    along = F[face, (corner + 1) % 3] == mesh.facets.vertices[edge, 0]
-    # Seen along the edge from the lower to the higher vertex: the copy of the face that faces counterclockwise.
-    counterclockwise, clockwise = np.where(along, front, back), np.where(along, back, front)
-
-    order = np.lexsort((_angles(mesh), edge))
-    following = connectivity.next_in_run(order, mesh.facets.n_faces)
-    a, b = counterclockwise[order], clockwise[following]
-    twin = np.empty(2 * F.size, np.int64)
-    twin[a], twin[b] = b, a
-    added = mollify(lengths, F)
-    lengths = lengths + added
-    return IntrinsicTriangulation(
-        F=np.concatenate([F, F[:, BACK_CORNERS]]),
-        l=np.concatenate([lengths, lengths[:, BACK_CORNERS]]),
-        twin=twin,
-        aligned=np.ones(2 * F.size, bool),
-        n=mesh.n_vertices,
-        lengthening=float(added.max()),
-        history=(Covered(m),),
-    )
+    along = triangulation.tail(np.arange(mesh.F.size)) == mesh.facets.vertices[edge, 0]
+    return _cover(triangulation, np.lexsort((_angles(mesh), edge)), mesh.facets.n_faces, along)
 
 
 def closed_cover(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
@@ -79,19 +56,34 @@ def closed_cover(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulatio
     Inner edges are glued front to front and back to back, or front to back if the two faces are not aligned, and
     boundary edges front to back.
     """
-    F, lengths, m = triangulation.F, triangulation.l, len(triangulation.F)
+    # One half-edge of each edge is first; the other runs against it, unless the two faces are not aligned.
+    twin, half_edge = triangulation.twin, np.arange(triangulation.F.size)
+    first = np.where(twin < 0, half_edge, np.minimum(half_edge, twin))
+    order = np.lexsort((half_edge, first))
+    count = np.bincount(first, minlength=len(first))
+    return _cover(triangulation, order, count[count > 0], (first == half_edge) | ~triangulation.aligned)
+
+
+def _cover(
+    triangulation: IntrinsicTriangulation, order: IntArray, counts: IntArray, along: BoolArray
+) -> IntrinsicTriangulation:
+    """Two copies of each triangle, each glued to the next around its edge.
+
+    `order` (3 m,) are the half-edges, edge after edge and counterclockwise around each; `counts` (k,) how many each
+    edge has; `along` (3 m,) marks those that run along the edge, where the others run against it.
+    """
+    F, m = triangulation.F, len(triangulation.F)
     front = np.arange(F.size)
     back = 3 * (m + front // 3) + BACK_CORNERS[front % 3]
-    inner = triangulation.twin >= 0
-    mate = np.where(inner, triangulation.twin, front)
-    same_side = inner & triangulation.aligned
+    # Seen along the edge: the copy of the face that faces counterclockwise.
+    counterclockwise, clockwise = np.where(along, front, back), np.where(along, back, front)
+    a, b = counterclockwise[order], clockwise[connectivity.next_in_run(order, counts)]
     twin = np.empty(2 * F.size, np.int64)
-    twin[front] = np.where(same_side, mate, back[mate])
-    twin[back] = np.where(same_side, back[mate], mate)
+    twin[a], twin[b] = b, a
     return replace(
         triangulation,
         F=np.concatenate([F, F[:, BACK_CORNERS]]),
-        l=np.concatenate([lengths, lengths[:, BACK_CORNERS]]),
+        l=np.concatenate([triangulation.l, triangulation.l[:, BACK_CORNERS]]),
         twin=twin,
         aligned=np.ones(2 * F.size, bool),
         history=(*triangulation.history, Covered(m)),

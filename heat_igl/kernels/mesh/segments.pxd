@@ -1,4 +1,4 @@
-cdef class Segments:
+cdef class SegmentList:
     cdef int[::1] face
     cdef double[:, :, ::1] place
     cdef long long n

@@ -6,7 +6,7 @@ import numpy as np
 
 @cython.final
 @cython.cclass
-class Segments:
+class SegmentList:
     """`n` segments so far: `face`, and the barycentric coordinates `place` of both ends; there may be room for more."""
 
     def __init__(self):

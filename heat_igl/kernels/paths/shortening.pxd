@@ -1,4 +1,4 @@
-from heat_igl.kernels.mesh.segments cimport Segments
+from heat_igl.kernels.mesh.segments cimport SegmentList
 from heat_igl.kernels.paths.strips cimport Detour, FaceTable, Funnel, Place, Strip
 
 cdef extern from *:
@@ -60,7 +60,7 @@ cdef class Shortener:
     cdef int n_choices, n_tried
     cdef double largest_loss
     # The result.
-    cdef Segments segments
+    cdef SegmentList segments
     cdef double length
 
     cdef int follow(

@@ -13,7 +13,7 @@ shortest. The length falls with every such step unless the loop is locally short
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.mesh.segments import Segments
+from cython.cimports.heat_igl.kernels.mesh.segments import SegmentList
 from cython.cimports.heat_igl.kernels.paths.shortening import (
     BOTH_WAYS,
     FIRST_BASES,
@@ -60,7 +60,7 @@ class Shortener:
     def __init__(self, faces: FaceTable, half_turn, most_corners):
         self.s, self.half_turn = faces, half_turn
         self.strip, self.other, self.kept = Strip(), Strip(), Strip()
-        self.detour, self.funnel, self.segments = Detour(most_corners), Funnel(), Segments()
+        self.detour, self.funnel, self.segments = Detour(most_corners), Funnel(), SegmentList()
         self.choice, self.tried = np.empty(MOST_CHOICES, _CHOICE), np.empty(MOST_TRIED, np.int32)
 
     def shorten(

@@ -1,4 +1,4 @@
-from heat_igl.kernels.mesh.segments cimport Segments
+from heat_igl.kernels.mesh.segments cimport SegmentList
 from heat_igl.kernels.mesh.straight cimport Exit, Heading
 
 cdef extern from *:
@@ -25,7 +25,7 @@ cdef class _Tracer:
     cdef double[:, ::1] angle
     cdef long long[::1] twin
     cdef double[:, ::1] half
-    cdef Segments segments  # None if they are not asked for
+    cdef SegmentList segments  # None if they are not asked for
     # Of the geodesic being traced: the ray into a face, and where it leaves that, by the share of the side. In
     # barycentric coordinates, where it enters and leaves. How far it came, and the face there.
     cdef Heading ray

@@ -1,7 +1,7 @@
 """Straightest geodesics over the triangles of an oriented manifold triangulation (Polthier and Schmies 1998)."""
 
 import cython
-from cython.cimports.heat_igl.kernels.mesh.segments import Segments
+from cython.cimports.heat_igl.kernels.mesh.segments import SegmentList
 from cython.cimports.heat_igl.kernels.mesh.straight import INSIDE, OUT_OF_TAIL, OVER_SIDE, Heading, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot
 from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_RAY, PI
@@ -212,7 +212,7 @@ def trace(
     """
     tracer = _Tracer()
     tracer.l, tracer.area, tracer.angle, tracer.twin, tracer.half = triangles
-    tracer.segments = Segments() if stores else None
+    tracer.segments = SegmentList() if stores else None
     with cython.nogil:
         for i in range(face.shape[0]):
             tracer.trace_one(face[i], cython.address(at[i, 0]), turn[i], length[i])

@@ -1,4 +1,4 @@
-from heat_igl.kernels.mesh.segments cimport Segments
+from heat_igl.kernels.mesh.segments cimport SegmentList
 from heat_igl.kernels.mesh.straight cimport Exit, Heading
 
 cdef class InnerSources:
@@ -59,7 +59,7 @@ cdef class PathTracer:
     cdef const unsigned char[::1] aligned
     cdef const double[::1] length, double_area, distance, crossing
     cdef InnerSources sources
-    cdef Segments segments
+    cdef SegmentList segments
     cdef long long n_steps
     # Lines to be tried, the next one last.
     cdef Line[MOST_LINES] line

@@ -4,7 +4,7 @@ Sources inside faces, points and segments, have the roots n + i for source i of 
 """
 
 import cython
-from cython.cimports.heat_igl.kernels.mesh.segments import Segments
+from cython.cimports.heat_igl.kernels.mesh.segments import SegmentList
 from cython.cimports.heat_igl.kernels.mesh.straight import OVER_SIDE, Exit, Heading, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
@@ -83,7 +83,7 @@ def trace_back(
         The segments, path after path: face, and barycentric coordinates of both ends.
     """
     tracer: PathTracer = PathTracer(tables, found, sources)
-    segments: Segments = tracer.segments
+    segments: SegmentList = tracer.segments
     corner_of_vertex: cython.const[cython.int][::1] = tables.corner_of_vertex
     face: cython.const[cython.int][::1] = targets.place.faces
     place: cython.const[cython.double][:, ::1] = targets.place.barycentric
@@ -126,7 +126,7 @@ class PathTracer:
         self.double_area = tables.double_area
         self.distance, self.root = found.distance, found.root
         self.entered, self.crossing = found.entered, found.crossing
-        self.sources, self.segments = InnerSources(tables.n, sources), Segments()
+        self.sources, self.segments = InnerSources(tables.n, sources), SegmentList()
 
     def along_bends(self, v: cython.int) -> cython.int:
         """From vertex v to a source; AT_SOURCE or LOST."""
