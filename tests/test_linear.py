@@ -13,8 +13,8 @@ from conftest import perturbed
 from heat_igl import HeatMethodSolver, Mesh, shapes
 from heat_igl.errors import FactorizationError
 from heat_igl.linear import analyse, backends, factorize
+from heat_igl.linear.backends import factor_bytes
 from heat_igl.linear.dissection import dissect
-from heat_igl.linear.factor_memory import factor_bytes
 from heat_igl.linear.multifrontal import MultifrontalAnalysis
 from heat_igl.operators import operators
 from heat_igl.runtime import PeakMemory, threads

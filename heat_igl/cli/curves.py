@@ -12,8 +12,8 @@ import typer
 import heat_igl
 from heat_igl import drawing
 from heat_igl.cli import options as opt
-from heat_igl.cli.output import Row, check_output, check_writable, print_rows, write_results, wrote
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.cli.output import Row, check_file, check_output, print_rows, write_results, wrote
+from heat_igl.errors import SourceError
 from heat_igl.heat import Level, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh_or_cloud, read_polylines, write_mesh
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, as_simplices, closest_points
@@ -148,9 +148,7 @@ def cut(
 ) -> None:
     """Cut a mesh along curves, so that they become edges."""
     loaded = as_simplices(read_mesh_or_cloud(mesh, points))
-    if output.suffix.lower() not in MESH_SUFFIXES:
-        raise MeshError(f"--output {output}: meshes go to {', '.join(MESH_SUFFIXES)} files")
-    check_writable(output)
+    check_file("--output", output, "meshes", MESH_SUFFIXES)
     found = heat_igl.cut(loaded, projected(loaded, curves))
     pieces = found.split()
     written = {output: found.mesh}

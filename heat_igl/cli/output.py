@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from heat_igl.errors import MeshError, MissingExtraError
+from heat_igl.errors import MissingExtraError
 from heat_igl.io import CURVE_SUFFIXES, complete_file, write_mesh, write_point_cloud
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.plan import Plan
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # For distances alone: an array of numpy, and text with a line per vertex.
 ARRAY_SUFFIXES = (".npy", ".csv")
 _STANDARD_OUTPUT = Path("-")
+# What writes files of a format, and the extra that brings it.
+_LIBRARIES = {".dxf": "ezdxf io", ".vtu": "meshio io", ".gii": "nibabel io"}
 
 
 def say(message: str) -> None:
@@ -111,13 +113,18 @@ def check_writable(path: Path) -> None:
         raise OSError(f"{path} cannot be written: {error.strerror}") from error
 
 
-def check_page(path: Path) -> None:
-    """Check that a page can be written to `path`."""
-    from heat_igl.drawing.output import PAGE_SUFFIXES
+def check_file(option: str, path: Path, what: str, suffixes: Sequence[str], library: str = "") -> None:
+    """Check that the value of an option is a file of a format for `what`, whose library is there, and can be written.
 
-    if path.suffix.lower() not in PAGE_SUFFIXES:
-        raise ValueError(f"--html {path}: pages go to {' or '.join(PAGE_SUFFIXES)} files")
-    MissingExtraError.check("a page", "matplotlib", "view")
+    Raises
+    ------
+    ValueError, MissingExtraError, OSError
+        If it is not. `library` is its name and that of the extra that brings it.
+    """
+    if path.suffix.lower() not in suffixes:
+        raise ValueError(f"{option} {path}: {what} go to {', '.join(suffixes[:-1])} or {suffixes[-1]} files")
+    if library:
+        MissingExtraError.check(f"a {path.suffix.lower()} file", *library.split())
     check_writable(path)
 
 
@@ -126,11 +133,14 @@ def check_picture(picture: Path | None) -> Path | None:
     if picture is not None:
         from heat_igl.drawing.output import PICTURE_SUFFIXES
 
-        if picture.suffix.lower() not in PICTURE_SUFFIXES:
-            raise ValueError(f"--picture {picture}: pictures go to {', '.join(PICTURE_SUFFIXES)} files")
-        MissingExtraError.check("a picture", "matplotlib", "view")
-        check_writable(picture)
+        check_file("--picture", picture, "pictures", PICTURE_SUFFIXES, "matplotlib view")
     return picture
+
+
+def check_curves(output: Path) -> Path:
+    """Check that curves can be written to the value of an option."""
+    check_file("--output", output, "curves", CURVE_SUFFIXES, _LIBRARIES.get(output.suffix.lower(), ""))
+    return output
 
 
 def check_output(mesh: Mesh | PointCloud, output: Path | None) -> None:
@@ -143,13 +153,7 @@ def check_output(mesh: Mesh | PointCloud, output: Path | None) -> None:
         kind, with_mesh = "points with distances", (".ply",)
     elif mesh.is_tetrahedral:
         kind, with_mesh = "tetrahedra with distances", (".vtu",)
-    accepted = with_mesh + ARRAY_SUFFIXES
-    suffix = output.suffix.lower()
-    if suffix not in accepted:
-        raise MeshError(f"--output {output}: {kind} go to {', '.join(accepted[:-1])} or {accepted[-1]} files")
-    if suffix in (".vtu", ".gii"):
-        MissingExtraError.check(f"a {suffix} file", "meshio" if suffix == ".vtu" else "nibabel", "io")
-    check_writable(output)
+    check_file("--output", output, kind, with_mesh + ARRAY_SUFFIXES, _LIBRARIES.get(output.suffix.lower(), ""))
 
 
 def write_results(
@@ -187,13 +191,3 @@ def _write_distance(path: Path, mesh: Mesh | PointCloud, distance: FloatArray) -
         else:
             lines = [f"{vertex},{value!r}" for vertex, value in enumerate(distance.tolist())]
             file.write("\n".join(["vertex,distance", *lines, ""]).encode("ascii"))
-
-
-def check_curves(output: Path) -> Path:
-    """Check that curves can be written to the value of an option."""
-    if output.suffix.lower() not in CURVE_SUFFIXES:
-        raise ValueError(f"--output {output}: curves go to {', '.join(CURVE_SUFFIXES)} files")
-    if output.suffix.lower() == ".dxf":
-        MissingExtraError.check("a .dxf file", "ezdxf", "io")
-    check_writable(output)
-    return output

@@ -41,8 +41,8 @@ _MODULES = {
     "cut": "curves",
     "view": "views",
     "demo": "views",
-    "batch": "collections",
-    "dataset": "collections",
+    "batch": "matrices",
+    "dataset": "matrices",
 }
 
 #: Examples for the help of the commands.

@@ -16,7 +16,7 @@ from heat_igl import reference
 from heat_igl.cli import options as opt
 from heat_igl.cli.curves import projected
 from heat_igl.cli.demo import demonstrate
-from heat_igl.cli.output import check_json, check_page, check_writable, described, print_rows
+from heat_igl.cli.output import check_file, check_json, check_writable, described, print_rows
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import SignedHeatSolver
 from heat_igl.io import read_mesh_or_cloud
@@ -41,9 +41,10 @@ def view(
 ) -> None:
     """An interactive page, opened in the browser: a click moves the source, and the distance follows."""
     from heat_igl.drawing import page
+    from heat_igl.drawing.output import PAGE_SUFFIXES
 
     target = html or Path(f"{mesh.stem}-view.html")
-    check_page(target)
+    check_file("--html", target, "pages", PAGE_SUFFIXES, "matplotlib view")
     loaded = read_mesh_or_cloud(mesh, points)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
     with Console(stderr=True).status("measuring"):

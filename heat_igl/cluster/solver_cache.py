@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from heat_igl.cluster.store import rows_per_block
 from heat_igl.geodesic import DistanceMethod, Solver, SolverChoice
-from heat_igl.linear.factor_memory import factor_bytes
+from heat_igl.linear.backends import factor_bytes
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.runtime import release_free_memory
 

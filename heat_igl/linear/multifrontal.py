@@ -16,8 +16,7 @@ import scipy.sparse as sp
 from heat_igl.errors import FactorizationError
 from heat_igl.kernels import builds
 from heat_igl.kernels.signals import raise_caught
-from heat_igl.linear.dissection import dissect
-from heat_igl.linear.fronts import Fronts, fronts
+from heat_igl.linear.dissection import Fronts, dissect, fronts
 from heat_igl.linear.protocols import check_finite, check_probe
 from heat_igl.runtime import n_threads, pool, side_by_side
 from heat_igl.typing import BoolArray, FloatArray, IntArray

@@ -3,13 +3,12 @@ from heat_igl.operators.connection import connection_laplacian as connection_lap
 from heat_igl.operators.connection import edge_rotations as edge_rotations
 from heat_igl.operators.connection import face_rotations as face_rotations
 from heat_igl.operators.connection import with_rotations as with_rotations
-from heat_igl.operators.elements import EdgeLengths as EdgeLengths
-from heat_igl.operators.elements import TriangleElements as TriangleElements
-from heat_igl.operators.intrinsic import edge_length_operators as edge_length_operators
-from heat_igl.operators.intrinsic import intrinsic_operators as intrinsic_operators
+from heat_igl.operators.matrices import EdgeLengths as EdgeLengths
 from heat_igl.operators.matrices import Laplacian as Laplacian
 from heat_igl.operators.matrices import OnLaplacian as OnLaplacian
 from heat_igl.operators.matrices import Operators as Operators
+from heat_igl.operators.matrices import Surface as Surface
+from heat_igl.operators.matrices import TriangleElements as TriangleElements
 from heat_igl.operators.matrices import check_laplacian as check_laplacian
 from heat_igl.operators.matrices import divergence_matrix as divergence_matrix
 from heat_igl.operators.metric import fibre_metric as fibre_metric
@@ -22,8 +21,9 @@ from heat_igl.operators.point_clouds import point_cloud_operators as point_cloud
 from heat_igl.operators.simplices import cotan_operators as cotan_operators
 from heat_igl.operators.suitability import is_rough_or_narrow as is_rough_or_narrow
 from heat_igl.operators.suitability import share_on_large_triangles as share_on_large_triangles
-from heat_igl.operators.surface import Surface as Surface
+from heat_igl.operators.triangles import edge_length_operators as edge_length_operators
 from heat_igl.operators.triangles import fan_operators as fan_operators
+from heat_igl.operators.triangles import intrinsic_operators as intrinsic_operators
 from heat_igl.operators.triangles import operators as operators
 from heat_igl.operators.triangles import tufted_operators as tufted_operators
 from heat_igl.operators.triangles import unfolding_surface as unfolding_surface

@@ -1,24 +1,138 @@
-"""`Operators`: the matrices of a domain, and the few numbers beside them that the heat method takes."""
+"""`Operators`: the matrices of a domain, its triangles and their elements, and the few numbers beside."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
-from heat_igl.operators.elements import EdgeLengths, TriangleElements
+from heat_igl.intrinsic import IntrinsicTriangulation, Merged, apex
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.mesh import PolygonFans
     from heat_igl.operators.metric_derivatives import MetricSides
     from heat_igl.operators.metric_simplices import MetricSimplices
-    from heat_igl.operators.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The triangles along which distance is measured on a domain.
+
+    Attributes
+    ----------
+    triangulation : IntrinsicTriangulation
+        The triangles that the operators belong to: their edges are straight lines from sources.
+    faces : IntrinsicTriangulation or None
+        The triangles before any flip, but each once: points and curves are carried to them. None if not known.
+    uncovered : IntrinsicTriangulation or None
+        The surface itself, each face once and without added vertices, if `triangulation` is the tufted cover, which
+        has each face twice, or a refinement.
+    V : (n, 3) float64 or None
+        Positions of the vertices; None if not known.
+    """
+
+    triangulation: IntrinsicTriangulation
+    faces: IntrinsicTriangulation | None = None
+    uncovered: IntrinsicTriangulation | None = None
+    V: FloatArray | None = None
+
+    @property
+    def unfolding(self) -> IntrinsicTriangulation:
+        """The triangles to unfold paths in: on the cover a path over an edge of five faces goes on in one face only."""
+        return self.triangulation if self.uncovered is None else self.uncovered
+
+    @cached_property
+    def given_faces(self) -> IntArray | None:
+        """Vertices (m, 3) of the triangles that points and curves refer to; None without `faces`."""
+        if self.faces is None:
+            return None
+        F = self.faces.F
+        for move in self.faces.history:
+            if isinstance(move, Merged):
+                F = move.before(F)
+        return F
+
+
+class EdgeLengths(NamedTuple):
+    """Edges, each with the vertices `i`, `j` (k,) at the ends and the `length` (k,).
+
+    Several edges may join the same two vertices, and one may join a vertex to itself.
+    """
+
+    i: IntArray
+    j: IntArray
+    length: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleElements:
+    """Linear elements on m triangles: all that the operators and the steps take of a triangulation.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        The triangles.
+    in_space : callable, optional
+        Makes the gradient in space (3 m, n).
+    """
+
+    triangulation: IntrinsicTriangulation
+    in_space: Callable[[], sp.csc_matrix] | None = None
+
+    def matrix(self) -> sp.csc_matrix:
+        """The gradient G (d m, n), made anew: in space, or d = 2 in the plane of each triangle (paper, equation 5).
+
+        Then row f is the component along the edge from corner 0 to corner 1 of triangle f, and row m + f the one
+        across it, towards corner 2. Unit 1 / length.
+        """
+        if self.in_space is not None:
+            return self.in_space()
+        (per_base, foot, per_height), zero = self.frames(), np.zeros(len(self.corners))
+        along = -per_base, per_base, zero
+        across = (foot - 1) * per_height, -foot * per_height, per_height
+        values = np.stack([np.stack(part, axis=1) for part in (along, across)])
+        columns = np.tile(self.corners.astype(np.int32), (2, 1)).ravel()
+        starts = np.arange(0, values.size + 1, 3, dtype=np.int32)
+        rows = sp.csr_matrix((values.ravel(), columns, starts), shape=(len(starts) - 1, self.triangulation.n))
+        if (self.corners[:, [1, 2, 0]] == self.corners).any():
+            rows.sum_duplicates()  # an edge from a vertex to itself
+        return rows.tocsc()
+
+    @property
+    def corners(self) -> IntArray:
+        """Vertices (m, 3) whose values the gradient on each face depends on."""
+        return self.triangulation.F
+
+    def frames(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The gradient in the plane of each triangle, in three numbers (m,).
+
+        With corner 0 at the origin and corner 1 on the first axis, the gradient of u is ``x = per_base (u_1 - u_0)``,
+        ``y = per_height (u_2 - u_0 - foot (u_1 - u_0))``.
+
+        Returns
+        -------
+        per_base, foot, per_height : (m,) float64
+            One over the length of the side from corner 0 to corner 1; the foot of corner 2 on that side, from 0 to 1
+            between the ends; one over the height of corner 2.
+        """
+        lengths = self.triangulation.l
+        base = lengths[:, 2]
+        x, y = apex(base, lengths[:, 1], lengths[:, 0])
+        with np.errstate(divide="ignore"):
+            return 1 / base, x / base, 1 / y
+
+    def edge_lengths(self) -> EdgeLengths:
+        """The edges of the triangles."""
+        triangulation = self.triangulation
+        edges = triangulation.edges
+        return EdgeLengths(triangulation.tail(edges), triangulation.head(edges), triangulation.l.ravel()[edges])
+
 
 # Which triangulation of a triangle mesh the operators belong to.
 Laplacian = Literal["auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"]

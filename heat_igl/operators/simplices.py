@@ -12,10 +12,8 @@ import scipy.sparse as sp
 from heat_igl.errors import MeshError
 from heat_igl.kernels.linear import assembling
 from heat_igl.mesh import Mesh
-from heat_igl.operators.elements import TriangleElements
-from heat_igl.operators.matrices import OnLaplacian, Operators, laplacian_of_gradient
+from heat_igl.operators.matrices import OnLaplacian, Operators, Surface, TriangleElements, laplacian_of_gradient
 from heat_igl.operators.metric_simplices import MetricSimplices
-from heat_igl.operators.surface import Surface
 from heat_igl.typing import FloatArray, IntArray
 
 

@@ -1,7 +1,9 @@
 from heat_igl.runtime.blocks import WORKING_MEMORY as WORKING_MEMORY
 from heat_igl.runtime.blocks import block_size as block_size
+from heat_igl.runtime.blocks import float_type as float_type
 from heat_igl.runtime.blocks import in_blocks as in_blocks
 from heat_igl.runtime.blocks import in_order as in_order
+from heat_igl.runtime.blocks import row_writer as row_writer
 from heat_igl.runtime.heat_range import LARGEST_EXPONENT as LARGEST_EXPONENT
 from heat_igl.runtime.heat_range import LOWEST_HEAT as LOWEST_HEAT
 from heat_igl.runtime.heat_range import RANGE_LIMIT as RANGE_LIMIT
@@ -12,8 +14,6 @@ from heat_igl.runtime.memory import release_free_memory as release_free_memory
 from heat_igl.runtime.progress import TimeLeft as TimeLeft
 from heat_igl.runtime.progress import progress_bar as progress_bar
 from heat_igl.runtime.progress import rich_progress as rich_progress
-from heat_igl.runtime.rows import float_type as float_type
-from heat_igl.runtime.rows import row_writer as row_writer
 from heat_igl.runtime.threads import both as both
 from heat_igl.runtime.threads import n_threads as n_threads
 from heat_igl.runtime.threads import over_rows as over_rows
