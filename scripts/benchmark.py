@@ -28,10 +28,12 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl import GeodesicSolver, Mesh, read_mesh, shapes
+from heat_igl import Mesh, read_mesh, shapes
 from heat_igl.cli.demo import sample_mesh
+from heat_igl.reference import exact
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
+from heat_igl.validation import closed_forms
 from heat_igl.validation.zoo import hull
 
 from harness import METHODS, Method, Row, Table, collected, drawn, errors, ours, parsed, publish, seconds
@@ -123,15 +125,6 @@ def noisy_sphere(n: int, rng: np.random.Generator) -> Mesh:
     return hull(V / np.linalg.norm(V, axis=1, keepdims=True))
 
 
-def great_circles(V: FloatArray, source: int) -> FloatArray:
-    """Distance on the unit sphere; the arc tangent keeps its accuracy near 0 and pi."""
-    return np.arctan2(np.linalg.norm(np.cross(V, V[source]), axis=1), V @ V[source])
-
-
-def exact(mesh: Mesh, source: int) -> FloatArray:
-    return GeodesicSolver(mesh, method="exact").distance(source)
-
-
 def by_size(sizes: Sequence[int], paths: Sequence[Path], rng: np.random.Generator) -> Iterator[tuple[str, Mesh, Mesh]]:
     """Name, mesh, and the mesh for exact distances: spheres, and meshes subdivided to the sizes."""
     for n in sizes:
@@ -149,7 +142,7 @@ def timings(options: Any, paths: Sequence[Path]) -> Iterator[Row]:
     rng = np.random.default_rng(options.seed)
     for name, mesh, first in by_size(options.sizes, paths, rng):
         sources = [int(rng.integers(first.n_vertices)), *drawn(mesh, BATCH, options.seed)]
-        truth = great_circles(mesh.V, sources[0]) if name.startswith("sphere") else exact(first, sources[0])
+        truth = closed_forms.sphere(mesh, sources[0]) if name.startswith("sphere") else exact(first, sources[0])
         # A run takes minutes where noise is a small part of it.
         runs = min(options.runs, 5 if mesh.n_vertices < 125_000 else 3 if mesh.n_vertices < 400_000 else 1)
         yield from measured(name, mesh, options.methods, runs, sources, truth)
@@ -158,7 +151,7 @@ def timings(options: Any, paths: Sequence[Path]) -> Iterator[Row]:
 def at_range(options: Any) -> Iterator[Row]:
     """Where range and accuracy are put to the test, one run each."""
     sphere = shapes.icosphere(8)
-    yield from measured("icosphere 655362", sphere, options.methods, 1, [0], great_circles(sphere.V, 0))
+    yield from measured("icosphere 655362", sphere, options.methods, 1, [0], closed_forms.sphere(sphere, 0))
     for name, mesh in (("strip 4000 x 3", shapes.strip(4000, 3)), ("grid 450 x 450", shapes.grid(450))):
         corner = int(np.argmin(mesh.V.sum(axis=1)))
         truth = np.linalg.norm(mesh.V - mesh.V[corner], axis=1)
@@ -175,7 +168,7 @@ def huge(options: Any) -> Iterator[Row]:
         truth = exact(first, 0)
     else:
         mesh = shapes.icosphere(max(0, round(np.log(options.huge / 10) / np.log(4))))
-        truth = great_circles(mesh.V, 0)
+        truth = closed_forms.sphere(mesh, 0)
     for method in options.methods:
         sources = [0, len(truth) // 2, len(truth) // 3]
         yield from measured(mesh.n_vertices, mesh, [method], 1, sources, truth, whole=False)

@@ -65,11 +65,6 @@ def in_a_process(call: Callable[[], object]) -> tuple[float, float, Any]:
     return spent, peak, result
 
 
-def graph(mesh: Mesh) -> sp.csr_array:
-    n = mesh.n_vertices
-    return sp.csr_array((mesh.edge_lengths, mesh.edges.T), shape=(n, n))
-
-
 def rows_of(prepare: Callable[[Mesh], Query], part: Mesh, sources: Sequence[int], all_of: int) -> Callable[[], Any]:
     """Prepare, and ask for some rows: the time that all would take, and the rows."""
 
@@ -89,7 +84,7 @@ def table(mesh: Mesh, region: BoolArray, labels: IntArray, radius: float, source
     used, F = np.unique(mesh.F[region[mesh.F].all(axis=1)], return_inverse=True)
     part = Mesh(mesh.V[used], F.reshape(-1, 3))
     some = np.random.default_rng(0).choice(len(used), sources, replace=False).tolist()
-    edges, solver = graph(part), heat_igl.GeodesicSolver(part, method="exact")
+    edges, solver = part.edge_graph, heat_igl.GeodesicSolver(part, method="exact")
     truth = solver.distances(some)
 
     def error(rows: FloatArray) -> float:

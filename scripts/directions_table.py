@@ -1,6 +1,7 @@
-"""Log maps, directions, traced geodesics and the vector heat method: errors and times, beside potpourri3d.
+"""Log maps, directions, traced geodesics, paths and the vector heat method: errors and times, beside potpourri3d.
 
     python scripts/directions_table.py bunny.obj spot.obj [--sources 2] [--pairs 16] [--traces 1000]
+    python scripts/directions_table.py bunny.obj cow.obj --sources 0 --paths 500 --docs docs/paths_theory.md
 
 Truth is the exact shortest path from every vertex, followed back to the source on the faces of the mesh: the length,
 and the direction in which it leaves the source. Vectors are off by their mean error in percent of the mean distance, at
@@ -8,6 +9,11 @@ all vertices and away from the cut locus, and by angles in degrees; "exp(log)" i
 ends of straight paths, in largest distances. The vector heat method is measured from three sources against the nearest
 one along the path. Times are seconds of the processor of ``--pairs`` calls that take turns. Manifold meshes, oriented
 alike; needs the extra ``bench``. docs/directions_theory.md shows the tables.
+
+paths: `GeodesicPathSolver` and potpourri3d's `EdgeFlipGeodesicSolver` join so many pairs of vertices by paths, and
+straighten a tenth as many loops through four vertices along edges. Counted are results of ours that are shorter and
+longer by more than 1e-9, and paths that are longer than the exact distance. Ratios of processor times, ours to theirs,
+are the median over the calls, and that of the sums.
 """
 
 from __future__ import annotations
@@ -18,17 +24,21 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
+from scipy.sparse import csgraph
 
 from heat_igl import (
     GeodesicSolver,
     Mesh,
     SurfacePoints,
     VectorHeatSolver,
+    edge_curve,
     exp_map,
     log_map,
+    pair_distances,
     shortest_paths,
     tangent_frames,
 )
+from heat_igl.curves import GeodesicPathSolver
 from heat_igl.intrinsic import TangentFrames
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
@@ -36,6 +46,8 @@ from harness import Row, Table, as_they_are, collected, drawn, named, parsed, pu
 
 # The log map jumps over an edge if it changes by more than so many of the lengths of the edge.
 JUMP = 4.0
+# Lengths that differ by a smaller share are the same.
+SAME = 1e-9
 STRATEGIES = ("VectorHeat", "AffineLocal", "AffineAdaptive")
 
 
@@ -184,18 +196,77 @@ def traces(name: str, mesh: Mesh, count: int, seed: int) -> Row:
     return {"mesh": name, "geodesics": count} | took | {"ends differ by at most": gap}
 
 
+def edge_loop(mesh: Mesh, stops: list[int]) -> list[int]:
+    """The vertices of the loop along shortest ways of edges through some vertices."""
+    loop: list[int] = []
+    for a, b in pairwise([*stops, stops[0]]):
+        before = csgraph.dijkstra(mesh.edge_graph, directed=False, indices=b, return_predecessors=True)[1]
+        while a != b:
+            loop.append(int(a))
+            a = int(before[a])
+    return loop
+
+
+def paths(name: str, mesh: Mesh, n_pairs: int, seed: int) -> Iterator[Row]:
+    """A row for paths and one for loops."""
+    import potpourri3d
+
+    rng = np.random.default_rng(seed)
+    usable = np.flatnonzero(mesh.components == mesh.components[mesh.F[0, 0]])
+    pairs = [rng.choice(usable, 2, replace=False).tolist() for _ in range(n_pairs)]
+    loops = [edge_loop(mesh, rng.choice(usable, 4, replace=False).tolist()) for _ in range(max(n_pairs // 10, 1))]
+    curves = [edge_curve(mesh, loop, closed=True) for loop in loops]
+    ours, theirs = GeodesicPathSolver(mesh), potpourri3d.EdgeFlipGeodesicSolver(mesh.V, mesh.F)
+    found: dict[str, list[tuple[float, float, float, float]]] = {"paths": [], "loops": []}
+
+    def take(kind: str, one: Callable[[], object], other: Callable[[], FloatArray]) -> None:
+        kept: list[object] = []
+        times = seconds(lambda: kept.append(one())), seconds(lambda: kept.append(other()))
+        length = np.linalg.norm(np.diff(kept[1], axis=0), axis=1).sum()  # type: ignore[call-overload]
+        found[kind].append((*times, kept[0].lengths(mesh).sum(), length))  # type: ignore[attr-defined]
+
+    for pair in [pairs[0], *pairs]:
+        take("paths", lambda p=pair: ours.path(p), lambda p=pair: theirs.find_geodesic_path(*p))
+    del found["paths"][0]
+    for curve, loop in zip(curves, loops, strict=True):
+        take("loops", lambda c=curve: ours.straighten(c), lambda v=loop: theirs.find_geodesic_loop(np.array(v)))
+    for kind, values in found.items():
+        time, peer_time, length, other = np.array(values).T
+        excess = (length - other) / other.clip(mesh.edge_lengths.mean())
+        row = {"mesh": name, "n": mesh.n_vertices, "kind": kind, "count": len(values), "most": 100 * excess.max()}
+        row |= {"shorter": int((excess < -SAME).sum()), "longer": int((excess > SAME).sum())}
+        row |= {"median time": np.median(time / peer_time), "time": time.sum() / peer_time.sum()}
+        if kind == "paths":
+            exact = pair_distances(mesh, np.array(pairs))
+            row["not shortest"] = [int((each > exact * (1 + SAME)).sum()) for each in (length, other)]
+        yield row
+
+
+PATHS = {
+    "mesh": "mesh", "vertices": "{n}", "kind": "{kind}", "count": "{count}",
+    "shorter / longer": "{shorter} / {longer}", "longer by at most, %": "{most:.2g}",
+    "time": "{median time:.2f}, {time:.2f}",
+    "not the shortest: here / flips": "{not shortest[0]} / {not shortest[1]}",
+}  # fmt: skip
+
+
 def main(argv: Sequence[str] | None = None) -> None:
-    options = parsed(__doc__, argv, "*", sources=2, pairs=0, traces=0)
-    parts: dict[str, list[Row]] = {"log maps": [], "vector heat": [], "times": [], "traces": []}
+    options = parsed(__doc__, argv, "*", sources=2, pairs=0, traces=0, paths=0)
+    parts: dict[str, list[Row]] = {"log maps": [], "vector heat": [], "times": [], "traces": [], "paths": []}
     for name, mesh in named(options.meshes, "bunny").items():
         vertices = drawn(mesh, max(options.pairs, options.sources, 3), options.seed)
-        parts["log maps"] += collected(log_maps(name, mesh, vertices[: options.sources]))
-        parts["vector heat"] += collected([vector_heat(name, mesh, vertices[:3])])
+        if options.sources:
+            parts["log maps"] += collected(log_maps(name, mesh, vertices[: options.sources]))
+            parts["vector heat"] += collected([vector_heat(name, mesh, vertices[:3])])
         if options.pairs:
             parts["times"] += collected(times(name, mesh, vertices[: options.pairs]))
         if options.traces:
             parts["traces"] += collected([traces(name, mesh, options.traces, options.seed)])
+        if options.paths:
+            parts["paths"] += collected(paths(name, mesh, options.paths, options.seed))
     tables: dict[str, Table] = {part: as_they_are(rows) for part, rows in parts.items() if rows}
+    if parts["paths"]:
+        tables["paths"] = Table(parts["paths"], PATHS)
     publish(options, tables)
 
 

@@ -7,6 +7,7 @@
     python scripts/metrics_table.py faces [--edge 20]          # a metric per face
     python scripts/metrics_table.py grids [--rows 48]          # pixels and voxels, beside fast marching
     python scripts/metrics_table.py smooth [--rows 48]         # tensors that change smoothly in bodies
+    python scripts/metrics_table.py polygons cow.obj --sources 8   # on the duals of these meshes, or their polygons
 
 metrics and bodies: the mean of |d - exact| / exact over vertices and ``--sources`` in percent, "-" where a method does
 not apply; "heat" is the paper's method. For bodies also how much too long the worst value is, by how much it is below
@@ -22,8 +23,9 @@ grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels 
 them. Beside the default: scikit-fmm (by pip), whose front begins as a circle of 2.5 pixels, and pykonal if it is
 installed. Mean and largest error in percent, and seconds of one query with its preparation.
 smooth: a cylinder that is twisted, and a cube with a speed that grows linearly, with tensors per tetrahedron and at the
-vertices; the same of fim-python, if it is installed, which takes those per tetrahedron. docs/metrics_theory.md
-has the tables.
+vertices; the same of fim-python, if it is installed, which takes those per tetrahedron.
+polygons: the mean error of heat on triangles of the polygons, and on those around virtual vertices, each from exact
+distance on the same surface. docs/metrics_theory.md has the tables.
 """
 
 from __future__ import annotations
@@ -45,13 +47,16 @@ from heat_igl import (
     AccuracyWarning,
     GeodesicSolver,
     Mesh,
+    PolygonMesh,
     fibre_metric,
     geodesic_distance,
     image_domain,
     metric_operators,
+    read_polygon_mesh,
     shapes,
     speed_operators,
 )
+from heat_igl.mesh import PolygonFans
 from heat_igl.operators import MetricSimplices, Operators
 from heat_igl.sweep import LineEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -555,6 +560,41 @@ def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         yield row
 
 
+# Polygons, on triangles of theirs and around virtual vertices.
+
+
+def dual(mesh: Mesh) -> PolygonMesh:
+    """A polygon around each vertex that lies inside, corners in the middles of the faces."""
+    beyond = {(a, b): f for f, (x, y, z) in enumerate(mesh.F.tolist()) for a, b in ((x, y), (y, z), (z, x))}
+    third = {(f, v): row[(row.index(v) + 2) % 3] for f, row in enumerate(mesh.F.tolist()) for v in row}
+    polygons = []
+    for v, f in dict(zip(mesh.F.ravel().tolist(), np.repeat(np.arange(mesh.n_faces), 3).tolist(), strict=True)).items():
+        ring: list[int] = []
+        at: int | None = f
+        while at is not None and at not in ring:
+            ring.append(at)
+            at = beyond.get((v, third[at, v]))
+        if at == f and len(ring) > 2:
+            polygons.append(ring)
+    used, corners = np.unique(np.concatenate(polygons), return_inverse=True)
+    ends = np.cumsum([len(ring) for ring in polygons])[:-1]
+    return PolygonMesh(mesh.V[mesh.F[used]].mean(axis=1), np.split(corners.ravel(), ends))
+
+
+def on_polygons(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
+    domains = {"sphere, 642 polygons": dual(shapes.icosphere(3))}
+    for path in options.meshes:
+        mesh = read_polygon_mesh(path)
+        domains[path.stem] = dual(mesh.triangles) if (mesh.degree == 3).all() else mesh
+    for name, mesh in domains.items():
+        sources, row = rng.choice(mesh.n_vertices, options.sources, replace=False).tolist(), {"mesh": name}
+        fans = PolygonFans.of(mesh).mesh
+        for key, domain, surface in (("triangles", mesh.triangles, mesh.triangles), ("virtual", mesh, fans)):
+            truth = GeodesicSolver(surface, method="exact").distance
+            row[key] = mean_error(ours("heat")(domain), sources, lambda i, d=truth, n=mesh.n_vertices: d(i)[:n])
+        yield row
+
+
 def timed(exact: FloatArray, query: Callable[..., FloatArray], *arguments: Any) -> Row:
     """Mean and largest error in percent, and seconds; nan if what it needs is not installed."""
     try:
@@ -609,6 +649,10 @@ COLUMNS = {
     "grids": {"grid": "{grid}"} | errors_and_seconds(default="default", fmm="scikit-fmm", konal="pykonal"),
     "smooth": {"body": "{body}", "vertices": "{n}", "tetrahedra": "{m}"}
     | errors_and_seconds(fim="fim-python", face="per tetrahedron", vertex="at the vertices"),
+    "polygons": {
+        "": "{mesh}", "triangles without virtual vertices, %": "{triangles:.2g}",
+        "with virtual vertices (default), %": "{virtual:.2g}",
+    },
 }  # fmt: skip
 ROWS = {
     "metrics": on_metrics,
@@ -618,6 +662,7 @@ ROWS = {
     "faces": on_faces,
     "grids": on_grids,
     "smooth": on_smooth,
+    "polygons": on_polygons,
 }
 
 

@@ -68,17 +68,15 @@ def on_plane(n: int, seed: int) -> Case:
     return mesh, [curve_on(mesh, 0.3 * circle() + middle, closed=True)], truth
 
 
-def on_sphere(n: int, seed: int) -> Case:
+def on_sphere(n: int, _: int) -> Case:
     """The circle of latitude at height 0.8 on an icosphere with edges of about 2.8 / n."""
-    del seed
     mesh = shapes.icosphere(3 + round(math.log2(n / COARSEST)))
     latitude = np.arctan2(np.hypot(*mesh.V[:, :2].T), mesh.V[:, 2])
     return mesh, [curve_on(mesh, 0.6 * circle() + [0, 0, 0.8], closed=True)], latitude - np.arctan2(3, 4)
 
 
-def on_cylinder(n: int, seed: int) -> Case:
+def on_cylinder(n: int, _: int) -> Case:
     """The circle at height 0.77 of a cylinder of 2 n x n squares and height 2."""
-    del seed
     mesh = shapes.cylinder(2 * n, n, 2.0)
     height = mesh.V[:, 2] - mesh.V[:, 2].min() - 0.77
     return mesh, isolines(mesh, height, 0.0)[0], height
