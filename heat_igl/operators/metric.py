@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import igl
 import numpy as np
@@ -16,7 +17,7 @@ from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
 from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.simplices import check_measures, longest_sides
 from heat_igl.operators.triangles import edge_length_operators, intrinsic_operators
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
 # for its length.
@@ -101,8 +102,8 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
     check_measures(mesh)
     g = real_numbers("metric", metric)
     if g.shape == (mesh.n_vertices, 3, 3) and mesh.n_vertices != mesh.n_faces:
-        return _of_smooth_metric(mesh, _checked_at_corners(g, mesh), laplacian)
-    domain = operators_in_metric(mesh, _checked(g, mesh), laplacian)
+        return _of_smooth_metric(mesh, *_checked_at_corners(g, mesh), laplacian)
+    domain = operators_in_metric(mesh, *_checked(g, mesh), laplacian)
     if domain.surface is None:
         return domain
     return replace(domain, metric=MetricSides(mesh, metric))
@@ -162,7 +163,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     largest = _LARGEST**0.5
     outside = (s < 1 / largest) | (s > largest)
     _raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
-    domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2)
+    domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2, 1 / float(s.max()))
     if domain.surface is None:
         return domain
     return replace(domain, metric=MetricSides(mesh, np.eye(3) / s[:, None, None] ** 2))
@@ -260,12 +261,15 @@ def _squared_factor(name: str, given: ArrayLike, k: int) -> FloatArray:
     return np.asarray(square[:, None, None])
 
 
-def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto") -> Operators:
-    """`metric_operators` of a checked mesh and metric g (m, p, p), in the planes of triangles or in space."""
+def operators_in_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Laplacian = "auto") -> Operators:
+    """`metric_operators` of a checked mesh and metric g (m, p, p), in the planes of triangles or in space.
+
+    No unit vector is shorter than `least` in it.
+    """
     # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T: edges times C have the lengths of the metric.
     p = mesh.F.shape[1] - 1
     if p == 3:
-        return _of_tetrahedra(mesh, MetricSimplices.in_metric(mesh, g[:, None]), g)
+        return _TetrahedronOperators(mesh, g, MetricSimplices.in_metric(mesh, g[:, None], least))
     factor = np.linalg.cholesky(g)
     corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
     # Relative to the first corner: digits would be lost far from the origin.
@@ -276,7 +280,7 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian = "auto"
     if sides is not None:
         domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
         return replace(domain, contrast=_contrast(g))
-    return _refracting(mesh, own, g, laplacian)
+    return _refracting(mesh, own, g, least, laplacian)
 
 
 def _contrast(g: FloatArray) -> float:
@@ -284,20 +288,19 @@ def _contrast(g: FloatArray) -> float:
     return float(np.exp(np.ptp(np.linalg.slogdet(g)[1]) / (2 * g.shape[1])))
 
 
-def _of_smooth_metric(mesh: Mesh, corners: FloatArray, laplacian: Laplacian) -> Operators:
-    """The operators of simplices with a metric (m, p + 1, 3, 3) at each corner, linear in between."""
-    simplices = MetricSimplices.in_metric(mesh, corners)
-    mean = corners.mean(axis=1)
+def _of_smooth_metric(mesh: Mesh, corners: FloatArray, least: float, laplacian: Laplacian) -> Operators:
+    """The operators of simplices with a metric (m, p + 1, 3, 3) at each corner, as `operators_in_metric`."""
+    simplices = MetricSimplices.in_metric(mesh, corners, least)
     if mesh.is_tetrahedral:
-        return _of_tetrahedra(mesh, simplices, mean)
+        return _TetrahedronOperators(mesh, corners.mean(axis=1), simplices)
     axes = plane_axes(mesh)
-    inside = axes @ mean @ np.swapaxes(axes, 1, 2)
-    sides = simplices.lengths[:, [1, 2, 0], [2, 0, 1]]
+    inside = axes @ corners.mean(axis=1) @ np.swapaxes(axes, 1, 2)
+    sides = simplices.lengths[:, ::-1]  # opposite each corner
     if (sides.sum(axis=1) > 2 * (1 + _ROUNDING) * longest_sides(sides)).all():
         domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
         return replace(domain, contrast=_contrast(inside))
     # For heat: what each face says alone.
-    domain = operators_in_metric(mesh, inside, laplacian)
+    domain = operators_in_metric(mesh, inside, least, laplacian)
     return replace(domain, surface=None, simplices=simplices)
 
 
@@ -314,7 +317,7 @@ def _common_lengths(mesh: Mesh, own: FloatArray) -> FloatArray | None:
     return None if (slack < _SLACK * was_slack).any() else np.asarray(mean)
 
 
-def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, laplacian: Laplacian) -> Operators:
+def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
     glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F))
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
@@ -326,11 +329,10 @@ def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, laplacian: Laplaci
     is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
     fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
     if fits or not (mesh.measures > 0).all():
-        least = float(np.sqrt(np.linalg.eigvalsh(g)[:, 0].min()))
         simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, least)
     else:
         axes = plane_axes(mesh)
-        simplices = MetricSimplices.in_metric(mesh, (np.swapaxes(axes, 1, 2) @ g @ axes)[:, None])
+        simplices = MetricSimplices.in_metric(mesh, (np.swapaxes(axes, 1, 2) @ g @ axes)[:, None], least)
     return replace(domain, simplices=simplices, contrast=_contrast(g))
 
 
@@ -344,39 +346,109 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
     return replace(apart, l=sides, twin=twin)
 
 
-def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Operators:
-    """The operators of tetrahedra with a metric g (m, 3, 3) on each, for heat, and `simplices` for distance."""
-    check_measures(mesh)
-    m, n = mesh.n_faces, mesh.n_vertices
-    # Each in a space of its own: edges times C have the lengths of the metric C C^T.
-    corners = mesh.V[mesh.F]
-    corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)
-    apart = np.arange(4 * m).reshape(-1, 4)
-    # In units of the mean length: libigl multiplies up to six of them.
-    pairs, lengths = simplices.edges
-    unit = float(2.0 ** round(np.log2(float(lengths.mean()))))
-    flat = corners.reshape(-1, 3) / unit
-    own = sp.csc_matrix((np.ones(4 * m), mesh.F.ravel(), np.arange(4 * m + 1)), shape=(n, 4 * m)).T
-    G = (igl.grad(flat, apart) @ own).tocsc() / unit
-    weights = np.abs(igl.volume(flat, apart)) * unit**3
-    # A quarter of the volume for each corner, as igl.massmatrix has it.
-    mass = np.bincount(mesh.F.ravel(), np.repeat(weights / 4, 4), minlength=n)
-    domain = Operators(
-        L=laplacian_of_gradient(G, weights),
-        M=sp.diags(mass, format="csc"),
-        gradient=G,
-        weights=weights,
-        face_sizes=longest_sides(lengths.reshape(m, -1)),
-        mean_edge_length=np.nan,
-        components=mesh.components,
-        boundary=mesh.boundary,
-        referenced=mesh.referenced,
-        longest_distance=np.nan,
-        is_surface=False,
-        simplices=simplices,
-        contrast=_contrast(g),
-    )
-    return _with_shortest_edges(domain, mesh, pairs, lengths)
+class _TetrahedronOperators(Operators):
+    """The operators of tetrahedra with a metric g (m, 3, 3) on each, made on first use: `simplices` need none of them.
+
+    Parameters
+    ----------
+    mesh, g
+        The tetrahedra, and the metric for heat.
+    simplices : MetricSimplices
+        For distance.
+    """
+
+    def __init__(self, mesh: Mesh, g: FloatArray, simplices: MetricSimplices) -> None:
+        vars(self).update(_mesh=mesh, _g=g, simplices=simplices, is_surface=False)
+
+    _mesh: Mesh
+    _g: FloatArray
+    simplices: MetricSimplices
+
+    @property
+    def n(self) -> int:
+        """Number of vertices."""
+        return self._mesh.n_vertices
+
+    @cached_property
+    def referenced(self) -> BoolArray:
+        """Vertices that a face uses."""
+        return self._mesh.referenced
+
+    @cached_property
+    def boundary(self) -> BoolArray:
+        """Vertices on the boundary."""
+        return self._mesh.boundary
+
+    @cached_property
+    def components(self) -> IntArray:
+        """Component label of each vertex."""
+        return self._mesh.components
+
+    @cached_property
+    def _own(self) -> tuple[FloatArray, FloatArray, IntArray, float]:
+        """Edges (e,) of the tetrahedra, corners (4 m, 3) in a space of its own for each, their numbers, and the unit.
+
+        Edges times C have the lengths of the metric C C^T. The unit is about the mean length: libigl multiplies six.
+        """
+        lengths = self.simplices.edges[1]
+        unit = float(2.0 ** round(np.log2(float(lengths.mean()))))
+        corners = self._mesh.V[self._mesh.F]
+        corners = (corners - corners[:, :1]) @ np.linalg.cholesky(self._g)
+        return lengths, corners.reshape(-1, 3) / unit, np.arange(4 * len(corners)).reshape(-1, 4), unit
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Volumes (m,)."""
+        _, corners, apart, unit = self._own
+        return np.asarray(np.abs(igl.volume(corners, apart)) * unit**3)
+
+    @cached_property
+    def face_sizes(self) -> FloatArray:
+        """Longest edge (m,) of each."""
+        return longest_sides(self._own[0].reshape(self._mesh.n_faces, -1))
+
+    @cached_property
+    def gradient(self) -> sp.csc_matrix:
+        """G (3 m, n)."""
+        _, corners, apart, unit = self._own
+        n, m = self.n, self._mesh.n_faces
+        own = sp.csc_matrix((np.ones(4 * m), self._mesh.F.ravel(), np.arange(4 * m + 1)), shape=(n, 4 * m)).T
+        return (igl.grad(corners, apart) @ own).tocsc() / unit
+
+    @cached_property
+    def L(self) -> sp.csc_matrix:
+        """Laplacian (n, n)."""
+        return laplacian_of_gradient(self.G, self.weights)
+
+    @cached_property
+    def M(self) -> sp.csc_matrix:
+        """A quarter of the volume for each corner, as igl.massmatrix has it."""
+        mass = np.bincount(self._mesh.F.ravel(), np.repeat(self.weights / 4, 4), minlength=self.n)
+        return sp.diags(mass, format="csc")
+
+    @cached_property
+    def _graph(self) -> sp.csr_array:
+        return connectivity.shortest_edge_graph(*self.simplices.edges, self.n)
+
+    @cached_property
+    def mean_edge_length(self) -> float:
+        """Over the distinct edges."""
+        return float(self._graph.data.mean())
+
+    @cached_property
+    def longest_distances(self) -> FloatArray:
+        """Of each component."""
+        return connectivity.longest_paths(self._graph, self.components)
+
+    @cached_property
+    def longest_distance(self) -> float:
+        """Length of a longest shortest path along edges."""
+        return float(self.longest_distances.max())
+
+    @cached_property
+    def contrast(self) -> float:
+        """Largest ratio of lengths."""
+        return _contrast(self._g)
 
 
 def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths: FloatArray) -> Operators:
@@ -393,8 +465,8 @@ def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths
     )
 
 
-def _checked(g: FloatArray, mesh: Mesh) -> FloatArray:
-    """The metric (m, p, p) in the planes of triangles or in space, from one per face."""
+def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float]:
+    """The metric (m, p, p) in the planes of triangles or in space, from one per face, and its least length."""
     m, p = mesh.n_faces, mesh.F.shape[1] - 1
     shapes = [(m, 3, 3), (mesh.n_vertices, 3, 3)] + [(m, 2, 2)] * (p == 2)
     if g.shape not in (shapes[0], *shapes[2:]):
@@ -406,12 +478,11 @@ def _checked(g: FloatArray, mesh: Mesh) -> FloatArray:
     if p < g.shape[1]:
         axes = plane_axes(mesh)
         symmetric = np.asarray(axes @ symmetric @ np.swapaxes(axes, 1, 2), np.float64)
-    _check_definite(np.asarray(np.linalg.eigvalsh(symmetric)[:, 0]), g)
-    return symmetric
+    return symmetric, _least_length(np.asarray(np.linalg.eigvalsh(symmetric)[:, 0]), g)
 
 
-def _checked_at_corners(g: FloatArray, mesh: Mesh) -> FloatArray:
-    """The metric (m, p + 1, 3, 3) at the corners of faces, from one per vertex."""
+def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float]:
+    """The metric (m, p + 1, 3, 3) at the corners of faces, from one per vertex, and its least length."""
     symmetric = _symmetric(g)
     corners = symmetric[mesh.F]
     if mesh.is_tetrahedral:
@@ -419,8 +490,7 @@ def _checked_at_corners(g: FloatArray, mesh: Mesh) -> FloatArray:
     else:
         axes, smallest = plane_axes(mesh)[:, None], np.full(mesh.n_vertices, np.inf)
         np.minimum.at(smallest, mesh.F, np.linalg.eigvalsh(axes @ corners @ np.swapaxes(axes, 2, 3))[..., 0])
-    _check_definite(smallest, g)
-    return np.asarray(corners)
+    return np.asarray(corners), _least_length(smallest, g)
 
 
 def _symmetric(g: FloatArray) -> FloatArray:
@@ -432,8 +502,8 @@ def _symmetric(g: FloatArray) -> FloatArray:
     return np.asarray((g + transposed) / 2)
 
 
-def _check_definite(smallest: FloatArray, g: FloatArray) -> None:
-    """An error unless the smallest eigenvalues (k,) of tensors (k, p, p) on their faces are in the range of doubles."""
+def _least_length(smallest: FloatArray, g: FloatArray) -> float:
+    """The root of the least of the smallest eigenvalues (k,) of tensors (k, p, p); an error unless doubles hold all."""
     _raise_at_first(~(smallest > 0), "metric", g, "must be positive definite on its face")
     _raise_at_first(
         (smallest < 1 / _LARGEST) | (np.abs(g).max(axis=(1, 2)) > _LARGEST),
@@ -442,6 +512,7 @@ def _check_definite(smallest: FloatArray, g: FloatArray) -> None:
         f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}, or squares leave the range of "
         "doubles: take another unit",
     )
+    return float(np.sqrt(smallest.min()))
 
 
 def _raise_at_first(bad: AnyArray, name: str, values: AnyArray, problem: str, remedy: str = "") -> None:

@@ -9,7 +9,6 @@ import scipy.sparse as sp
 
 from heat_igl.kernels.sweep import hopf_lax
 from heat_igl.mesh import Mesh
-from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import FloatArray, IntArray
 
 # Differences between tensors that are taken for rounding.
@@ -24,8 +23,9 @@ class MetricSimplices:
     ----------
     corners : (m, p + 1) int64
         Vertices of each triangle (p = 2) or tetrahedron (p = 3).
-    lengths : (m, p + 1, p + 1) float64
-        Distances between the corners of each, in its own metric; empty if they are those between positions `V`.
+    lengths : (m, pairs) float64
+        Distances between the corners of each, in its own metric, pairs in the order of `np.tril_indices`; empty if they
+        are those between positions `V`.
     n : int
         Number of vertices.
     V : (n, 3) float64 or None
@@ -57,8 +57,8 @@ class MetricSimplices:
         return cls(mesh.F, np.empty(0), mesh.n_vertices, mesh.V, mesh.V, is_given=True)
 
     @classmethod
-    def in_metric(cls, mesh: Mesh, tensors: FloatArray) -> MetricSimplices:
-        """The faces of a mesh with a metric (m, q, 3, 3) on each, or at each of its corners.
+    def in_metric(cls, mesh: Mesh, tensors: FloatArray, least: float) -> MetricSimplices:
+        """The faces of a mesh with a metric (m, q, 3, 3) on each, or at each of its corners, and its `least` length.
 
         Where it is the same everywhere, distance is that in space after a linear map.
         """
@@ -70,51 +70,43 @@ class MetricSimplices:
             return replace(mapped, is_given=False)
         is_given = tensors.shape[1] > 1
         if p == 3 and not is_given:
-            tensors = _at_corners(mesh, tensors[:, 0])
-            is_given = tensors.shape[1] == 1
-        inside = tensors
-        if p == 2:
-            axes = plane_axes(mesh)[:, None]
-            inside = axes @ tensors @ np.swapaxes(axes, 2, 3)
-        least = float(np.sqrt(np.linalg.eigvalsh(inside)[..., 0].min()))
+            tensors, fitted = _at_corners(mesh, tensors[:, 0])
+            is_given, least = tensors.shape[1] == 1, min(least, fitted)
         simplices = cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors, is_given)
         squares = simplices.squared_lengths()
         lengths = np.sqrt(squares[:, 0])
         if tensors.shape[1] > 1:
             # Along an edge, the logarithm of the squared length is linear: Simpson's rule of an exponential function.
-            a, b = np.sqrt(np.einsum("miij->mij", squares)), np.sqrt(np.einsum("mjij->mij", squares))
+            a, b = (np.sqrt(squares[:, end, np.arange(len(end))]) for end in np.tril_indices(p + 1, -1))
             lengths = (a + 4 * np.sqrt(a * b) + b) / 6
         return replace(simplices, lengths=lengths)
 
     @classmethod
     def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
         """Triangles (m, 3) whose sides (m, 3), opposite each corner, have lengths of their own."""
-        lengths = np.zeros((len(F), 3, 3))
-        lengths[:, [1, 2, 0], [2, 0, 1]] = lengths[:, [2, 0, 1], [1, 2, 0]] = sides
         # The tensor E^+ P E^+^T for edges E from the first corner with scalar products P.
         across = np.linalg.pinv(V[F[:, 1:]] - V[F[:, :1]])
-        squares = lengths**2
-        products = (squares[:, 1:, :1] + squares[:, :1, 1:] - squares[:, 1:, 1:]) / 2
+        a, b, c = sides.T**2
+        products = np.stack([c, (b + c - a) / 2, (b + c - a) / 2, b], axis=1).reshape(-1, 2, 2)
         tensors = across @ products @ np.swapaxes(across, 1, 2)
-        return cls(F, lengths, len(V), None, V, least, tensors[:, None])
+        return cls(F, sides[:, ::-1], len(V), None, V, least, tensors[:, None])
 
     def squared_lengths(self) -> FloatArray:
-        """Squared distances (m, q, p + 1, p + 1) between the corners, in each of the `tensors`."""
+        """Squared distances (m, q, pairs) between the corners, in each of the `tensors`; pairs as in `lengths`."""
         if self.place is None or self.tensors is None:
             raise ValueError("these simplices have lengths, and no tensors")
         if self.tensors.shape[1] == 1 and len(self.lengths):
-            return self.lengths[:, None] ** 2
+            return np.ascontiguousarray(self.lengths[:, None] ** 2)
         corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
         return np.asarray(hopf_lax.squared_lengths(corners, V, np.ascontiguousarray(self.tensors)))
 
     @property
     def edges(self) -> tuple[IntArray, FloatArray]:
         """Edges (e, 2) of each simplex one after the other, and their lengths (e,) there."""
-        i, j = np.triu_indices(self.corners.shape[1], 1)
-        ends = self.corners[:, np.stack([i, j], axis=1)].reshape(-1, 2)
+        ends = self.corners[:, np.stack(np.tril_indices(self.corners.shape[1], -1), axis=1)].reshape(-1, 2)
         if self.V is not None:
             return ends, np.linalg.norm(self.V[ends[:, 0]] - self.V[ends[:, 1]], axis=1)
-        return ends, self.lengths[:, i, j].ravel()
+        return ends, self.lengths.ravel()
 
     def halved(self) -> MetricSimplices:
         """Tetrahedra in space, each cut into eight at the middles of the edges; the vertices keep their numbers.
@@ -127,7 +119,7 @@ class MetricSimplices:
         if self.V is None or self.corners.shape[1] != 4:
             raise ValueError("only tetrahedra in space can be halved: give their positions V")
         ends, middle = self._middles()
-        ab, ac, ad, bc, bd, cd = self.n + middle.reshape(-1, 6).T
+        ab, ac, bc, ad, bd, cd = self.n + middle.reshape(-1, 6).T
         a, b, c, d = self.corners.T
         # Four at the corners, and the octahedron between them around its diagonal from ac to bd.
         around = [(ab, ad), (ad, cd), (cd, bc), (bc, ab)]
@@ -148,12 +140,13 @@ class MetricSimplices:
         return np.unique(np.sort(self.edges[0], axis=1), axis=0, return_inverse=True)
 
 
-def _at_corners(mesh: Mesh, g: FloatArray) -> FloatArray:
+def _at_corners(mesh: Mesh, g: FloatArray) -> tuple[FloatArray, float]:
     """The tensors g (m, 3, 3) of tetrahedra as samples of a smooth field: (m, 4, 3, 3) at their corners.
 
     Around each vertex, a linear function is fitted to the logarithms of the tensors. The tensor at the vertex is taken
     from it if it explains all of their variance, and is that of each tetrahedron if it leaves a quarter or more, as it
-    leaves of a step: jumps stay where they are. (m, 1, 3, 3) if the field is smooth nowhere.
+    leaves of a step: jumps stay where they are. (m, 1, 3, 3) if the field is smooth nowhere. The second result is the
+    least length of a unit vector in the tensors at vertices.
     """
     m, n = mesh.n_faces, mesh.n_vertices
     i, j = np.triu_indices(3)
@@ -183,7 +176,7 @@ def _at_corners(mesh: Mesh, g: FloatArray) -> FloatArray:
     is_constant = variance <= _ROUNDING * (1 + sums[:, 37])
     share = np.clip(1 - 4 * (1 - explained / np.where(is_constant, 1, variance)), 0, 1) * ~is_constant
     if not share.any():
-        return g[:, None]
+        return g[:, None], np.inf
     found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
     count = np.maximum(at.sum(axis=1), 1)[:, None]
     least = share[mesh.F].min(axis=1)[:, None]
@@ -196,4 +189,4 @@ def _at_corners(mesh: Mesh, g: FloatArray) -> FloatArray:
     sizes, axes = np.linalg.eigh(log)
     at_vertex = (axes * np.exp(sizes)[:, None]) @ np.swapaxes(axes, 1, 2)
     part = share[mesh.F][..., None, None]
-    return np.asarray((1 - part) * g[:, None] + part * at_vertex[mesh.F])
+    return np.asarray((1 - part) * g[:, None] + part * at_vertex[mesh.F]), float(np.exp(sizes.min() / 2))

@@ -20,15 +20,22 @@ cdef class Facet:
     cdef double sag[3][3]
     cdef double product[36]
     cdef double share[3]
-    cdef double level[3]
     cdef double g[3]
-    cdef double lean[3]
     cdef double H[3][3]
+    # Of the last value: T and its derivatives; lengths at v, in the middle and at x, and what they came from.
+    cdef double T, near, middle, far
+    cdef double rise[3]
+    cdef double square[4]
+    cdef double log[3]
+    cdef double by[4][3]
+    cdef double bent[3]
 
     cdef bint is_flat(self) noexcept nogil
     cdef double dual(self, int k, const double* e) noexcept nogil
     cdef double along_edges(self) noexcept nogil
     cdef double length(self, const double* x) noexcept nogil
+    cdef double lean(self, int i) noexcept nogil
     cdef double value(self, const double* x) noexcept nogil
+    cdef void curve(self, const double* x) noexcept nogil
     cdef double newton(self, double limit) noexcept nogil
     cdef (double, double) on_triangle(self, double* x) noexcept nogil

@@ -12,6 +12,7 @@ class Facet:
     Of its corners, `D` are the distances less `start`, and `sag[i][j]` is by how much the square of T sags below that
     of the linear function between two of them. `product` has the scalar products of the vectors from v to the corners,
     in one metric (q = 1), or in that at v and those at the corners (q = p + 1). The best place has the shares `share`.
+    For p = 2 the third of each is 0.
     """
 
     @cython.cfunc
@@ -57,101 +58,89 @@ class Facet:
         return best
 
     def length(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """|v - x|, with its derivatives `g` and `H` by the shares x, and `lean` by moving v towards each corner.
+        """|v - x| for shares x, with its derivatives `g` by these.
 
         The logarithm of the squared length in one direction is linear between the corners: lengths are those of the
         inverse metric as well, and the integral along the line is Simpson's rule of an exponential function.
         """
-        p: cython.int = self.p
         to: cython.double = 0.0
-        by: cython.double[3][4]
-        slope: cython.double[3]
-        bent: cython.double[3]
-        size: cython.double[4]
         for k in range(self.q):
-            of = 0.0
-            for i in range(p):
-                by[k][i] = 0.0
-                for j in range(p):
-                    by[k][i] += self.product[9 * k + 3 * i + j] * x[j]
-                of += x[i] * by[k][i]
-            if not of > 0.0:
+            m = cython.address(self.product[9 * k])
+            by = cython.address(self.by[k][0])
+            for i in range(3):
+                by[i] = m[3 * i] * x[0] + m[3 * i + 1] * x[1] + m[3 * i + 2] * x[2]
+            square: cython.double = x[0] * by[0] + x[1] * by[1] + x[2] * by[2]
+            if not square > 0.0:
                 return 0.0
-            size[k] = of
+            self.square[k] = square
             if k > 0:
-                self.level[k - 1] = log(of)
-                to += x[k - 1] * self.level[k - 1]
-            for i in range(p):
-                by[k][i] *= 2.0 / of
-        near: cython.double = sqrt(size[0])
+                self.log[k - 1] = log(square)
+                to += x[k - 1] * self.log[k - 1]
+            for i in range(3):
+                by[i] *= 2.0 / square
+        self.near = sqrt(self.square[0])
         if self.q == 1:
-            for i in range(p):
-                self.g[i] = 0.5 * near * by[0][i]
-                self.lean[i] = -self.g[i]
-                for j in range(i + 1):
-                    self.H[i][j] = self.product[3 * i + j] / near - self.g[i] * self.g[j] / near
-            return near
-        far: cython.double = exp(0.5 * to)
-        middle: cython.double = 4.0 * sqrt(near * far)
-        # Of the logarithms of the squared lengths at v and at x; lengths change by half of that.
-        a: cython.double = (near + 0.5 * middle) / 12.0
-        b: cython.double = (far + 0.5 * middle) / 12.0
-        aa: cython.double = (near + 0.25 * middle) / 24.0
-        bb: cython.double = (far + 0.25 * middle) / 24.0
-        ab: cython.double = 0.25 * middle / 24.0
-        for i in range(p):
-            bent[i] = 0.0
-            for k in range(p):
-                bent[i] += x[k] * by[k + 1][i]
-            slope[i] = self.level[i] + bent[i]
-            self.g[i] = a * by[0][i] + b * slope[i]
-            self.lean[i] = a * (self.level[i] - log(size[0]) - by[0][i]) - b * bent[i]
-        for i in range(p):
-            for j in range(i + 1):
-                of = 2.0 * self.product[3 * i + j] / size[0] - by[0][i] * by[0][j]
-                to = by[i + 1][j] + by[j + 1][i]
-                for k in range(p):
-                    to += x[k] * (
-                        2.0 * self.product[9 * (k + 1) + 3 * i + j] / size[k + 1] - by[k + 1][i] * by[k + 1][j]
-                    )
-                self.H[i][j] = (
-                    a * of
-                    + b * to
-                    + aa * by[0][i] * by[0][j]
-                    + bb * slope[i] * slope[j]
-                    + ab * (by[0][i] * slope[j] + slope[i] * by[0][j])
-                )
-        return (near + middle + far) / 6.0
+            for i in range(3):
+                self.g[i] = 0.5 * self.near * self.by[0][i]
+            return self.near
+        self.far = exp(0.5 * to)
+        self.middle = 4.0 * sqrt(self.near * self.far)
+        for i in range(3):
+            self.bent[i] = x[0] * self.by[1][i] + x[1] * self.by[2][i] + x[2] * self.by[3][i]
+            # Of the logarithms of the squared lengths at v and at x; lengths change by half of that.
+            self.g[i] = (self.near + 0.5 * self.middle) / 12.0 * self.by[0][i]
+            self.g[i] += (self.far + 0.5 * self.middle) / 12.0 * (self.log[i] + self.bent[i])
+        return (self.near + self.middle + self.far) / 6.0
+
+    @cython.cfunc
+    @cython.nogil
+    def lean(self, i: cython.int) -> cython.double:
+        """What the last `length` gains by moving v towards corner i."""
+        if self.q == 1:
+            return -0.5 * self.near * self.by[0][i]
+        gain: cython.double = self.log[i] - log(self.square[0]) - self.by[0][i]
+        return (self.near + 0.5 * self.middle) / 12.0 * gain - (self.far + 0.5 * self.middle) / 12.0 * self.bent[i]
 
     def value(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """T(x) + |v - x| for shares x of the corners, inf if there is none; sets its derivatives `g` and `H`."""
-        p: cython.int = self.p
-        mean: cython.double = 0.0
-        square: cython.double = 0.0
-        hang: cython.double[3]
-        for i in range(p):
-            mean += x[i] * self.D[i]
-            hang[i] = 0.0
-            for j in range(p):
-                if j != i:
-                    hang[i] += 0.5 * x[j] * self.sag[i][j]
-            square -= x[i] * hang[i]
-        square += mean * mean
+        """T(x) + |v - x| for shares x of the corners, inf if there is none; sets its derivatives `g`."""
+        mean: cython.double = x[0] * self.D[0] + x[1] * self.D[1] + x[2] * self.D[2]
+        square: cython.double = mean * mean
+        for i in range(3):
+            self.rise[i] = 0.5 * (x[0] * self.sag[i][0] + x[1] * self.sag[i][1] + x[2] * self.sag[i][2])
+            square -= x[i] * self.rise[i]
         if not square > 0.0:
             return INFINITY
-        T: cython.double = sqrt(square)
+        self.T = sqrt(square)
         L: cython.double = self.length(x)
         if not L > 0.0:
             return INFINITY
-        for i in range(p):
-            hang[i] = (mean * self.D[i] - hang[i]) / T
-            self.g[i] += hang[i]
+        for i in range(3):
+            self.rise[i] = (mean * self.D[i] - self.rise[i]) / self.T
+            self.g[i] += self.rise[i]
+        return self.start + self.T + L
+
+    def curve(self, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
+        """Set the second derivatives `H` of the last `value`, which was that at x."""
+        half: cython.double = 0.5 * self.middle
+        a: cython.double = 0.5 * self.near if self.q == 1 else (self.near + half) / 12.0
+        aa: cython.double = 0.5 * a if self.q == 1 else (self.near + 0.5 * half) / 24.0
+        b: cython.double = (self.far + half) / 12.0
+        bb: cython.double = (self.far + 0.5 * half) / 24.0
+        one = cython.address(self.by[0][0])
+        for i in range(self.p):
             for j in range(i + 1):
-                self.H[i][j] += (
-                    self.D[i] * self.D[j] - (0.5 * self.sag[i][j] if i != j else 0.0) - hang[i] * hang[j]
-                ) / T
-                self.H[j][i] = self.H[i][j]
-        return self.start + T + L
+                found: cython.double = self.D[i] * self.D[j] - 0.5 * self.sag[i][j] - self.rise[i] * self.rise[j]
+                found = found / self.T + 2.0 * a / self.square[0] * self.product[3 * i + j]
+                found += (aa - a) * one[i] * one[j]
+                if self.q > 1:
+                    u: cython.double = self.log[i] + self.bent[i]
+                    w: cython.double = self.log[j] + self.bent[j]
+                    to: cython.double = self.by[i + 1][j] + self.by[j + 1][i]
+                    for k in range(1, self.q):
+                        along: cython.double = 2.0 / self.square[k] * self.product[9 * k + 3 * i + j]
+                        to += x[k - 1] * (along - self.by[k][i] * self.by[k][j])
+                    found += b * to + bb * u * w + half / 48.0 * (one[i] * w + one[j] * u)
+                self.H[i][j] = self.H[j][i] = found
 
     def newton(self, limit: cython.double) -> cython.double:
         """The least value over the facet, by Newton's method from `share`, which is changed; inf if not below `limit`.
@@ -161,8 +150,7 @@ class Facet:
         x: cython.double[3]
         y: cython.double[3]
         for i in range(3):
-            x[i] = self.share[i] if i < self.p else 0.0
-            self.share[i] = x[i]
+            x[i] = self.share[i]
         best: cython.double = self.value(x)
         if best == INFINITY:
             # The linear place is on the other side of what T allows: begin in the middle.
@@ -179,6 +167,7 @@ class Facet:
         for _step in range(MOST_STEPS):
             if best == INFINITY:
                 return best
+            self.curve(x)
             db: cython.double = 0.0
             de: cython.double = 0.0
             if self.p == 2:

@@ -24,15 +24,15 @@ cdef class HopfLax(Facet):
     cdef const int[:, ::1] corners
     cdef const int[::1] first
     cdef const int[::1] incident
-    cdef const double[:, :, :, ::1] squares
-    cdef const double[:, :, ::1] mean
+    cdef const double[:, :, ::1] squares
+    cdef const double[:, ::1] mean
     cdef const double[:, :, ::1] gradient
     cdef const double[:, ::1] V
     cdef PriorityQueue queue
     cdef double[::1] pending
     cdef int[::1] n_visits
     cdef long long n_carried
-    cdef double unit, low, nearest
+    cdef double unit, low
     cdef const unsigned char[::1] fixed
     cdef double[::1] d
     cdef int[::1] label
@@ -48,16 +48,18 @@ cdef class HopfLax(Facet):
     cdef double[::1] widest
     cdef double[::1] slack
     cdef double[::1] bend
-    # The corners of the facet in the simplex.
+    # The corners of the facet in the simplex, and distance at these.
     cdef int side[3]
+    cdef double level[3]
 
     cdef void wait(self, int v) noexcept nogil
     cdef int nearest_waiting(self) noexcept nogil
     cdef void spread(self) noexcept nogil
     cdef int nearest_corner(self) noexcept nogil
-    cdef void face(self, int c) noexcept nogil
-    cdef double linear(self, int s, int c, double limit, int from_v) noexcept nogil
-    cdef double across(self, int s, int c, double da, double db, double dc) noexcept nogil
+    cdef double face(self, int s, int c) noexcept nogil
+    cdef double linear(self, int s, int c, double room, int from_v) noexcept nogil
+    cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
+    cdef double across(self, int s, int c, double room) noexcept nogil
     cdef void sharpen(self, double least) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil

@@ -29,15 +29,23 @@ from cython.cimports.libc.math import INFINITY, fabs, log, log2, sqrt
 from heat_igl.kernels.signals import raise_caught
 
 
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _pair(i: cython.int, j: cython.int) -> cython.int:
+    """The number of the pair of two corners, as `np.tril_indices` counts them below the diagonal."""
+    return i * (i - 1) // 2 + j if i > j else j * (j - 1) // 2 + i
+
+
 def squared_lengths(
     corners: cython.const[cython.int][:, ::1],
     V: cython.const[cython.double][:, ::1],
     tensors: cython.const[cython.double][:, :, :, ::1],
 ):
-    """Squared distances (m, q, p + 1, p + 1) between the corners of simplices (m, p + 1), in the q tensors of each."""
+    """Squared distances (m, q, pairs) between the corners of simplices (m, p + 1), in the q tensors of each."""
     size: cython.int = corners.shape[1]
-    found = np.zeros((corners.shape[0], tensors.shape[1], size, size))
-    squares: cython.double[:, :, :, ::1] = found
+    found = np.zeros((corners.shape[0], tensors.shape[1], size * (size - 1) // 2))
+    squares: cython.double[:, :, ::1] = found
     e: cython.double[3]
     with cython.nogil:
         for s in range(corners.shape[0]):
@@ -49,14 +57,14 @@ def squared_lengths(
                         g = cython.address(tensors[s, k, 0, 0])
                         square: cython.double = g[0] * e[0] * e[0] + g[4] * e[1] * e[1] + g[8] * e[2] * e[2]
                         square += 2.0 * (g[1] * e[0] * e[1] + g[2] * e[0] * e[2] + g[5] * e[1] * e[2])
-                        squares[s, k, i, j] = squares[s, k, j, i] = square
+                        squares[s, k, _pair(i, j)] = square
     return found
 
 
 def measured(
     corners: cython.const[cython.int][:, ::1],
     V: cython.const[cython.double][:, ::1],
-    squares: cython.const[cython.double][:, :, :, ::1],
+    squares: cython.const[cython.double][:, :, ::1],
 ):
     """What `HopfLax` takes of simplices beside their `squared_lengths`.
 
@@ -69,9 +77,9 @@ def measured(
     """
     size: cython.int = corners.shape[1]
     m = corners.shape[0]
-    means, widths, slacks = np.zeros((m, size, size)), np.zeros(m), np.ones(m)
+    means, widths, slacks = np.zeros((m, squares.shape[2])), np.zeros(m), np.ones(m)
     gradients, growths = np.zeros((m, size, 3)), np.zeros(m)
-    mean: cython.double[:, :, ::1] = means
+    mean: cython.double[:, ::1] = means
     widest: cython.double[::1] = widths
     slack: cython.double[::1] = slacks
     gradient: cython.double[:, :, ::1] = gradients
@@ -80,23 +88,24 @@ def measured(
     P: cython.double[3][3]
     with cython.nogil:
         for s in range(corners.shape[0]):
-            for i in range(size):
-                for j in range(i):
-                    least: cython.double = INFINITY
-                    total: cython.double = 0.0
-                    for k in range(squares.shape[1]):
-                        total += squares[s, k, i, j]
-                        least = min(least, squares[s, k, i, j])
-                        widest[s] = max(widest[s], squares[s, k, i, j])
-                    mean[s, i, j] = mean[s, j, i] = total / squares.shape[1]
-                    if total > 0.0:
-                        slack[s] = min(slack[s], least / mean[s, i, j])
+            for i in range(squares.shape[2]):
+                least: cython.double = INFINITY
+                total: cython.double = 0.0
+                for k in range(squares.shape[1]):
+                    total += squares[s, k, i]
+                    least = min(least, squares[s, k, i])
+                    widest[s] = max(widest[s], squares[s, k, i])
+                mean[s, i] = total / squares.shape[1]
+                if total > 0.0:
+                    slack[s] = min(slack[s], least / mean[s, i])
             slack[s] = sqrt(slack[s])
             for i in range(size - 1):
                 for x in range(3):
                     e[i][x] = V[corners[s, i + 1], x] - V[corners[s, 0], x]
-                for j in range(size - 1):
-                    P[i][j] = 0.5 * (mean[s, i + 1, 0] + mean[s, j + 1, 0] - mean[s, i + 1, j + 1])
+                P[i][i] = mean[s, _pair(i + 1, 0)]
+                for j in range(i):
+                    between: cython.double = P[i][i] + P[j][j] - mean[s, _pair(i + 1, j + 1)]
+                    P[i][j] = P[j][i] = 0.5 * between
             if size == 3:
                 # The third vector is the normal of a triangle, as long as twice its area.
                 _cross(e[0], e[1], e[2])
@@ -139,10 +148,10 @@ class HopfLax(Facet):
         Vertices of each simplex.
     first, incident : (n + 1,) int32, (m (p + 1),) int32
         Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
-    squares : (m, q, p + 1, p + 1) float64
+    squares : (m, q, pairs) float64
         Squared distances between the corners of each simplex, in its metric (q = 1), or in that of each of its corners
-        (q = p + 1).
-    mean : (m, p + 1, p + 1) float64
+        (q = p + 1); pairs of corners in the order of `np.tril_indices`.
+    mean : (m, pairs) float64
         The mean of these over the metrics.
     widest, slack : (m,) float64
         The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
@@ -242,7 +251,10 @@ class HopfLax(Facet):
                         u: cython.int = self.corners[s, c]
                         if u == v:
                             continue
-                        value: cython.double = self.linear(s, c, self.d[u], v)
+                        nearest: cython.double = self.face(s, c)
+                        if not nearest < self.d[u]:
+                            continue
+                        value: cython.double = self.linear(s, c, self.d[u] - nearest, v)
                         if value < self.d[u]:
                             self.label[u] = self.label[self.corners[s, self.nearest_corner()]]
                             self.d[u], self.facet[u] = value, s * size + c
@@ -267,103 +279,114 @@ class HopfLax(Facet):
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    def face(self, c: cython.int) -> cython.void:
-        """Look at the facet opposite corner c."""
+    def face(self, s: cython.int, c: cython.int) -> cython.double:
+        """Look at the facet opposite corner c of simplex s: sets `side` and `level`, returns the least distance."""
         k: cython.int = 0
         i: cython.int
+        nearest: cython.double = INFINITY
         for i in range(self.p + 1):
             if i != c:
                 self.side[k] = i
-                self.share[k] = 0.0
+                self.level[k] = self.d[self.corners[s, i]]
+                nearest = min(nearest, self.level[k])
                 k += 1
+        return nearest
 
-    def linear(self, s: cython.int, c: cython.int, limit: cython.double, from_v: cython.int) -> cython.double:
-        """The least value at corner c of simplex s with T linear; sets `side`, `share` and `nearest`.
+    def linear(self, s: cython.int, c: cython.int, room: cython.double, from_v: cython.int) -> cython.double:
+        """The least value at corner c of simplex s with T linear, after `face`; sets `share`.
 
-        It may be inf if it is not below `limit`, or if a vertex `from_v` has no share in it, unless that is negative.
+        It may be inf if it is above the nearest corner by `room` or more, or if a vertex `from_v` has no share in it,
+        unless that is negative.
         """
-        self.face(c)
-        sq = cython.address(self.mean[s, 0, 0])
-        size: cython.int = self.p + 1
-        best: cython.double = INFINITY
-        at: cython.int = 0
-        other: cython.int = -1
-        place: cython.double = 0.0
-        j: cython.int
-        d: cython.double[3]
-        d[2] = self.nearest = INFINITY
-        for i in range(self.p):
-            d[i] = self.d[self.corners[s, self.side[i]]]
-            self.nearest = min(self.nearest, d[i])
-        if not self.nearest < limit:
-            return INFINITY
-        if self.p == 3 and d[0] < INFINITY and d[1] < INFINITY and d[2] < INFINITY:
-            value: cython.double = self.across(s, c, d[0], d[1], d[2])
-            if value < INFINITY:
-                return value
-        for i in range(self.p):
-            if d[i] == INFINITY:
-                continue
-            to: cython.double = sq[size * c + self.side[i]]
-            is_from: cython.bint = from_v < 0 or self.corners[s, self.side[i]] == from_v
-            if is_from:
-                value = d[i] + sqrt(to)
-                if value < best:
-                    best, at, other = value, i, -1
-            for j in range(i + 1, self.p):
-                if d[j] == INFINITY or not (is_from or self.corners[s, self.side[j]] == from_v):
-                    continue
-                # From corner i, along the edge to corner j.
-                base: cython.double = sq[size * self.side[i] + self.side[j]]
-                rise: cython.double = d[j] - d[i]
-                steep: cython.double = rise * rise / base
-                if not steep < 1.0:
-                    continue
-                along: cython.double = 0.5 * (base + to - sq[size * c + self.side[j]]) / base
-                far: cython.double = sqrt(max(to - along * along * base, 0.0) / (1.0 - steep))
-                along -= far * rise / base
-                if 0.0 < along < 1.0:
-                    value = d[i] + rise * along + far
-                    if value < best:
-                        best, at, other, place = value, i, j, along
-        if best < INFINITY:
-            self.share[at] = 1.0
-            if other >= 0:
-                self.share[at], self.share[other] = 1.0 - place, place
-        return best
+        self.share[0] = self.share[1] = self.share[2] = 0.0
+        if self.p == 2:
+            return self.over_edge(s, c, 0, 1, INFINITY)
+        least: cython.double = self.across(s, c, room)
+        if least == INFINITY:
+            # Values are convex: the least one is on an edge beyond which that over the whole plane lies.
+            is_within: cython.bint[3]
+            for k in range(3):
+                is_within[k] = self.share[k] > 0.0
+            for k in range(3):
+                i: cython.int = 1 if k == 0 else 0
+                j: cython.int = 1 if k == 2 else 2
+                if not is_within[k] and (
+                    from_v < 0 or self.corners[s, self.side[i]] == from_v or self.corners[s, self.side[j]] == from_v
+                ):
+                    least = self.over_edge(s, c, i, j, least)
+        return least
 
-    def across(
-        self, s: cython.int, c: cython.int, da: cython.double, db: cython.double, dc: cython.double
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    def over_edge(
+        self, s: cython.int, c: cython.int, i: cython.int, j: cython.int, least: cython.double
     ) -> cython.double:
-        """The least value if it lies inside the triangle of `side`, else inf; sets `share` then."""
-        sq = cython.address(self.mean[s, 0, 0])
-        a: cython.int = self.side[0]
-        b: cython.int = self.side[1]
-        e: cython.int = self.side[2]
-        to: cython.double = sq[4 * c + a]
-        bb: cython.double = sq[4 * a + b]
-        ee: cython.double = sq[4 * a + e]
-        be: cython.double = 0.5 * (bb + ee - sq[4 * b + e])
+        """The smaller of `least` and the least value over the edge between two corners of `side`; then sets `share`."""
+        sq = cython.address(self.mean[s, 0])
+        base: cython.double = sq[_pair(self.side[j], self.side[i])]
+        to: cython.double = sq[_pair(c, self.side[i])]
+        rise: cython.double = self.level[j] - self.level[i]
+        rest: cython.double = base - rise * rise
+        # From corner i, along the edge to corner j: at one of them if T is steeper than the metric allows.
+        along: cython.double = -rise
+        far: cython.double = 0.0
+        if rest > 0.0:
+            along = 0.5 * (base + to - sq[_pair(c, self.side[j])])
+            far = sqrt(max(to * base - along * along, 0.0) / rest)
+            along -= far * rise
+        if not along > 0.0:
+            along, far = 0.0, sqrt(to)
+        elif along < base and rest > 0.0:
+            along /= base
+            far += rise * along
+        else:
+            along, far = 1.0, rise + sqrt(sq[_pair(c, self.side[j])])
+        if not self.level[i] + far < least:
+            return least
+        for k in range(3):
+            self.share[k] = 0.0
+        self.share[i], self.share[j] = 1.0 - along, along
+        return self.level[i] + far
+
+    def across(self, s: cython.int, c: cython.int, room: cython.double) -> cython.double:
+        """The least value if it lies inside the triangle of `side`, else inf; sets `share`.
+
+        Else shares are those where the value over the whole plane is least, 0 if there is no such place, and 1 if no
+        value is above the nearest corner by less than `room`.
+        """
+        sq = cython.address(self.mean[s, 0])
+        to: cython.double = sq[_pair(c, self.side[0])]
+        bb: cython.double = sq[_pair(self.side[1], self.side[0])]
+        ee: cython.double = sq[_pair(self.side[2], self.side[0])]
+        be: cython.double = 0.5 * (bb + ee - sq[_pair(self.side[2], self.side[1])])
         det: cython.double = bb * ee - be * be
-        if not det > 0.0:
+        b: cython.double = self.level[1] - self.level[0]
+        e: cython.double = self.level[2] - self.level[0]
+        if not (det > 0.0 and fabs(b) + fabs(e) < INFINITY):
             return INFINITY
-        wb: cython.double = 0.5 * (bb + to - sq[4 * c + b])
-        we: cython.double = 0.5 * (ee + to - sq[4 * c + e])
+        det = 1.0 / det
+        wb: cython.double = 0.5 * (bb + to - sq[_pair(c, self.side[1])])
+        we: cython.double = 0.5 * (ee + to - sq[_pair(c, self.side[2])])
         # The foot of v on the plane, and the slope of T there, in shares of b and e.
-        fb: cython.double = (ee * wb - be * we) / det
-        fe: cython.double = (bb * we - be * wb) / det
-        gb: cython.double = (ee * (db - da) - be * (dc - da)) / det
-        ge: cython.double = (bb * (dc - da) - be * (db - da)) / det
-        steep: cython.double = gb * (db - da) + ge * (dc - da)
-        if not steep < 1.0:
+        fb: cython.double = (ee * wb - be * we) * det
+        fe: cython.double = (bb * we - be * wb) * det
+        height: cython.double = max(to - fb * wb - fe * we, 0.0)
+        if height >= room * room:
+            self.share[0] = self.share[1] = self.share[2] = 1.0
             return INFINITY
-        far: cython.double = sqrt(max(to - fb * wb - fe * we, 0.0) / (1.0 - steep))
+        gb: cython.double = (ee * b - be * e) * det
+        ge: cython.double = (bb * e - be * b) * det
+        rest: cython.double = 1.0 - gb * b - ge * e
+        if not rest > 0.0:
+            return INFINITY
+        far: cython.double = sqrt(height / rest)
         fb -= far * gb
         fe -= far * ge
+        self.share[0], self.share[1], self.share[2] = 1.0 - fb - fe, fb, fe
         if not (fb > 0.0 and fe > 0.0 and fb + fe < 1.0):
             return INFINITY
-        self.share[0], self.share[1], self.share[2] = 1.0 - fb - fe, fb, fe
-        return da + (db - da) * fb + (dc - da) * fe + far
+        return self.level[0] + b * fb + e * fe + far
 
     def sharpen(self, least: cython.double) -> cython.void:
         """Second order: the nearest vertex next, until no distance around any has changed by more than is settled."""
@@ -423,7 +446,7 @@ class HopfLax(Facet):
         if best_at < 0:
             return
         s, c = best_at // size, best_at % size
-        self.face(c)
+        self.face(s, c)
         for i in range(self.p):
             self.share[i] = kept[i]
             self.place[v, i] = kept[i]
@@ -449,30 +472,30 @@ class HopfLax(Facet):
 
         It is at least what first order and the nearest corner say, with some margin.
         """
-        linear: cython.double = self.linear(s, c, best, -1)
-        near: cython.double = self.nearest - self.low
+        nearest: cython.double = self.face(s, c)
         # Between corners at one distance from a point, the square is less by at most a third of a squared edge.
-        sag: cython.double = near - sqrt(max(near * near - 0.5 * self.widest[s], 0.0))
-        if not self.nearest + self.slack[s] * (linear - self.nearest) - sag < best:
+        most: cython.double = 0.5 * self.widest[s]
+        near: cython.double = max(nearest - self.low, sqrt(most))
+        sag: cython.double = near - sqrt(max(near * near - most, 0.0))
+        room: cython.double = (best + sag - nearest) / self.slack[s]
+        if not room > 0.0:
             return INFINITY
-        return self.curved(s, c, linear, best)
+        linear: cython.double = self.linear(s, c, room, -1)
+        return self.curved(s, c, linear, best) if linear - nearest < room else INFINITY
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """Fill `product`: of v's metric first, then of those of the corners of the facet."""
-        j: cython.int
-        size: cython.int = self.p + 1
-        for k in range(self.q if self.q == 1 else self.p + 1):
+        for k in range(self.q):
             at: cython.int = 0
             if self.q > 1:
                 at = c if k == 0 else self.side[k - 1]
-            sq = cython.address(self.squares[s, at, 0, 0])
+            sq = cython.address(self.squares[s, at, 0])
+            m = cython.address(self.product[9 * k])
             for i in range(self.p):
-                for j in range(i + 1):
-                    self.product[9 * k + 3 * i + j] = self.product[9 * k + 3 * j + i] = 0.5 * (
-                        sq[size * c + self.side[i]]
-                        + sq[size * c + self.side[j]]
-                        - sq[size * self.side[i] + self.side[j]]
-                    )
+                m[4 * i] = sq[_pair(c, self.side[i])]
+                for j in range(i):
+                    between: cython.double = m[4 * i] + m[4 * j] - sq[_pair(self.side[i], self.side[j])]
+                    m[3 * i + j] = m[3 * j + i] = 0.5 * between
 
     def curved(self, s: cython.int, c: cython.int, best: cython.double, limit: cython.double) -> cython.double:
         """The least value at corner c of simplex s with T of second order, after that of first order; sets `share`.
@@ -555,15 +578,14 @@ class HopfLax(Facet):
         if fabs(doubt) >= fabs(sag):
             return 0.0
         sag -= fabs(doubt) * max(doubt / sag, -doubt / sag, 1.0 - trusted) * (1.0 if sag > 0.0 else -1.0)
-        at: cython.int = self.side[i] if self.q > 1 else 0
-        from_i: cython.double = 2.0 * Di * sqrt(self.squares[s, at, self.side[i], self.side[j]])
-        at = self.side[j] if self.q > 1 else 0
-        from_j: cython.double = 2.0 * Dj * sqrt(self.squares[s, at, self.side[i], self.side[j]])
+        edge: cython.int = _pair(self.side[i], self.side[j])
+        from_i: cython.double = 2.0 * Di * sqrt(self.squares[s, self.side[i] if self.q > 1 else 0, edge])
+        from_j: cython.double = 2.0 * Dj * sqrt(self.squares[s, self.side[j] if self.q > 1 else 0, edge])
         most: cython.double = min(rise + from_i, from_j - rise) - level
         least: cython.double = max(rise - from_i, -from_j - rise) - level
         base: cython.double = 0.0
         for k in range(self.q):
-            base = max(base, self.squares[s, k, self.side[i], self.side[j]])
+            base = max(base, self.squares[s, k, edge])
         # Where T falls below both ends, vertices that rest on each other would lower each other.
         most = min(most, max(self.bend[s] * base, fabs(rise)) - level)
         return max(min(sag, most), least)
@@ -593,4 +615,4 @@ class HopfLax(Facet):
         for k in range(3):
             self.slope[v, k] = 0.0
             for i in range(self.p):
-                self.slope[v, k] += self.lean[i] * self.gradient[s, self.side[i], k]
+                self.slope[v, k] += self.lean(i) * self.gradient[s, self.side[i], k]
