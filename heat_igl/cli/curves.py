@@ -12,7 +12,7 @@ import typer
 import heat_igl
 from heat_igl import drawing
 from heat_igl.cli import options as opt
-from heat_igl.cli.output import Row, check_file, check_output, print_rows, write_results, wrote
+from heat_igl.cli.options import Row, check_file, check_output, print_rows, write_results, wrote
 from heat_igl.errors import SourceError
 from heat_igl.heat import Level, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, read_mesh_or_cloud, read_polylines, write_mesh

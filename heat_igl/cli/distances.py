@@ -14,7 +14,7 @@ from rich.console import Console
 import heat_igl
 from heat_igl import drawing
 from heat_igl.cli import options as opt
-from heat_igl.cli.output import Row, check_output, described, plan_row, print_rows, write_results, wrote
+from heat_igl.cli.options import Row, check_output, described, plan_row, print_rows, write_results, wrote
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import HeatMethodSolver, Magnitude

@@ -20,7 +20,7 @@ from rich.console import Console
 import heat_igl
 from heat_igl.applications import Statistic
 from heat_igl.cli import options as opt
-from heat_igl.cli.output import Row, check_file, described, print_json, print_rows, prints_json, say, wrote
+from heat_igl.cli.options import Row, check_file, described, print_json, print_rows, prints_json, say, wrote
 from heat_igl.errors import BatchError
 from heat_igl.io import complete_file, read_mesh
 from heat_igl.mesh import Mesh

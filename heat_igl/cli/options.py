@@ -1,20 +1,200 @@
-"""Types of arguments and options that several commands share."""
+"""Arguments and options that several commands share, checks of files before any work is done for them, and output."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import numpy as np
 import typer
+from rich.console import Console
+from rich.text import Text
 
-from heat_igl.cli.output import check_curves, check_json, check_picture
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import MeshError, MissingExtraError, SourceError
 from heat_igl.geodesic import DistanceMethod
-from heat_igl.io import MAP_SUFFIXES, read_attributes
+from heat_igl.io import CURVE_SUFFIXES, MAP_SUFFIXES, complete_file, read_attributes, write_mesh, write_point_cloud
+from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.plan import Plan
 from heat_igl.steps import Boundary
-from heat_igl.typing import AnyArray, BoolArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from heat_igl.drawing import Picture
+
+# For distances alone: an array of numpy, and text with a line per vertex.
+ARRAY_SUFFIXES = (".npy", ".csv")
+_STANDARD_OUTPUT = Path("-")
+# What writes files of a format, and the extra that brings it.
+_LIBRARIES = {".dxf": "ezdxf io", ".vtu": "meshio io", ".gii": "nibabel io"}
+
+
+def say(message: str) -> None:
+    """Print one line to standard error."""
+    print(f"heat-igl: {' '.join(message.split())}", file=sys.stderr)
+
+
+# Name and text of a line, and what JSON holds in place of the text, if anything.
+Row = tuple[str, str] | tuple[str, str, Any]
+
+
+def plan_row(plan: Plan) -> Row:
+    """The line that says which engine measures distance, and why."""
+    return "plan", str(plan), {"engine": plan.engine, "tolerance": plan.tolerance, "reason": plan.reason}
+
+
+def described(path: Path, mesh: Mesh | PointCloud) -> Row:
+    """The line that names a mesh or a point cloud, with the numbers of vertices and faces."""
+    kind = "tetrahedra" if isinstance(mesh, Mesh) and mesh.is_tetrahedral else "triangles"
+    name, points = ("point cloud", "points") if isinstance(mesh, PointCloud) else ("mesh", "vertices")
+    counts = {"path": str(path), "n_vertices": mesh.n_vertices, f"n_{kind}": mesh.n_faces}
+    return name, f"{path}: {mesh.n_vertices} {points}, {mesh.n_faces} {kind}", counts
+
+
+def print_rows(rows: Sequence[Row], json_file: Path | None = None) -> None:
+    """Print names and texts as two columns; also as JSON to a file, or to standard output in their place."""
+    if json_file == _STANDARD_OUTPUT:
+        print_json(as_dictionary(rows), json_file)
+        return
+    width = max(len(row[0]) for row in rows)
+    console = Console(highlight=False, soft_wrap=True)  # no wrapping, so that pipes receive one line per row
+    for name, text, *_ in rows:
+        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {text}"))
+    if json_file is not None:
+        print_json(as_dictionary(rows), json_file)
+
+
+def as_dictionary(rows: Sequence[Row]) -> dict[str, Any]:
+    """The rows by name, with _ for spaces; what stands in several rows, and all files written, as lists."""
+    found: dict[str, list[Any]] = {}
+    for name, text, *value in rows:
+        found.setdefault(name.replace(" ", "_"), []).append(value[0] if value else text)
+    return {name: values if len(values) > 1 or name == "wrote" else values[0] for name, values in found.items()}
+
+
+def print_json(content: Mapping[str, Any], json_file: Path) -> None:
+    """Write JSON to a file, or print it where the file is called ``-``."""
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+    if json_file == _STANDARD_OUTPUT:
+        print(text, end="")
+        return
+    with complete_file(json_file) as temporary:
+        temporary.write_bytes(text.encode("utf8"))
+
+
+def prints_json(json_file: Path | None) -> bool:
+    """Whether standard output is for JSON alone."""
+    return json_file == _STANDARD_OUTPUT
+
+
+def wrote(*paths: Path | None) -> list[Row]:
+    """The lines that name the files that were written."""
+    return [("wrote", str(path)) for path in paths if path is not None]
+
+
+def check_json(json_file: Path | None) -> Path | None:
+    """Check that JSON can be written to the value of an option."""
+    if json_file is not None and json_file != _STANDARD_OUTPUT:
+        check_writable(json_file)
+    return json_file
+
+
+def check_writable(path: Path) -> None:
+    """Check that a file can be written to `path`, before it is computed; an OSError if not."""
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a directory: name a file in it")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path} cannot be written: there is no directory {path.parent}")
+    try:
+        # Permissions do not suffice: the file system may be read-only.
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise OSError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def check_file(option: str, path: Path, what: str, suffixes: Sequence[str], library: str = "") -> None:
+    """Check that the value of an option is a file of a format for `what`, whose library is there, and can be written.
+
+    Raises
+    ------
+    ValueError, MissingExtraError, OSError
+        If it is not. `library` is its name and that of the extra that brings it.
+    """
+    if path.suffix.lower() not in suffixes:
+        raise ValueError(f"{option} {path}: {what} go to {', '.join(suffixes[:-1])} or {suffixes[-1]} files")
+    if library:
+        MissingExtraError.check(f"a {path.suffix.lower()} file", *library.split())
+    check_writable(path)
+
+
+def check_picture(picture: Path | None) -> Path | None:
+    """Check that a picture can be written to the value of an option."""
+    if picture is not None:
+        from heat_igl.drawing.output import PICTURE_SUFFIXES
+
+        check_file("--picture", picture, "pictures", PICTURE_SUFFIXES, "matplotlib view")
+    return picture
+
+
+def check_curves(output: Path) -> Path:
+    """Check that curves can be written to the value of an option."""
+    check_file("--output", output, "curves", CURVE_SUFFIXES, _LIBRARIES.get(output.suffix.lower(), ""))
+    return output
+
+
+def check_output(mesh: Mesh | PointCloud, output: Path | None) -> None:
+    """Check that mesh and distance can be written to `output`."""
+    if output is None:
+        return
+    kind = "distances"
+    with_mesh: tuple[str, ...] = (".ply", ".vtu", ".gii")
+    if isinstance(mesh, PointCloud):
+        kind, with_mesh = "points with distances", (".ply",)
+    elif mesh.is_tetrahedral:
+        kind, with_mesh = "tetrahedra with distances", (".vtu",)
+    check_file("--output", output, kind, with_mesh + ARRAY_SUFFIXES, _LIBRARIES.get(output.suffix.lower(), ""))
+
+
+def write_results(
+    mesh: Mesh | PointCloud,
+    distance: FloatArray,
+    output: Path | None,
+    picture: Path | None,
+    draw: Callable[[], Picture],
+) -> list[Row]:
+    """Write a distance, and the picture that `draw` makes of it, to those files that are asked for."""
+    drawn = None
+    if picture is not None:
+        # Drawing comes before writing, since it may still fail.
+        with Console(stderr=True).status("drawing"):
+            drawn = draw()
+    if output is not None:
+        _write_distance(output, mesh, distance)
+    if drawn is not None and picture is not None:
+        drawn.save(picture)
+    return wrote(output, picture)
+
+
+def _write_distance(path: Path, mesh: Mesh | PointCloud, distance: FloatArray) -> None:
+    """Write a distance: with the mesh or the points, or alone to one of the `ARRAY_SUFFIXES`."""
+    suffix = path.suffix.lower()
+    if suffix not in ARRAY_SUFFIXES:
+        if isinstance(mesh, PointCloud):
+            write_point_cloud(path, mesh, distance=distance)
+        else:
+            write_mesh(path, mesh, distance=distance)
+        return
+    with complete_file(path) as temporary, temporary.open("wb") as file:
+        if suffix == ".npy":
+            np.save(file, distance)
+        else:
+            lines = [f"{vertex},{value!r}" for vertex, value in enumerate(distance.tolist())]
+            file.write("\n".join(["vertex,distance", *lines, ""]).encode("ascii"))
+
 
 MeshArgument = Annotated[
     Path,

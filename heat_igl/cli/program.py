@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 import heat_igl
-from heat_igl.cli.output import say
+from heat_igl.cli.options import say
 from heat_igl.errors import (
     AccuracyWarning,
     BatchError,

@@ -16,7 +16,7 @@ from heat_igl import reference
 from heat_igl.cli import options as opt
 from heat_igl.cli.curves import projected
 from heat_igl.cli.demo import demonstrate
-from heat_igl.cli.output import check_file, check_json, check_writable, described, print_rows
+from heat_igl.cli.options import check_file, check_json, check_writable, described, print_rows
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import SignedHeatSolver
 from heat_igl.io import read_mesh_or_cloud

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from heat_igl.kernels.linear import dissection, graphs, symbolic
+from heat_igl.kernels.linear import dissection, symbolic
 from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 
 # Pieces with more vertices than this, and than this share of all, are cut one at a time, and their parts are dissected
@@ -63,7 +63,7 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
     n = len(ends) - 1
     # A vertex with very many neighbours belongs to every separator.
     is_hub = np.diff(ends) > max(10 * np.sqrt(n), 64)
-    others = graphs.breadth_first(ends, neighbours, is_hub.view(np.uint8))
+    others = dissection.breadth_first(ends, neighbours, is_hub.view(np.uint8))
     order = np.concatenate([others, np.flatnonzero(is_hub).astype(np.int32)])
     inner = n - int(is_hub.sum())
     is_start, parent = np.zeros(n, np.uint8), np.full(n, -1, np.int64)
@@ -78,13 +78,13 @@ def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = Non
         order[low:high] = order[low:high][some]
         parent_here[:] = np.where(parent_here < 0, above, parent_here + low)
         return [
-            (graphs.subgraph(*graph, some[first:end]), low + first, low + end, above if up < 0 else up + low)
+            (dissection.subgraph(*graph, some[first:end]), low + first, low + end, above if up < 0 else up + low)
             for first, end, up in rest.tolist()
         ]
 
     pieces = [
         (graph, low, high, inner if inner < n else -1)
-        for graph, low, high in _apart(*graphs.subgraph(ends, neighbours, order[:inner]))
+        for graph, low, high in _apart(*dissection.subgraph(ends, neighbours, order[:inner]))
     ]
     running: set[Future[list[Any]]] = set()
     while pieces or running:
