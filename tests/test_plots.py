@@ -9,11 +9,11 @@ from surfaces import arcs, twice
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.drawing import camera, figure, raster, shading
+from heat_igl.drawing import camera, figure, plots, raster
 from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.plots import Picture, plot, plot_field, plot_labels
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK
-from heat_igl.drawing.surface_image import LINE
+from heat_igl.drawing.surface_image import LINE, stripe_coverage
 
 
 @pytest.fixture(autouse=True)
@@ -113,12 +113,12 @@ def test_stripes_are_light_in_every_second_interval():
 
 def test_stripes_too_narrow_to_be_seen_become_an_even_tone():
     values = np.random.default_rng(0).uniform(0, 1, 500)
-    share = shading.stripe_coverage(values, np.full(500, 10.0), 0.01)
+    share = stripe_coverage(values, np.full(500, 10.0), 0.01)
     np.testing.assert_allclose(share, 0.5, atol=1e-3)
     # A pixel's mean over the values in it, by a slow second opinion.
     fine = values[:, None] + 0.15 * (np.arange(2000) + 0.5 - 1000) / 2000
     slow = (np.floor(fine / 0.2) % 2 == 1).mean(axis=1)
-    np.testing.assert_allclose(shading.stripe_coverage(values, np.full(500, 0.15), 0.2), slow, atol=2e-3)
+    np.testing.assert_allclose(stripe_coverage(values, np.full(500, 0.15), 0.2), slow, atol=2e-3)
 
 
 def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not():
@@ -308,7 +308,7 @@ def test_what_cannot_be_drawn_is_rejected_by_name():
 def test_labels_have_one_colour_each_and_neighbours_others():
     mesh = shapes.grid(12)
     cells = heat_igl.voronoi_cells(heat_igl.HeatMethodSolver(mesh), [0, 12, 84, 100, 168])
-    numbers = shading.colour_numbers(cells.labels, mesh.edges, 10)
+    numbers = plots._colour_numbers(cells.labels, mesh.edges, 10)
     assert len({(label, number) for label, number in zip(cells.labels, numbers, strict=True)}) == 5
     across = cells.labels[mesh.edges[:, 0]] != cells.labels[mesh.edges[:, 1]]
     assert across.any()

@@ -18,7 +18,7 @@ from surfaces import folded_torus
 
 from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
-from heat_igl.reference import guarded, measurement
+from heat_igl.reference import guarded, solvers
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
 from heat_igl.validation import closed_forms
@@ -356,7 +356,7 @@ def test_what_is_no_distance_is_an_error(change, message, monkeypatch):
 
 
 def test_a_missing_package_names_its_extra(monkeypatch):
-    monkeypatch.setattr(measurement, "find_spec", lambda name: object() if name == "igl" else None)
+    monkeypatch.setattr(solvers, "find_spec", lambda name: object() if name == "igl" else None)
     mesh = rectangle(3, 3, 1, 1)
     with pytest.raises(MissingExtraError, match="needs pymeshlab: pip install pymeshlab"):
         reference.meshlab(mesh, 0)

@@ -153,7 +153,7 @@ def test_infinite_errors_reach_json_as_text():
 
 
 def test_a_method_that_fails_is_a_row_that_says_why(monkeypatch):
-    monkeypatch.setattr(reference.measurement, "find_spec", lambda name: None if name == "pymeshlab" else object())
+    monkeypatch.setattr(reference.solvers, "find_spec", lambda name: None if name == "pymeshlab" else object())
     mesh = shapes.grid(5)
     steps = []
     report = validate(mesh, [[0], [7]], ["meshlab", "heat"], progress=lambda *step: steps.append(step[1]))

@@ -14,7 +14,7 @@ from rich.table import Table
 import heat_igl
 from heat_igl.cli import options as opt
 from heat_igl.cli.options import described, plan_row, print_json, print_rows, prints_json, say
-from heat_igl.drawing.output import Picture
+from heat_igl.drawing.figure import Picture
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.validation import METHODS, ValidationReport, ValidationRow, draw_sources

@@ -134,7 +134,7 @@ def check_file(option: str, path: Path, what: str, suffixes: Sequence[str], libr
 def check_picture(picture: Path | None) -> Path | None:
     """Check that a picture can be written to the value of an option."""
     if picture is not None:
-        from heat_igl.drawing.output import PICTURE_SUFFIXES
+        from heat_igl.drawing.figure import PICTURE_SUFFIXES
 
         check_file("--picture", picture, "pictures", PICTURE_SUFFIXES, "matplotlib view")
     return picture

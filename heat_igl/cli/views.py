@@ -41,7 +41,7 @@ def view(
 ) -> None:
     """An interactive page, opened in the browser: a click moves the source, and the distance follows."""
     from heat_igl.drawing import page
-    from heat_igl.drawing.output import PAGE_SUFFIXES
+    from heat_igl.drawing.figure import PAGE_SUFFIXES
 
     target = html or Path(f"{mesh.stem}-view.html")
     check_file("--html", target, "pages", PAGE_SUFFIXES, "matplotlib view")

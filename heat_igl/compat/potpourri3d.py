@@ -26,8 +26,8 @@ from heat_igl.curves import (
     straighten,
     trace_geodesic,
 )
+from heat_igl.curves.geodesics import as_curve
 from heat_igl.curves.places import CommonFaces
-from heat_igl.curves.shortening import as_curve
 from heat_igl.geodesic import geodesic_distance
 from heat_igl.heat import HeatMethodSolver, SignedHeatSolver, VectorHeatSolver
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh, SurfaceCurve, SurfacePoints

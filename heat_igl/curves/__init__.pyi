@@ -1,6 +1,6 @@
 from heat_igl.curves.bezier import geodesic_bezier as geodesic_bezier
-from heat_igl.curves.cut_mesh import CutMesh as CutMesh
-from heat_igl.curves.cut_mesh import MeshPiece as MeshPiece
+from heat_igl.curves.cutting import CutMesh as CutMesh
+from heat_igl.curves.cutting import MeshPiece as MeshPiece
 from heat_igl.curves.cutting import cut as cut
 from heat_igl.curves.drawn_curves import curve_on as curve_on
 from heat_igl.curves.drawn_curves import curve_through as curve_through
@@ -13,9 +13,9 @@ from heat_igl.curves.level_sets import enclosed_areas as enclosed_areas
 from heat_igl.curves.level_sets import isolines as isolines
 from heat_igl.curves.level_sets import offset_curves as offset_curves
 from heat_igl.curves.level_sets import sublevel_areas as sublevel_areas
-from heat_igl.curves.local_log_maps import LogMapsWithin as LogMapsWithin
-from heat_igl.curves.local_log_maps import log_maps_within as log_maps_within
+from heat_igl.curves.log_maps import LogMapsWithin as LogMapsWithin
 from heat_igl.curves.log_maps import log_map as log_map
+from heat_igl.curves.log_maps import log_maps_within as log_maps_within
 from heat_igl.curves.means import karcher_mean as karcher_mean
 from heat_igl.curves.paths import shortest_path as shortest_path
 from heat_igl.curves.paths import shortest_paths as shortest_paths

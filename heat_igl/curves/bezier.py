@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.curves.geodesics import GeodesicPathSolver
+from heat_igl.curves.geodesics import GeodesicPathSolver, Shortened, as_curve
 from heat_igl.curves.places import Waypoints, mixed_places
-from heat_igl.curves.shortening import Shortened, as_curve
 from heat_igl.errors import SourceError, shown
 from heat_igl.mesh import MeshLike, SurfaceCurve, as_simplices
 from heat_igl.sources.source_sets import on_simplex

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.curves.geodesics import GeodesicPathSolver
+from heat_igl.curves.geodesics import GeodesicPathSolver, as_curve
 from heat_igl.curves.places import Waypoints, mixed_places
-from heat_igl.curves.shortening import as_curve
 from heat_igl.errors import SourceError, names_guessed, positive, truth
 from heat_igl.heat import SignedHeatSolver
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices

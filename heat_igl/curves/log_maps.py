@@ -1,19 +1,23 @@
-"""The logarithmic map: the vector from a point of the surface to every vertex, along the shortest path."""
+"""The logarithmic map: vectors from a point to all vertices, or around many vertices up to a radius."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+import scipy.sparse as sp
 
-from heat_igl.errors import SourceError, names_guessed, require_choice
+from heat_igl.errors import MeshError, SourceError, names_guessed, positive, require_choice
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.heat import VectorHeatSolver
 from heat_igl.intrinsic import TangentFrames
-from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices
+from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices, one_sided
+from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
-from heat_igl.typing import FloatArray
-from heat_igl.windows import vectors_from
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.windows import PathDirections, WindowWays, contradicted, in_circle, local_searches, vectors_from
+from heat_igl.windows.tables import MARGIN, Tables, from_triangulation
 
 LogMapMethod = Literal["exact", "vector-heat"]
 
@@ -100,3 +104,132 @@ def _vertex(source: Sources, n: int) -> int | None:
     if len(places) != 1:
         raise SourceError(f"source must be one vertex or point, not {len(places)}")
     return None if is_point else int(places[0])
+
+
+@dataclass(frozen=True, eq=False)
+class LogMapsWithin:
+    """The shortest paths from k vertices to all vertices up to a radius, made by `log_maps_within`.
+
+    Attributes
+    ----------
+    distance : (k, n) scipy.sparse.csr_array
+        What is stored is a distance, the 0 of a vertex from itself too; what is not stored is farther than the radius.
+        The other arrays have the same pattern, and share its ``indices`` and ``indptr``.
+    departure : (k, n) scipy.sparse.csr_array
+        Polar angle in [0, 2 pi) at which the path leaves the source, in the frame of `tangent_frames` there. The log
+        map is ``frames.from_angles(departure.data, distance.data)``.
+    arrival : (k, n) scipy.sparse.csr_array
+        Angle in [0, 2 pi) in the frame of the vertex in which the path arrives, away from the source.
+    rotation : (k, n) scipy.sparse.csr_array
+        Angle in [-pi, pi] by which parallel transport along the path turns components: a vector with the angle a in the
+        frame of the source has the angle a + rotation in that of the vertex. Departure and arrival are 0 at the
+        source, where rotation is 0 too.
+
+    Notes
+    -----
+    Angles are those of `GeodesicSolver.directions`. As coordinates for torch or JAX, without a copy of the values:
+    ``torch.sparse_csr_tensor(d.indptr, d.indices, d.data)``, or `rows` and ``d.indices``.
+    """
+
+    distance: sp.csr_array
+    departure: sp.csr_array
+    arrival: sp.csr_array
+    rotation: sp.csr_array
+
+    def __repr__(self) -> str:
+        k, n = self.distance.shape
+        return f"LogMapsWithin({k} sources, {n} vertices, {self.distance.nnz} paths)"
+
+    @property
+    def rows(self) -> IntArray:
+        """The row of each stored entry."""
+        return np.repeat(np.arange(self.distance.shape[0]), np.diff(self.distance.indptr))
+
+
+def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = None) -> LogMapsWithin:
+    """Log maps of some vertices up to a radius: distance, directions and parallel transport, all exact.
+
+    Parameters
+    ----------
+    mesh : mesh
+        Triangles on n vertices, oriented alike, at most two at an edge: whatever `as_mesh` takes.
+    radius : float
+        In the mesh's unit, positive; ``inf`` for all that can be reached.
+    sources : int, sequence of int, or (n,) mask of bool, optional
+        The k vertices that are asked, each for itself; all n if not given.
+
+    Returns
+    -------
+    LogMapsWithin
+        Four sparse arrays of one pattern, that of `distances_within`.
+
+    Raises
+    ------
+    MeshError
+        If the mesh cannot be used, holds tetrahedra, or has no tangent frames.
+    ValueError
+        If `radius` is not a positive number.
+    SourceError
+        If `sources` does not name vertices.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> import numpy as np
+    >>> mesh = heat_igl.shapes.grid(4)
+    >>> maps = heat_igl.log_maps_within(mesh, 0.3, sources=[12])  # the middle
+    >>> maps.distance.indices.tolist(), maps.distance.data.tolist()
+    ([7, 11, 12, 13, 17], [0.25, 0.25, 0.0, 0.25, 0.25])
+    >>> frames = heat_igl.tangent_frames(mesh)
+    >>> vectors = frames.from_angles(maps.departure.data, maps.distance.data)
+    >>> bool(np.allclose(frames.to_world(vectors[-1:], [12]), mesh.V[17] - mesh.V[12]))
+    True
+    """
+    limit = positive("radius", radius, infinite=True)
+    triangles = one_sided(mesh, "parallel transport along paths needs")
+    if triangles.is_tetrahedral:
+        raise MeshError("log maps need triangles, and the mesh holds tetrahedra")
+    n = triangles.n_vertices
+    chosen = triangles.originals[np.arange(n) if sources is None else named_vertices(sources, n)]
+    surface = unfolding_surface(triangles, MARGIN)
+    directions, tables = PathDirections(surface), from_triangulation(surface.unfolding)
+    indptr, ways, distance = _paths(tables, triangles.V, chosen, limit)
+    angles, polar = directions.of_ways(ways), directions.angles
+    back = polar.from_polar(ways.vertex, angles.back)
+    departure = polar.from_polar(np.repeat(chosen, np.diff(indptr)), angles.departure)
+    turn = back + np.pi - departure - angles.turning
+    rotation = turn - 2 * np.pi * np.rint(turn / (2 * np.pi))
+    values = [np.nan_to_num(value) for value in (angles.departure, in_circle(back + np.pi), rotation)]
+    shape = len(chosen), n
+    found = (sp.csr_array((data, ways.vertex, indptr), shape=shape) for data in (distance, *values))
+    return LogMapsWithin(*(array[:, triangles.originals] if triangles.has_copies else array for array in found))
+
+
+def _paths(tables: Tables, V: FloatArray, chosen: IntArray, radius: float) -> tuple[IntArray, WindowWays, FloatArray]:
+    """Of paths from vertices (k,), source after source: the ends (k + 1,), how they run, and their lengths."""
+    number = tables.number[chosen]
+    order = np.argsort(number, kind="stable")
+    limit = float(tables.scaled(radius))
+    parts = local_searches.in_chunks(
+        tables, number[order], lambda work, part: local_searches.within(work, part, limit), V, directed=True
+    )
+    counts, vertex, distance, way, line, is_wrong = (np.concatenate(column) for column in zip(*parts, strict=True))
+    if is_wrong.any():
+        raise contradicted(f"from vertex {chosen[order[np.argmax(is_wrong)]]}")
+    # In the order of the sources, and of each in the order of the vertices.
+    source = np.repeat(order, counts)
+    key = source * tables.n + vertex
+    sort = np.argsort(key, kind="stable")
+    key, vertex, way, line = key[sort], vertex[sort], way[sort], line[sort]
+    root = tables.old_vertex[way[:, 0]]
+    # Roots are nearer than the vertices, so they are there too.
+    ways = WindowWays(
+        vertex.astype(np.int64),
+        np.searchsorted(key, source[sort] * tables.n + root),
+        tables.old_half_edge(way[:, 1]),
+        line[:, :2],
+        tables.old_half_edge(way[:, 2]),
+        tables.unscaled(line[:, 2]),
+    )
+    indptr = np.append(0, np.cumsum(np.bincount(source, minlength=len(chosen))))
+    return indptr, ways, tables.unscaled(distance[sort])

@@ -1,5 +1,5 @@
-from heat_igl.drawing.output import PAGE_SUFFIXES as PAGE_SUFFIXES
-from heat_igl.drawing.output import PICTURE_SUFFIXES as PICTURE_SUFFIXES
+from heat_igl.drawing.figure import PAGE_SUFFIXES as PAGE_SUFFIXES
+from heat_igl.drawing.figure import PICTURE_SUFFIXES as PICTURE_SUFFIXES
 from heat_igl.drawing.plots import Page as Page
 from heat_igl.drawing.plots import Picture as Picture
 from heat_igl.drawing.plots import page as page

@@ -21,7 +21,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from heat_igl.drawing.output import PAGE_SUFFIXES
+from heat_igl.drawing.figure import PAGE_SUFFIXES
 from heat_igl.drawing.scene import (
     DISTANCE_COLOURS,
     DISTANCE_LABEL,

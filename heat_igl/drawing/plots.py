@@ -22,12 +22,10 @@ from dataclasses import replace
 import numpy as np
 
 from heat_igl.drawing.discs import slopes
-from heat_igl.drawing.figure import lay_out
+from heat_igl.drawing.figure import Picture, lay_out
 from heat_igl.drawing.html_view import Page, page
 from heat_igl.drawing.line_drawing import write_line_drawing
-from heat_igl.drawing.output import Picture
 from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene
-from heat_igl.drawing.shading import colour_numbers
 from heat_igl.errors import as_array, real_numbers
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_mesh, as_simplices
 from heat_igl.sources import Sources
@@ -202,7 +200,7 @@ def plot_labels(
     table = colours("tab10", is_trimmed=False)
     if given.shape != (mesh.n_vertices,):
         raise ValueError(f"labels must have shape ({mesh.n_vertices},), one per vertex, but they have {given.shape}")
-    values = np.where(given < 0, np.inf, colour_numbers(given, as_simplices(mesh).edges, _N_COLOURS) + 0.5)
+    values = np.where(given < 0, np.inf, _colour_numbers(given, as_simplices(mesh).edges, _N_COLOURS) + 0.5)
     seen = scene(
         mesh, values, name="labels", sources=sources, limits=(0, _N_COLOURS), view=view, up=up, is_categorical=True
     )  # fmt: skip
@@ -213,6 +211,21 @@ def plot_labels(
         if not isinstance(mesh, PointCloud):  # whose discs have one label each
             seen = replace(seen, borders=_borders(seen, given, measured / seen.unit))
     return lay_out(seen, _lines_in_space(mesh, curves, seen), "plain", table, "", "no label")
+
+
+def _colour_numbers(labels: IntArray, edges: IntArray, n_colours: int) -> IntArray:
+    """A colour (n,) for the label (n,) of each vertex: the first that none of its earlier neighbours has."""
+    names, rank = np.unique(labels, return_inverse=True)
+    pairs = np.unique(np.sort(rank[edges], axis=1), axis=0)
+    colour = np.full(len(names), -1)
+    earlier: list[list[int]] = [[] for _ in names]
+    for low, high in pairs[pairs[:, 0] != pairs[:, 1]].tolist():
+        earlier[high].append(low)
+    for label, neighbours in enumerate(earlier):
+        taken = {int(colour[other]) for other in neighbours}
+        free = (number for number in range(n_colours) if number not in taken)
+        colour[label] = next(free, label % n_colours)
+    return np.asarray(colour[rank])
 
 
 def _borders(seen: Scene, labels: IntArray, distance: FloatArray) -> FloatArray:

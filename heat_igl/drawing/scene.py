@@ -9,7 +9,6 @@ import numpy as np
 
 from heat_igl.drawing.camera import default_rotation, rotation
 from heat_igl.drawing.discs import discs
-from heat_igl.drawing.shading import isoline_spacing
 from heat_igl.errors import MissingExtraError, real_numbers, require_choice
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import Sources, source_set
@@ -113,7 +112,7 @@ def scene(
     if limits is not None and not (np.isfinite([low, high]).all() and low < high):
         raise ValueError(f"limits must be two numbers, the lower one first, not {limits!r}")
     across = max(high - low, 0.0)
-    step = isoline_spacing(across) if spacing is None else float(spacing)
+    step = _isoline_spacing(across) if spacing is None else float(spacing)
     if not (np.isfinite(step) and step > 0) or across / step > 1000:
         raise ValueError(f"spacing must be a positive number, and no less than {across / 1000:.2g}, not {spacing!r}")
 
@@ -137,6 +136,15 @@ def scene(
         limits=(low, high if high > low else low + 1.0), step=step, vertices=vertices, dots=dots, lines=lines,
         is_categorical=is_categorical,
     )  # fmt: skip
+
+
+def _isoline_spacing(largest: float) -> float:
+    """A round number (1, 2 or 5 times a power of ten) near a sixteenth of `largest`."""
+    if not largest > 0:
+        return 1.0
+    exponent = np.floor(np.log10(largest / 16))
+    candidates = [digit * 10.0 ** (exponent + shift) for shift in (0, 1) for digit in (1, 2, 5)]
+    return float(min(candidates, key=lambda step: abs(np.log(largest / 16 / step))))
 
 
 def _places(mesh: Mesh, sources: Sources | None) -> tuple[IntArray, FloatArray, FloatArray]:

@@ -1,3 +1,4 @@
+from heat_igl.intrinsic.delaunay import delaunay_refinement as delaunay_refinement
 from heat_igl.intrinsic.delaunay import intrinsic_delaunay as intrinsic_delaunay
 from heat_igl.intrinsic.frames import TangentFrames as TangentFrames
 from heat_igl.intrinsic.frames import checked_indices as checked_indices
@@ -19,7 +20,6 @@ from heat_igl.intrinsic.history import Turned as Turned
 from heat_igl.intrinsic.layout import apex as apex
 from heat_igl.intrinsic.layout import corner_angles as corner_angles
 from heat_igl.intrinsic.layout import lay_out as lay_out
-from heat_igl.intrinsic.refinement import delaunay_refinement as delaunay_refinement
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation as IntrinsicTriangulation
 from heat_igl.intrinsic.tufted import closed_cover as closed_cover
 from heat_igl.intrinsic.tufted import has_nonmanifold_edges as has_nonmanifold_edges

@@ -1,7 +1,7 @@
 """Paths on triangles: curves shortened within their class, and straightest lines from a place in a direction.
 
 Exact shortest paths are followed back through windows, in `kernels.windows`; here a curve keeps its class, so that no
-distance is needed. `heat_igl.curves.shortening` and `.straightest` make the arguments.
+distance is needed. `heat_igl.curves.geodesics` and `.straightest` make the arguments.
 
 1. `routes`: a path between two places begins as the shortest way along edges, found by A*. A curve that is given
    begins as it is.

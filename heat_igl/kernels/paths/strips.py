@@ -33,7 +33,7 @@ _BEND = np.dtype([("x", "f8"), ("y", "f8"), ("side", "i4"), ("first", "i4"), ("l
 class FaceTable:
     """m faces on n vertices, which need not be oriented alike.
 
-    `face` (m,) are structures as `heat_igl.curves.shortening` makes them, and `edges` are `HalfEdges`. The corners at
+    `face` (m,) are structures as `heat_igl.curves.geodesics` makes them, and `edges` are `HalfEdges`. The corners at
     vertex v, numbered like half-edges, are ``corner[first_corner[v]:first_corner[v + 1]]``.
     """
 
