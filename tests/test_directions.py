@@ -129,11 +129,16 @@ def test_exp_map_undoes_the_log_map_from_edges_that_were_flipped(seed, place):
 def test_log_maps_of_the_plane_from_points_beside_a_vertex(share):
     mesh = flat_perturbed(shapes.grid(6))
     for face in np.flatnonzero(~mesh.boundary[mesh.F].any(axis=1))[::5]:
-        point = SurfacePoints([face], [[1 - share, 0.3 * share, 0.7 * share]])
-        offset = (mesh.V - point.positions(mesh))[:, :2]
-        along = (mesh.V[mesh.F[face, 1]] - mesh.V[mesh.F[face, 0]])[:2]
+        corners, near = mesh.V[mesh.F[face], :2], face % 3
+        weights = np.roll([1 - share, 0.3 * share, 0.7 * share], near)
+        offset = np.einsum("c,ncx->nx", weights, mesh.V[:, None, :2] - corners)
+        along = corners[1] - corners[0]
         turned = offset @ np.stack([along, [-along[1], along[0]]], axis=1) / np.linalg.norm(along)
-        np.testing.assert_allclose(log_map(mesh, point), turned, atol=1e-12)
+        log = log_map(mesh, SurfacePoints([face], [weights]))
+        np.testing.assert_allclose(log, turned, atol=1e-12)
+        # The direction to the vertex beside the point has as many digits.
+        ahead, expected = log[mesh.F[face, near]], turned[mesh.F[face, near]]
+        assert abs(ahead[0] * expected[1] - ahead[1] * expected[0]) < 1e-13 * ahead @ expected
 
 
 @pytest.mark.parametrize("share", [1e-5, 1e-8, 1e-9, 1e-10, 3e-11])

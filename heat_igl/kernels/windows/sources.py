@@ -63,13 +63,17 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
     place_x[1] = s.length[3 * f + 2]
     place_x[2] = foot(place_x[1], s.length[3 * f + 1], s.length[3 * f])
     place_y[2] = s.double_area[f] / place_x[1]
-    x: cython.double = at[1] * place_x[1] + at[2] * place_x[2]
-    y: cython.double = at[2] * place_y[2]
     for c in range(3):
         h: cython.int = 3 * f + c
         at_corner(c, corner)
         distance: cython.double = offset + apart(s.length + 3 * f, corner, at)
-        relax(s, s.vertex[h], distance, root, -1, 0.0, 3 * f, place_x[c] - x, place_y[c] - y)
+        # Not as a difference of two places: beside a corner that would be one of roundings.
+        x: cython.double = 0.0
+        y: cython.double = 0.0
+        for other in range(3):
+            x += at[other] * (place_x[c] - place_x[other])
+            y += at[other] * (place_y[c] - place_y[other])
+        relax(s, s.vertex[h], distance, root, -1, 0.0, 3 * f, x, y)
         if at[c] <= 0.0:
             continue  # on the side itself, the source belongs to the face beyond it too
         length: cython.double = s.length[h]
