@@ -74,6 +74,7 @@ def connected(scheduler: str | None = None, n_workers: int | None = None, dashbo
                     dashboard_address=":0",
                     scheduler_kwargs={"dashboard": dashboard},
                     silence_logs=logging.CRITICAL,
+                    preload=["heat_igl.cluster.worker", "zarr"],  # so that no mesh waits for imports
                 )
             )
         yield stack.enter_context(distributed.Client(cluster))
