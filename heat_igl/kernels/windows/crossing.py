@@ -10,7 +10,6 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, release, take
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
-    BESIDE,
     JOINS,
     LEFT_OF_APEX,
     MARGIN,
@@ -588,13 +587,11 @@ def _reach_apex(
                 apex.best = i
             continue
         # The apex is just beside the window: the path over the end of the window comes from the same direction as a
-        # straight one, unless it is longer. With the root nearby, where directions may differ nevertheless, it gives
-        # way to a straight one that is as long to rounding.
-        distance = bent(w, b, apex.x, apex.y)
-        if distance <= _straight(w, apex) * (1.0 + ROUNDING):
+        # straight one, unless it is longer. It gives way to a path that is as long to rounding: one from a root nearby
+        # may leave in another direction, and one that bends at a vertex of the end passes it on the right side.
+        distance = bent(w, b, apex.x, apex.y) * (1.0 + ROUNDING)
+        if distance <= _straight(w, apex) * (1.0 + 2.0 * ROUNDING):
             at = min(max(backward(w, apex.x, apex.y), 0.0), apex.length)
-            if reach(w, b) < BESIDE * apex.length:
-                distance *= 1.0 + ROUNDING
             _arrive(s, h, w, apex, distance, at)
     if apex.best >= 0:
         w = windows + apex.best

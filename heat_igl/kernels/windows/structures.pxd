@@ -187,8 +187,6 @@ cdef extern from *:
     // A vertex missed by less than this fraction of a side is reached over the end of the window, which is longer by
     // the square of that.
     #define NEAR 1e-7
-    // A root is beside an end of its half-edge if it is nearer than this fraction of the half-edge.
-    #define BESIDE 0.01
     // Windows whose roots are closer than this fraction of their distance have the same root.
     #define SAME 2e-14
     // Two halves of a window are turned against each other by less than this angle: a hundred flat vertices.
@@ -210,7 +208,6 @@ cdef extern from *:
     double WIDEST
     double NARROW
     double NEAR
-    double BESIDE
     double SAME
     double TURNED
     double OVERLAP
