@@ -9,7 +9,7 @@ from surfaces import arcs, twice
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.drawing import camera, figure, plots, raster
+from heat_igl.drawing import figure, plots, raster
 from heat_igl.drawing.line_drawing import write_line_drawing
 from heat_igl.drawing.plots import Picture, plot, plot_field, plot_labels
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK
@@ -60,7 +60,7 @@ def test_each_pixel_shows_the_nearest_triangle_and_interpolates_exactly():
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (90, 0), (33, -70), (0, 90)])
 def test_rotations_keep_shapes_and_handedness(azimuth, elevation):
-    turn = camera.rotation(azimuth, elevation)
+    turn = raster.rotation(azimuth, elevation)
     np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(turn) == pytest.approx(1)
     viewer = np.radians([azimuth, elevation])

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heat_igl.drawing.camera import to_pixels
-from heat_igl.drawing.raster import visible_runs
+from heat_igl.drawing.raster import to_pixels, visible_runs
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, UNREACHABLE, Scene, Style
 from heat_igl.drawing.surface_image import LINE, OVERSAMPLING, SOURCE, fitted, mark_dots, surface_image
 from heat_igl.typing import BoolArray, FloatArray

@@ -8,8 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from heat_igl.drawing.camera import to_pixels
-from heat_igl.drawing.raster import rasterize, visible_runs
+from heat_igl.drawing.raster import rasterize, to_pixels, visible_runs
 from heat_igl.drawing.scene import scene
 from heat_igl.drawing.surface_image import fitted
 from heat_igl.errors import require_choice

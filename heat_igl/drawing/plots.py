@@ -70,7 +70,7 @@ def plot(
     curves : sequence of SurfaceCurve
         Curves on the mesh; their hidden parts are thin and dotted.
     view : (azimuth, elevation), optional
-        Direction of the viewer in degrees; see `heat_igl.drawing.camera.rotation`. By default a flat mesh is viewed at
+        Direction of the viewer in degrees; see `heat_igl.drawing.raster.rotation`. By default a flat mesh is viewed at
         right angles, and any other mesh from the one of eight directions that shows the most of the surface and of the
         sources.
     up : {"x", "y", "z"}

@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from heat_igl.drawing.camera import default_rotation, rotation
 from heat_igl.drawing.discs import discs
+from heat_igl.drawing.raster import default_rotation, rotation
 from heat_igl.errors import MissingExtraError, real_numbers, require_choice
 from heat_igl.mesh import Mesh, PointCloud, as_simplices
 from heat_igl.sources import Sources, source_set

@@ -16,7 +16,7 @@ SOURCE = "#e8000b"
 
 
 def fitted(seen: Scene, columns: int, rows: int, margin: float) -> tuple[float, FloatArray]:
-    """Scale and centre for `heat_igl.drawing.camera.to_pixels`, such that the surface fills the image."""
+    """Scale and centre for `heat_igl.drawing.raster.to_pixels`, such that the surface fills the image."""
     turned = seen.turned[seen.used, :2]
     low, high = turned.min(axis=0), turned.max(axis=0)
     extent = np.maximum(high - low, 1e-3 * (high - low).max())

@@ -4,11 +4,14 @@ from heat_igl.intrinsic.frames import TangentFrames as TangentFrames
 from heat_igl.intrinsic.frames import checked_indices as checked_indices
 from heat_igl.intrinsic.frames import checked_vectors as checked_vectors
 from heat_igl.intrinsic.frames import tangent_frames as tangent_frames
+from heat_igl.intrinsic.gluing import closed_cover as closed_cover
 from heat_igl.intrinsic.gluing import each_face_once as each_face_once
 from heat_igl.intrinsic.gluing import from_edge_lengths as from_edge_lengths
 from heat_igl.intrinsic.gluing import from_gluing as from_gluing
+from heat_igl.intrinsic.gluing import has_nonmanifold_edges as has_nonmanifold_edges
 from heat_igl.intrinsic.gluing import intrinsic_triangulation as intrinsic_triangulation
 from heat_igl.intrinsic.gluing import oriented as oriented
+from heat_igl.intrinsic.gluing import tufted_cover as tufted_cover
 from heat_igl.intrinsic.half_edges import HalfEdges as HalfEdges
 from heat_igl.intrinsic.half_edges import mollify as mollify
 from heat_igl.intrinsic.history import Change as Change
@@ -21,9 +24,6 @@ from heat_igl.intrinsic.layout import apex as apex
 from heat_igl.intrinsic.layout import corner_angles as corner_angles
 from heat_igl.intrinsic.layout import lay_out as lay_out
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation as IntrinsicTriangulation
-from heat_igl.intrinsic.tufted import closed_cover as closed_cover
-from heat_igl.intrinsic.tufted import has_nonmanifold_edges as has_nonmanifold_edges
-from heat_igl.intrinsic.tufted import tufted_cover as tufted_cover
 from heat_igl.intrinsic.vertex_angles import PolarAngles as PolarAngles
 from heat_igl.intrinsic.vertex_angles import carried_angles as carried_angles
 from heat_igl.intrinsic.vertex_angles import polar_angles as polar_angles

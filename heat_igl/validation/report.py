@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heat_igl.drawing.camera import to_pixels
+from heat_igl.drawing.raster import to_pixels
 from heat_igl.drawing.scene import Scene, colours, scene
 from heat_igl.drawing.surface_image import fitted, mark_dots, surface_image
 from heat_igl.errors import MissingExtraError
