@@ -8,12 +8,10 @@ import scipy.sparse as sp
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.cloud_triangles import (
     FOLDED_BACK,
-    at_all_corners,
     corner,
     glued_sides,
     pinched_vertices,
     with_fans_joined,
-    with_one_fan,
 )
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -47,34 +45,28 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
     are many, or most of them flat, as on a surface with one side. Then as many neighbours as possible are oriented
     alike.
     """
-    is_turned, part, pairs, folds = _turned(P, F)
+    is_turned, part, pairs, folds, pinched = _turned(P, F)
     left_out = _in_pairs(pairs, len(F))
     # On a surface with one side, neighbours contradict each other where it is flat.
     if 0 < len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(folds) > _FLAT:
-        is_settled = np.ones(len(P), bool)
-        is_settled[F[left_out]] = False
-        is_settled[F[~at_all_corners(is_settled, F)]] = False
         F = np.delete(F, left_out, axis=0)
-        F = with_fans_joined(P, with_one_fan(F, pinched_vertices(F, is_settled)), is_settled)
-        is_turned, part, pairs, folds = _turned(P, F)
+        is_turned, part, pairs, folds, pinched = _turned(P, F)
     F = np.where(is_turned[:, None], F[:, [0, 2, 1]], F)
     if normals is not None:
         area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
         along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))
         turned = along[part] < 0
         F[turned] = F[turned, ::-1]
-    return F, _points_between(F, pairs[folds > _FLAT])
+    return with_fans_joined(P, F, pinched), _points_between(F, pairs[folds > _FLAT])
 
 
-def _pairs(F: IntArray, n: int) -> tuple[IntArray, BoolArray]:
-    """Neighbours (k, 2) among the triangles F (m, 3), and whether both run along their edge in one direction (k,)."""
-    first, second, runs_alike = glued_sides(F, n)
-    return np.stack([first // 3, second // 3], axis=1), runs_alike
+def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, FloatArray, IntArray]:
+    """Which of the triangles F (m, 3) to turn, their parts (m,), and pairs (k, 2) that contradict, with folds.
 
-
-def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
-    """Which of the triangles F (m, 3) to turn, their parts (m,), and pairs (k, 2) that contradict, with folds."""
-    pairs, runs_alike = _pairs(F, len(P))
+    Also returns the points at which several fans meet.
+    """
+    first, second, runs_alike = glued = glued_sides(F, len(P))
+    pairs = np.stack([first // 3, second // 3], axis=1)
     part, is_turned = _parts(pairs, runs_alike, len(F))
     contradicts, folds = np.zeros(len(pairs), bool), np.zeros(len(pairs))
     if (part[0] == part[1]).any():
@@ -89,7 +81,8 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
         wants_one = runs_alike != (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]])
         is_turned ^= turned_groups(pairs, np.where(wants_one, -weight, weight), group)
         contradicts = (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]]) != runs_alike
-    return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts]
+    pinched = pinched_vertices(F, len(P), glued)
+    return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts], pinched
 
 
 def _parts(pairs: IntArray, runs_alike: BoolArray, m: int) -> tuple[IntArray, BoolArray]:
@@ -154,8 +147,8 @@ def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolA
 
 def is_oriented_manifold(surface: Mesh) -> bool:
     """Whether neighbours of a surface with at most two faces at an edge run alike, and no point has several fans."""
-    _, runs_alike = _pairs(surface.F, surface.n_vertices)
-    return not (runs_alike.any() or pinched_vertices(surface.F, np.zeros(surface.n_vertices, bool)).any())
+    glued = glued_sides(surface.F, surface.n_vertices)
+    return not (glued[2].any() or len(pinched_vertices(surface.F, surface.n_vertices, glued)))
 
 
 def _points_between(F: IntArray, pairs: IntArray) -> IntArray:
@@ -166,7 +159,8 @@ def _points_between(F: IntArray, pairs: IntArray) -> IntArray:
 
 def folded_points(surface: Mesh) -> IntArray:
     """Points (k,) at edges along which triangles fold back by more than 120 degrees."""
-    pairs, runs_alike = _pairs(surface.F, surface.n_vertices)
+    first, second, runs_alike = glued_sides(surface.F, surface.n_vertices)
+    pairs = np.stack([first // 3, second // 3], axis=1)
     folds = _folds(surface.V, surface.F, pairs, runs_alike)
     return _points_between(surface.F, pairs[folds > FOLDED_BACK])
 

@@ -3,8 +3,7 @@
 In the union of the local triangulations (Sharp and Crane 2020, section 6), nearly all triangles are in the stars of all
 three corners. These never overlap, since each star is planar. If stars differ, on four points near a circle or on
 noisy points, triangles of more stars come first, and of these the smaller ones; others that do not fit are left out.
-Then each vertex keeps one fan, loops of outer edges are filled in space, fans that are the only connection of parts are
-joined, and points in no triangle are inserted into the nearest one.
+Then loops of outer edges are filled in space, and points in no triangle are inserted into the nearest one.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles
 from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets, group_by_label, unique_rows
+from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets
 from heat_igl.mesh.neighbourhoods import Neighbourhoods, PointTree
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
@@ -31,6 +30,8 @@ _LARGEST_RADIUS = 0.6
 _LARGEST_GAP = 0.9
 # Points whose stars are found at a time.
 _BLOCK = 1 << 14
+# Sides, those of neighbours on them, and whether both run alike.
+GluedSides = tuple[IntArray, IntArray, BoolArray]
 # Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge.
 _OTHER_SHEET = -0.25
 # Cosine of the angle to the next triangle above which the two fold back and may join sheets wrongly: 60 degrees; and
@@ -41,9 +42,7 @@ _PER_FILLED = 10
 
 
 def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) -> IntArray:
-    """Triangles (m, 3) int32 on points; an edge has at most two.
-
-    Around each point they make one fan, unless one that goes all the way around is the only connection to another part.
+    """Triangles (m, 3) int32 on points; an edge has at most two, and they may make several fans around a point.
 
     Parameters
     ----------
@@ -62,9 +61,7 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) ->
     both = np.concatenate([F, candidates])
     F = both[fitting_triangles(P, near.axes, both, len(F))]
     F = np.concatenate([agreed[~is_open], F])
-    F = with_loops_filled(P, with_one_fan(F, pinched_vertices(F, is_settled)), near.reach, is_settled)
-    F = with_fans_joined(P, F, is_settled)
-    return _with_isolated_points(P, F, near)
+    return _with_isolated_points(P, with_loops_filled(P, F, near.reach, is_settled), near)
 
 
 def _triangles_of_stars(
@@ -99,52 +96,22 @@ def _triangles_of_stars(
 
 
 def _with_isolated_points(P: FloatArray, F: IntArray, near: Neighbourhoods) -> IntArray:
-    """The triangles, and in them the points that noise has put above or behind others; outliers stay isolated."""
+    """The triangles, of which those are split that are nearest to points that noise has put above or behind others."""
     used = np.zeros(len(P), bool)
     used[F] = True
-    isolated = np.flatnonzero(~used)
-    if not len(isolated) or not len(F):
-        return F
-    of_used = np.flatnonzero(used)
-    position, distance = PointTree(P[of_used], of_used).nearest(P[isolated], 1)
-    vertex = of_used[position[:, 0]]
-    # Outliers are farther away than a neighbour would be.
-    close = distance <= near.radius[vertex]
-    return with_points(P, F, near.axes, isolated[close].astype(np.int32), vertex[close])
-
-
-def with_points(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vertices: IntArray) -> IntArray:
-    """The triangles, with `points` (k,) put into them: of those around a vertex of `vertices` (k,), one is split."""
-    F = F.copy()
-    while len(points):
-        face = _facing(P, F, axes, points, vertices)
+    points = np.flatnonzero(~used).astype(np.int32)
+    while len(points) and len(F):
+        nearest, distance = PointTree(P[F].mean(axis=1), np.arange(len(F))).nearest(P[points], 1)
+        # Outliers are farther away than a neighbour would be.
+        close = distance <= near.radius[F[nearest[:, 0], 0]]
         # One point in each triangle and round.
-        face, chosen = np.unique(face, return_index=True)
-        point = points[chosen]
+        face, chosen = np.unique(nearest[close, 0], return_index=True)
+        point = points[close][chosen]
         a, b, c = F[face].T
-        F[face, 2] = point
         F = np.concatenate([F, np.stack([b, c, point], axis=1), np.stack([c, a, point], axis=1)])
-        points, vertices = np.delete(points, chosen), np.delete(vertices, chosen)
+        F[face, 2] = point
+        points = np.delete(points[close], chosen)
     return F
-
-
-def _facing(P: FloatArray, F: IntArray, axes: FloatArray, points: IntArray, vertices: IntArray) -> IntArray:
-    """For each point the triangle (k,) around the vertex whose middle lies most in the direction of the point."""
-    corner, which = group_by_label(F.ravel(), len(P)).of(vertices)
-    face = corner // 3
-
-    def direction(positions: FloatArray) -> FloatArray:
-        local = np.einsum("rax,rx->ra", axes[vertices[which], :2], positions - P[vertices[which]])
-        return np.asarray(local / np.maximum(np.linalg.norm(local, axis=1), np.finfo(float).tiny)[:, None])
-
-    alike = np.einsum("ra,ra->r", direction(P[F[face]].mean(axis=1)), direction(P[points[which]]))
-    best = np.full(len(points), -2.0)
-    np.maximum.at(best, which, alike)
-    of_best = np.flatnonzero(alike == best[which])
-    found = np.empty(len(points), np.int64)
-    # Of several values written to one place, the last stays.
-    found[which[of_best]] = face[of_best]
-    return found
 
 
 def at_all_corners(is_chosen: BoolArray, F: IntArray) -> BoolArray:
@@ -158,73 +125,18 @@ def at_some_corner(is_chosen: BoolArray, F: IntArray) -> BoolArray:
     return ~at_all_corners(~is_chosen, F)
 
 
-def with_one_fan(F: IntArray, is_pinched: BoolArray) -> IntArray:
-    """The triangles without those that touch the others in a vertex alone: around each vertex, the largest fan.
-
-    `is_pinched` (n,) are the vertices at which several fans meet, see `pinched_vertices`. No vertices are cut off:
-    where several fans are the only connection between parts, they stay.
-    """
-    n, given, without = len(is_pinched), F, [F[:0]]
-    while is_pinched.any():
-        around = np.flatnonzero(at_some_corner(is_pinched, F))
-        left_out = around[_in_smaller_fans(F[around], is_pinched)]
-        is_settled = np.ones(n, bool)
-        is_settled[F[left_out]] = False
-        without.append(F[left_out])
-        F = np.delete(F, left_out, axis=0)
-        is_pinched = pinched_vertices(F, is_settled)
-    return _with_parts_joined(given, F, np.concatenate(without), n)
-
-
-def _with_parts_joined(given: IntArray, kept: IntArray, without: IntArray, n: int) -> IntArray:
-    """The triangles `kept`, and of the `given` ones those at parts that would be cut off: all but the largest."""
-    if not len(without):
-        return kept
-    after = connected_components(kept, n)
-    if (after[without] == after[without[:, :1]]).all():
-        return kept
-    before = connected_components(given, n)
-    size = np.bincount(after)[after]
-    largest = np.zeros(int(before.max()) + 1, np.int64)
-    np.maximum.at(largest, before, size)
-    # Of equal parts, the first is the one that the others are joined to.
-    first = np.full(len(largest), n)
-    np.minimum.at(first, before, np.where(size == largest[before], after, n))
-    is_cut_off = after != first[before]
-    rows = np.concatenate([kept, given[at_some_corner(is_cut_off, given)]])
-    return rows[np.sort(unique_rows(ascending_rows(rows), n)[0])]
-
-
-def pinched_vertices(F: IntArray, is_settled: BoolArray) -> BoolArray:
-    """Which vertices (n,) have several fans; not the settled ones, whose triangles may be missing in F."""
-    F = F[~at_all_corners(is_settled, F)]
-    fan = _fans(F, len(is_settled))
+def pinched_vertices(F: IntArray, n: int, glued: GluedSides) -> IntArray:
+    """The vertices (k,), of n, at which several fans of the triangles F (m, 3) meet, for their `glued_sides`."""
+    first, second, runs_alike = glued
+    ends = [np.stack([corner(first, e), corner(second, np.where(runs_alike, e, 3 - e))], axis=1) for e in (1, 2)]
+    # Corners of a vertex are in one fan if edges join their triangles.
+    fan = components(np.concatenate(ends), F.size)
     of_fan = np.zeros(int(fan.max(initial=-1)) + 1, np.int64)
     of_fan[fan] = F.ravel()
-    return np.asarray((np.bincount(of_fan, minlength=len(is_settled)) > 1) & ~is_settled)
+    return np.flatnonzero(np.bincount(of_fan, minlength=n) > 1)
 
 
-def _in_smaller_fans(F: IntArray, is_pinched: BoolArray) -> BoolArray:
-    """Which of the triangles F (m, 3) around pinched vertices are not in the largest fan of such a vertex."""
-    fan, vertex = _fans(F, len(is_pinched)), F.ravel()
-    size = np.bincount(fan)[fan]
-    # The largest fan of each vertex comes first, of equal ones that with the lowest number.
-    order = np.lexsort((fan, -size, vertex))
-    is_first = np.diff(vertex[order], prepend=-1) != 0
-    largest = np.empty(len(is_pinched), np.int64)
-    largest[vertex[order][is_first]] = fan[order][is_first]
-    return np.asarray((is_pinched[vertex] & (fan != largest[vertex])).reshape(-1, 3).any(axis=1))
-
-
-def _fans(F: IntArray, n: int) -> IntArray:
-    """The fan (3 m,) of each corner: corners of a vertex are in one fan if edges join their triangles."""
-    first, second, runs_alike = glued_sides(F, n)
-    ends = [np.stack([corner(first, e), corner(second, np.where(runs_alike, e, 3 - e))], axis=1) for e in (1, 2)]
-    fan: IntArray = components(np.concatenate(ends), F.size)
-    return fan
-
-
-def glued_sides(F: IntArray, n: int) -> tuple[IntArray, IntArray, BoolArray]:
+def glued_sides(F: IntArray, n: int) -> GluedSides:
     """Sides 3 f + c (k,), opposite corner c of triangle f, the sides of neighbours on them, and whether both run alike.
 
     On n points; an edge has at most two of the triangles F (m, 3).
@@ -239,19 +151,19 @@ def corner(sides: IntArray, turn: int | IntArray) -> IntArray:
     return sides - sides % 3 + (sides + turn) % 3
 
 
-def with_fans_joined(P: FloatArray, F: IntArray, is_settled: BoolArray) -> IntArray:
-    """The triangles F (m, 3), and others between the fans of vertices that have several with an end.
+def with_fans_joined(P: FloatArray, F: IntArray, pinched: IntArray) -> IntArray:
+    """The triangles F (m, 3), and others between the fans of `pinched` vertices (k,) that have several with an end.
 
     Two parts of a surface that meet in one vertex alone are connected for distance, but not for vectors, which need a
-    tangent plane along the way. Between the two fans goes the triangle with the smallest angle at the vertex.
-    Around the settled points (n,) there is one fan.
+    tangent plane along the way. Between two fans goes the triangle with the smallest angle at the vertex that runs
+    along its sides against the neighbours, if there is one.
     """
-    is_pinched = pinched_vertices(F, is_settled)
-    if not is_pinched.any():
+    if not len(pinched):
         return F
     is_near = np.zeros(len(P), bool)
-    is_near[F[at_some_corner(is_pinched, F)]] = True
-    added = joining_triangles(P, F[at_some_corner(is_near, F)].astype(np.int32), np.flatnonzero(is_pinched))
+    is_near[pinched] = True
+    is_near[F[at_some_corner(is_near, F)]] = True
+    added = joining_triangles(P, F[at_some_corner(is_near, F)].astype(np.int32), pinched)
     return np.concatenate([F, added.astype(F.dtype)])
 
 

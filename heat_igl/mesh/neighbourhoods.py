@@ -26,8 +26,6 @@ _SEVERAL_SHEETS = 0.04
 # Directions in which balls are tried, half and their opposites: every 22 degrees. With 60 a tenth of a neighbour
 # stays on the other of two sheets 1.5 spacings apart; with 120 and 160 errors at thin parts are no smaller.
 _DIRECTIONS = 100
-# Cosine of the angle between the normal of the roomier side and the fitted plane's, below which the plane is wrong.
-_ASTRAY = 0.95
 
 # Noise in shares of the spacing. Heights that vary by a share e of the spacing lengthen edges by the share e^2, so
 # below this one noise costs less than the heat method.
@@ -148,7 +146,7 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighb
 
 
 def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Neighbours on the same sheet of the surface as each of b points, and the tangent planes through them.
+    """Neighbours on the same sheet of the surface as each of b points, and planes by the side with most room.
 
     The sheets of a thin part, or on the two sides of a narrow gap, nearly touch: the neighbours of a point are on
     both. The empty balls that touch a point are small between the sheets, and neighbours on the other sheet share no
@@ -183,16 +181,12 @@ def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[In
 
     normals, radii = map(np.concatenate, zip(*over_rows(balls, len(index), _BLOCK), strict=True))
 
-    def seen(rows: slice) -> tuple[IntArray, FloatArray, FloatArray]:
-        kept = on_one_side(P, index[rows], number, normals, radii)
-        axes, radius, _ = tangent_planes(P, kept)
-        return kept, radius, axes
+    def seen(rows: slice) -> tuple[IntArray, FloatArray]:
+        kept, radius = on_one_side(P, index[rows], number, normals, radii)
+        return kept, radius
 
-    found, radius, axes = map(np.concatenate, zip(*over_rows(seen, len(index), _BLOCK), strict=True))
-    # Both normals where they agree, and that of the balls elsewhere: neighbours beyond an edge bend the plane.
-    alike = np.einsum("rx,rx->r", axes[:, 2], normals)[:, None]
-    mean = normals + np.where(np.abs(alike) >= _ASTRAY, np.sign(alike) * axes[:, 2], 0)
-    return found, radius, _axes_along(mean / np.linalg.norm(mean, axis=1, keepdims=True))
+    found, radius = map(np.concatenate, zip(*over_rows(seen, len(index), _BLOCK), strict=True))
+    return found, radius, _axes_along(normals)
 
 
 def _axes_along(normals: FloatArray) -> FloatArray:

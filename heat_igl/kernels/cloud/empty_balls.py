@@ -191,11 +191,14 @@ def on_one_side(
 
     Returns
     -------
-    (c, k) int32
+    kept : (c, k) int32
         Those that stay, in the same order; -1 after the last.
+    radius : (c,) float64
+        Distance of the last of them.
     """
-    found = np.full((index.shape[0], index.shape[1]), -1, np.int32)
+    found, distances = np.full((index.shape[0], index.shape[1]), -1, np.int32), np.empty(index.shape[0])
     kept: cython.int[:, ::1] = found
+    radius: cython.double[::1] = distances
     with cython.nogil:
         for row in range(index.shape[0]):
             at: cython.int = index[row, 0]
@@ -211,7 +214,12 @@ def on_one_side(
                     size += 1
             if size < 4:
                 kept[row, :] = index[row, :]
-    return found
+                size = index.shape[1]
+            square: cython.double = 0.0
+            for x in range(3):
+                square += (P[kept[row, size - 1], x] - P[at, x]) * (P[kept[row, size - 1], x] - P[at, x])
+            radius[row] = sqrt(square)
+    return found, distances
 
 
 @cython.cfunc

@@ -14,7 +14,7 @@ def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[c
     P : (n, 3) float64
         All points.
     index : (b, k) int32
-        Neighbours of some points, by distance and each point first, -1 after the last.
+        Neighbours of some points, by distance and each point first.
 
     Returns
     -------
@@ -34,10 +34,7 @@ def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[c
     local: cython.double[:, ::1] = _room_for(index.shape[1])
     with cython.nogil:
         for row in range(index.shape[0]):
-            k: cython.Py_ssize_t = index.shape[1]
-            while index[row, k - 1] < 0:
-                k -= 1
-            radius[row] = _principal_axes(P, index[row, :k], local, work, axes[row], variances)
+            radius[row] = _principal_axes(P, index[row], local, work, axes[row], variances)
             bend[row] = variances[0] / max(variances[1], TINY)
     return found, radii, bends
 
