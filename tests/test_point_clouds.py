@@ -601,24 +601,33 @@ def test_points_of_a_regular_torus_make_a_closed_surface(around_tube, around_hol
 
 @pytest.mark.parametrize("seed", range(5))
 def test_fans_that_meet_in_a_point_are_joined(seed):
-    """Some triangles of a closed surface, all of which run alike: the joined ones run against their neighbours.
+    """Some triangles of two closed surfaces with vertices in common, no neighbours, all of which run alike.
 
-    No edge gets a third triangle, and no vertex a closed fan beside another.
+    The joined ones run against their neighbours; no edge gets a third, and no vertex a closed fan beside another.
     """
-    mesh, rng = shapes.torus(12, 16), np.random.default_rng(seed)
-    F, n = mesh.F[rng.random(mesh.n_faces) < 0.6].astype(np.int32), mesh.n_vertices
+    torus, rng = shapes.torus(12, 16), np.random.default_rng(seed)
+    N = torus.n_vertices
+    common, of_second = np.arange(N).reshape(-1, 16)[::2, ::2].ravel(), np.arange(N, 2 * N)
+    of_second[common] = rng.permutation(common)
+    F = np.concatenate([torus.F, of_second[torus.F]])
+    # No fan around a common vertex is closed.
+    row, at = np.nonzero(np.isin(F, common))
+    first = row[np.unique(F[row, at] + 2 * N * (row >= torus.n_faces), return_index=True)[1]]
+    F = np.delete(F, np.append(first, rng.choice(len(F), 100)), axis=0).astype(np.int32)
+    V = np.concatenate([torus.V, torus.V @ [[0, 1, 0], [0, 0, 1], [1, 0, 0]]])
+    n = len(V)
     pinched = pinched_vertices(F, n, glued_sides(F, n))
-    joined = with_fans_joined(mesh.V, F, pinched)
+    joined = with_fans_joined(V, F, pinched)
     np.testing.assert_array_equal(joined[: len(F)], F)
-    report = heat_igl.Mesh(mesh.V, F).report()
+    report = heat_igl.Mesh(V, F).report()
     np.testing.assert_array_equal(pinched, report.nonmanifold_vertices)
-    found = heat_igl.Mesh(mesh.V, joined).report()
+    found = heat_igl.Mesh(V, joined).report()
     assert len(found.nonmanifold_vertices) < 0.1 * len(pinched)
     assert len(found.nonmanifold_edges) == 0
     sides = np.concatenate([joined[:, [0, 1]], joined[:, [1, 2]], joined[:, [2, 0]]])
     assert len(np.unique(sides, axis=0)) == len(sides)
     # A fan has as many edges as triangles where it is closed, and one more where it has ends.
-    edges = heat_igl.Mesh(mesh.V, joined).edges
+    edges = heat_igl.Mesh(V, joined).edges
     closed_or_open = np.bincount(edges.ravel(), minlength=n) - np.bincount(joined.ravel(), minlength=n)
     assert (closed_or_open[found.nonmanifold_vertices] > 1).all()
 
