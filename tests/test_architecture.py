@@ -1,7 +1,8 @@
-"""Rooms stand in their order, and optional libraries are loaded only where they are used."""
+"""Rooms stand in their order, optional libraries are loaded where they are used, examples of CONTRIBUTING.md work."""
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -168,3 +169,45 @@ def test_extras_and_libraries_in_messages_are_those_of_the_project():
     for packages, extra in calls:
         held = {re.split(r"[<>=\[;]", requirement)[0].strip().lower() for requirement in extras[extra]}
         assert set(packages.split(" and ")) <= held, (packages, extra)
+
+
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf8")
+EXAMPLES = re.findall(r"^\*\*(A [\w ]+): (\d) files?[.,]\*\*(.*?)^```python\n# check\n(.*?)^```", TEXT, re.M | re.S)
+
+
+def changed(text: str, diff: str) -> str:
+    """`text` with each line that begins with - replaced by the lines with + that follow."""
+    for old, new in re.findall(r"^-(.*\n)((?:^\+.*\n)+)", diff, re.M):
+        assert text.count(old) == 1, old
+        text = text.replace(old, re.sub(r"^\+", "", new, flags=re.M))
+    return text
+
+
+@pytest.mark.parametrize(
+    ("count", "example", "check"), [each[1:] for each in EXAMPLES], ids=[kind for kind, *_ in EXAMPLES]
+)
+def test_an_example_works_and_touches_so_many_files(count, example, check, tmp_path):
+    shutil.copytree(
+        ROOT / "heat_igl", tmp_path / "heat_igl", copy_function=os.symlink, ignore=shutil.ignore_patterns("__pycache__")
+    )
+    blocks = re.findall(r"^```(\w+)\n# (heat_igl/\S+)\n(.*?)^```", example, re.M | re.S)
+    assert len({path for _, path, _ in blocks}) == int(count)
+    for language, name, block in blocks:
+        path = tmp_path / name
+        assert path.exists() == (language == "diff")
+        text = changed(path.read_text(encoding="utf8"), block) if language == "diff" else block
+        path.unlink(missing_ok=True)
+        path.write_text(text, encoding="utf8")
+    command = [sys.executable, "-c", f"import heat_igl\nimport numpy as np\n{check}"]
+    around = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(command, cwd=tmp_path, env=around, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_all_four_kinds_have_an_example():
+    assert {kind: int(count) for kind, count, *_ in EXAMPLES} == {
+        "A kind of domain": 1,
+        "A linear solver": 2,
+        "A file format": 2,
+        "A kind of source": 2,
+    }

@@ -10,11 +10,11 @@ from conftest import (
     zoo,
 )
 from scipy.spatial import Delaunay
-from steiner import graph_distance
 from surfaces import (
     COORDINATES,
     bumpy,
     cube,
+    graph_distance,
     moebius_strip,
     nearest_vertex,
     random_disk,

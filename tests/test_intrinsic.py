@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import mean_error, perturbed, zoo
-from steiner import graph_distance
-from surfaces import moebius_strip
+from surfaces import graph_distance, moebius_strip
 
 import heat_igl
 from heat_igl import (

@@ -13,8 +13,7 @@ import psutil
 import pytest
 from conftest import relative_error, wheel_path, zoo
 from scipy.spatial import Delaunay
-from steiner import graph_distance
-from surfaces import folded_torus
+from surfaces import folded_torus, graph_distance
 
 from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
 from heat_igl.errors import MissingExtraError, ReferenceSolverError

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import flat_perturbed, mean_error, perturbed, two_halves
-from steiner import graph_distance
-from surfaces import nearest_vertex
+from surfaces import graph_distance, nearest_vertex
 
 import heat_igl
 from heat_igl import metric_operators, shapes, speed_operators
