@@ -16,7 +16,7 @@ from surfaces import twice
 
 import heat_igl
 from heat_igl import MeshError, cli, drawing, io, shapes
-from heat_igl.cli import comparison, demo, distances
+from heat_igl.cli import demo, distances, views
 from heat_igl.cli.program import EXAMPLES, application
 from heat_igl.io import read_attributes, read_mesh, read_polylines, write_curves, write_mesh
 
@@ -145,10 +145,10 @@ def test_without_typer_one_line_names_the_extra(tmp_path):
 def test_an_interrupt_ends_the_command_without_a_traceback(tmp_path):
     code = (
         # A process started in the background inherits that interrupts are ignored; a user's is not.
-        "import signal, sys, time; from heat_igl import cli; from heat_igl.cli import comparison\n"
+        "import signal, sys, time; from heat_igl import cli; from heat_igl.cli import views\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def read_mesh_or_cloud(path, points):\n    print('ready', flush=True)\n    time.sleep(60)\n"
-        "comparison.read_mesh_or_cloud = read_mesh_or_cloud; sys.exit(cli.run(['info', 'a.off']))"
+        "views.read_mesh_or_cloud = read_mesh_or_cloud; sys.exit(cli.run(['info', 'a.off']))"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code], cwd=tmp_path, env=ENVIRONMENT, stdout=-1, stderr=-1, text=True
@@ -264,7 +264,7 @@ def test_a_fault_of_the_package_is_not_hidden(ball, monkeypatch):
     def broken(*_):
         raise TypeError("a bug")
 
-    monkeypatch.setattr(comparison, "read_mesh_or_cloud", broken)
+    monkeypatch.setattr(views, "read_mesh_or_cloud", broken)
     with pytest.raises(TypeError, match="a bug"):
         cli.run(["info", str(ball)])
 

@@ -220,7 +220,7 @@ def test_distances_that_will_not_fit_into_memory_are_refused_early(monkeypatch):
 
 
 def test_a_terminal_is_told_how_long_a_search_takes(monkeypatch, capsys):
-    monkeypatch.setattr("heat_igl.runtime.progress._PATIENCE", -1.0)
+    monkeypatch.setattr("heat_igl.runtime.notices._PATIENCE", -1.0)
     mesh = shapes.icosphere(2)
     distances_within(mesh, 0.3)
     assert not capsys.readouterr().err  # no terminal

@@ -30,15 +30,15 @@ _COMPLETION = "_HEAT_IGL_COMPLETE"
 
 # The module of each command: only that of the command asked for is imported, which saves a third of its time.
 _MODULES = {
-    "info": "comparison",
-    "validate": "comparison",
+    "info": "views",
+    "validate": "views",
     "distance": "distances",
     "matrix": "matrices",
     "isolines": "distances",
-    "path": "curves",
-    "trace": "curves",
-    "signed": "curves",
-    "cut": "curves",
+    "path": "distances",
+    "trace": "distances",
+    "signed": "distances",
+    "cut": "distances",
     "view": "views",
     "demo": "views",
     "batch": "matrices",

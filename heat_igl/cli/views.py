@@ -1,27 +1,131 @@
-"""Commands that show: an interactive page, and the demonstration."""
+"""Commands that judge and show: the report of a mesh, the validation of methods, a page, the demonstration."""
 
 from __future__ import annotations
 
 import os
 import sys
 import webbrowser
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
 
+import heat_igl
 from heat_igl import reference
 from heat_igl.cli import options as opt
-from heat_igl.cli.curves import projected
 from heat_igl.cli.demo import demonstrate
-from heat_igl.cli.options import check_file, check_json, check_writable, described, print_rows
+from heat_igl.cli.distances import projected
+from heat_igl.cli.options import (
+    check_file,
+    check_json,
+    check_writable,
+    described,
+    plan_row,
+    print_json,
+    print_rows,
+    prints_json,
+    say,
+)
+from heat_igl.drawing.figure import Picture
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import SignedHeatSolver
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import as_simplices
+from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.sources import vertex_sources
+from heat_igl.validation import METHODS, ValidationReport, ValidationRow, draw_sources
+
+_DEFAULT_METHODS = "heat,sweep,windows,meshlab,igl"
+
+
+def info(mesh: opt.MeshArgument, points: opt.PointsOption = False, json_file: opt.JsonOption = None) -> None:
+    """Describe a mesh or the triangles of a point cloud: sizes, defects, and properties that affect distances."""
+    loaded = read_mesh_or_cloud(mesh, points)
+    report = loaded.report()
+    values = [getattr(report, field.name) for field in fields(report)]
+    plain = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
+    rows = [(*row, value) for row, value in zip(report.rows(), plain, strict=True)]
+    try:
+        plan = [plan_row(heat_igl.GeodesicSolver(loaded).plan)]
+    except heat_igl.MeshError:  # the report above says what is wrong
+        plan = []
+    print_rows([described(mesh, loaded), *rows, *plan], json_file)
+
+
+def validate(
+    mesh: opt.MeshArgument,
+    sources: Annotated[int, typer.Option(min=1, help="Single source vertices, one distance from each.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="For drawing them.")] = 0,
+    methods: Annotated[str, typer.Option(help=f"Separated by commas: {', '.join(METHODS)}.")] = _DEFAULT_METHODS,
+    reference: Annotated[str, typer.Option(help="Method to measure errors against.")] = "exact",
+    timeout: Annotated[float, typer.Option(help="Seconds for one native solve.", callback=opt.positive)] = TIMEOUT,
+    points: opt.PointsOption = False,
+    json_file: opt.JsonOption = None,
+    picture: opt.PictureOption = None,
+    fail_above: Annotated[
+        float | None,
+        typer.Option(metavar="PERCENT", help="Exit with 1 if a mean error is larger.", callback=opt.positive),
+    ] = None,
+) -> None:
+    """Errors of methods against a reference, with time and memory."""
+    loaded = read_mesh_or_cloud(mesh, points)
+    drawn_sources = draw_sources(loaded, sources, seed)
+    console = Console(stderr=True)
+    # Without a terminal there is no bar, not even the empty line after a finished one.
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=None)
+        report = heat_igl.validate(
+            loaded, drawn_sources, [name.strip() for name in methods.split(",")], name=mesh.stem,
+            reference=reference, timeout=timeout,
+            progress=lambda label, done, total: bar.update(task, description=label, completed=done, total=total),
+        )  # fmt: skip
+    if picture is not None and report.truths is None:
+        say(f"no picture of errors: {report.failure or 'there is no reference'}")
+    elif picture is not None:
+        Picture(report.plot()).save(picture)
+    if json_file is not None:
+        print_json(report.to_dict(), json_file)
+    if not prints_json(json_file):
+        _print(report)
+    exceeding = report.exceeding(fail_above) if fail_above is not None else ()
+    if exceeding:
+        found = ", ".join(f"{row.method} {_verdict(row)}" for row in exceeding)
+        say(f"the mean error is not at most {fail_above:g} %: {found}")
+        raise typer.Exit(1)
+
+
+def _print(report: ValidationReport) -> None:
+    """Print the columns that a terminal has space for, and all to anything else."""
+    console = Console(highlight=False)
+    heading, *_, remarks = report.to_markdown().split("\n\n")
+    if not console.is_terminal:
+        print(report.to_markdown(), end="")
+        return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    columns = "mean %", "max %", "precompute s", "solve ms", "memory MB"
+    table.add_column("method")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for row in report.rows:
+        table.add_row(*row.cells(columns))
+    console.print(heading.replace("**", ""))
+    console.print(table)
+    if remarks.startswith("- "):
+        console.print(remarks.rstrip(), markup=False)
+
+
+def _verdict(row: ValidationRow) -> str:
+    """Why a method does not have the error that is asked for."""
+    if row.errors is None:
+        return "failed" if row.failure else "has no reference"
+    if row.errors.n_wrong_reach:
+        return f"reaches {row.errors.n_wrong_reach} other vertices than the reference"
+    return f"{100 * row.errors.mean:.3g} %"
 
 
 def view(

@@ -1,14 +1,48 @@
-"""Progress on standard error: bars, by rich, and lines with the time that is left."""
+"""What a user is told: warnings where the call came from, progress on standard error, and the time that is left."""
 
 from __future__ import annotations
 
+import functools
+import os
 import sys
+import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from heat_igl.errors import MissingExtraError
+
+# Cached properties of the package are called by functools.
+_OURS = (str(Path(__file__).parents[1]) + os.sep, functools.__file__)
+_held = threading.local()
+
+
+def warn_caller(message: str, category: type[Warning]) -> None:
+    """Warn with the file and line of the innermost caller outside this package."""
+    collected = getattr(_held, "warnings", None)
+    if collected is not None:
+        collected.append((message, category))
+        return
+    # `skip_file_prefixes` of `warnings.warn` does this from Python 3.12 on.
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_OURS):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, category, stacklevel=level)
+
+
+@contextmanager
+def held_warnings() -> Iterator[list[tuple[str, type[Warning]]]]:
+    """Collect the warnings of `warn_caller` on this thread, so that another thread, which has a caller, can warn."""
+    before, collected = getattr(_held, "warnings", None), list[tuple[str, type[Warning]]]()
+    _held.warnings = collected
+    try:
+        yield collected
+    finally:
+        _held.warnings = before
+
 
 # Seconds before the first line on a terminal, and between lines.
 _PATIENCE = 5.0
