@@ -18,6 +18,11 @@ from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoi
 from heat_igl.mesh.surface_points import require_faces
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
+# Corners of curves are put on a grid of this many steps along each side of a face, so that integers hold them exactly.
+_STEPS = 2**50
+# Corners nearer than this to a vertex, an edge or each other, as a share of the face, are the same point.
+_SAME = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class MeshPiece:
@@ -159,12 +164,6 @@ class CutMesh:
             vertices, corners = np.unique(self.mesh.F[faces], return_inverse=True)
             found.append(MeshPiece(Mesh(self.mesh.V[vertices], corners.reshape(-1, 3)), vertices, faces))
         return found
-
-
-# Corners of curves are put on a grid of this many steps along each side of a face, so that integers hold them exactly.
-_STEPS = 2**50
-# Corners nearer than this to a vertex, an edge or each other, as a share of the face, are the same point.
-_SAME = 1e-9
 
 
 def cut(mesh: MeshLike, curves: NestedCurves) -> CutMesh:

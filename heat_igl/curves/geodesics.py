@@ -24,7 +24,7 @@ from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # The compiled module, whose signatures are those of Cython.
-tables: Any = strips
+_tables: Any = strips
 # Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
 _SHORTEST = 1e-12
 # Of each face the edge `length` opposite each corner, the `angle` at each, `vertex` and `edge` numbers. Corner c lies
@@ -113,7 +113,7 @@ def shortener(mesh: Mesh) -> tuple[Any, Any]:
     face, edge = _faces(mesh), mesh.facets
     edges, _ = HalfEdges.of_mesh(mesh)
     first_corner, corner = (rows.astype(np.int32) for rows in group_by_label(mesh.F.ravel(), mesh.n_vertices))
-    table = tables.FaceTable(face, edges, first_corner, corner)
+    table = _tables.FaceTable(face, edges, first_corner, corner)
     sums = np.bincount(mesh.F.ravel(), face["angle"].ravel(), mesh.n_vertices)
     # At a vertex with angles of 2 pi or more, and on the boundary, at most one side is locally shortest. On edges of
     # more than two faces there are more than two sides.
@@ -128,11 +128,10 @@ def _faces(mesh: Mesh) -> AnyArray:
     lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
     face = np.empty(mesh.n_faces, _FACE)
     face["length"], face["angle"] = lengths, corner_angles(lengths)
-    base, left, right = lengths, np.roll(lengths, -1, axis=1), np.roll(lengths, -2, axis=1)
-    half = (base + left + right) / 2
-    # By Heron's formula. `left` is the side from corner c to corner c + 2.
-    face["along"] = ((left - right) * (left + right) / base + base) / (2 * base)
-    face["above"] = 2 * np.sqrt(np.maximum(half * (half - base) * (half - left) * (half - right), 0)) / base**2
+    # The side from corner c to corner c + 2, and the one to corner c + 1.
+    left, right = np.roll(lengths, -1, axis=1), np.roll(lengths, -2, axis=1)
+    face["along"] = ((left - right) * (left + right) / lengths + lengths) / (2 * lengths)
+    face["above"] = igl.doublearea(lengths, 0.0)[:, None] / lengths**2
     face["vertex"] = mesh.F
     return face
 

@@ -6,12 +6,6 @@ import io
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-from heat_igl.io import complete_file
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +13,11 @@ import numpy as np
 from heat_igl.drawing.raster import to_pixels, visible_runs
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, UNREACHABLE, Scene, Style
 from heat_igl.drawing.surface_image import LINE, OVERSAMPLING, SOURCE, fitted, mark_dots, surface_image
+from heat_igl.io import complete_file
 from heat_igl.typing import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 PAGE_SUFFIXES = (".html", ".htm")

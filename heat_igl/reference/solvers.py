@@ -21,28 +21,6 @@ from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import exact_distance
 
-
-def straight_lines(mesh: MeshLike, sources: Sources) -> FloatArray:
-    """Length (n,) of the straight line from each vertex to the nearest source, never above the geodesic distance."""
-    mesh = as_simplices(mesh)
-    from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
-
-    seeds = vertex_sources(sources, mesh.n_vertices)
-    distance, _ = cKDTree(mesh.V[seeds]).query(mesh.V)
-    return np.asarray(distance, dtype=np.float64)
-
-
-def edge_paths(mesh: MeshLike, sources: Sources, *, count_edges: bool = False) -> FloatArray:
-    """Length (n,) of the shortest path along edges from each vertex to the sources (Dijkstra 1959).
-
-    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source. With `count_edges` the
-    smallest number of edges instead, the distance of the paper's theorem 3.1.
-    """
-    mesh = as_simplices(mesh)
-    chosen = vertex_sources(sources, mesh.n_vertices)
-    return connectivity.edge_distance(mesh.edge_graph, chosen, count_edges=count_edges)
-
-
 #: The exact solver of this package, which `exact` takes unless told otherwise.
 WINDOWS = "windows"
 #: The exact solvers of other packages, for a second opinion; the last one needs no extra.
@@ -76,6 +54,27 @@ _SOLVERS = {
     "potpourri3d_heat": _Solver("potpourri3d_heat", "potpourri3d", "potpourri3d", "bench"),
     "potpourri3d_marching": _Solver("potpourri3d_marching", "potpourri3d", "potpourri3d", "bench"),
 }
+
+
+def straight_lines(mesh: MeshLike, sources: Sources) -> FloatArray:
+    """Length (n,) of the straight line from each vertex to the nearest source, never above the geodesic distance."""
+    mesh = as_simplices(mesh)
+    from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
+
+    seeds = vertex_sources(sources, mesh.n_vertices)
+    distance, _ = cKDTree(mesh.V[seeds]).query(mesh.V)
+    return np.asarray(distance, dtype=np.float64)
+
+
+def edge_paths(mesh: MeshLike, sources: Sources, *, count_edges: bool = False) -> FloatArray:
+    """Length (n,) of the shortest path along edges from each vertex to the sources (Dijkstra 1959).
+
+    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source. With `count_edges` the
+    smallest number of edges instead, the distance of the paper's theorem 3.1.
+    """
+    mesh = as_simplices(mesh)
+    chosen = vertex_sources(sources, mesh.n_vertices)
+    return connectivity.edge_distance(mesh.edge_graph, chosen, count_edges=count_edges)
 
 
 @dataclass(frozen=True, eq=False)
