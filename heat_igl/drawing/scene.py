@@ -30,54 +30,24 @@ _PERMUTATION = {"x": [1, 0, 2], "y": [0, 1, 2], "z": [1, 2, 0]}
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A centred and scaled surface with values and a view direction.
+    """A centred and scaled surface with values and a view direction."""
 
-    Attributes
-    ----------
-    V : (n, 3) float64
-        Positions relative to `centre`, in units of `unit`; coordinates of vertices of `F` lie between -1 and 1.
-    F : (m, 3) int64
-        Triangles; for tetrahedra, the boundary.
-    used : (k,) int64
-        The vertices of `F`.
-    centre : (3,) float64
-        Centre of the bounding box, in the unit of the mesh.
-    unit : float
-        Length of 1 in the scene, in the unit of the mesh.
-    turn : (3, 3) float64
-        Rotation to viewer coordinates: rows point right, up and towards the viewer.
-    values : (n,) float64
-        Values in the unit of the caller; ``inf`` means no value.
-    limits : (float, float)
-        Values at the ends of the colour bar.
-    step : float
-        Distance between isolines, or width of stripes.
-    vertices : (s,) int64
-        Sources that are vertices.
-    dots : (k, 3) float64
-        Positions of sources that are vertices or points in faces, in the coordinates of `V`.
-    lines : (l, 2, 3) float64
-        Segments of sources that are curves, in the coordinates of `V`.
-    is_categorical : bool
-        Whether the values are numbers of categories, between which there is nothing: no interpolation, no colour bar.
-    borders : (m, 3, 3) float64 or None
-        Of categories: for each corner of each triangle a linear function, by its values at the three corners. A point
-        has the category of the corner with the smallest; None stands for the nearest corner.
-    """
-
-    V: FloatArray
-    F: IntArray
-    used: IntArray
-    centre: FloatArray
-    unit: float
-    turn: FloatArray
-    values: FloatArray
-    limits: tuple[float, float]
-    step: float
-    vertices: IntArray
-    dots: FloatArray
-    lines: FloatArray
+    V: FloatArray  # positions (n, 3) relative to `centre`, in units of `unit`: between -1 and 1 at the vertices of F
+    F: IntArray  # triangles (m, 3); for tetrahedra, the boundary
+    used: IntArray  # the vertices (k,) of F
+    centre: FloatArray  # of the bounding box, in the unit of the mesh
+    unit: float  # the length of 1 in the scene, in the unit of the mesh
+    turn: FloatArray  # rotation (3, 3) to viewer coordinates: rows point right, up and towards the viewer
+    values: FloatArray  # (n,), in the unit of the caller; inf means no value
+    limits: tuple[float, float]  # values at the ends of the colour bar
+    step: float  # distance between isolines, or width of stripes
+    vertices: IntArray  # sources (s,) that are vertices
+    dots: FloatArray  # positions (k, 3) of sources that are vertices or points in faces, in the coordinates of V
+    lines: FloatArray  # segments (l, 2, 3) of sources that are curves, in the coordinates of V
+    # Whether values are numbers of categories, between which there is nothing: no interpolation, no colour bar.
     is_categorical: bool = False
+    # (m, 3, 3), of categories: for each corner of each triangle a linear function, by its values at the three corners.
+    # A point has the category of the corner with the smallest; None stands for the nearest corner.
     borders: FloatArray | None = None
 
     @property

@@ -18,20 +18,10 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation, *, orients: bool =
     """Flip edges until the triangulation is intrinsic Delaunay (Fisher, Springborn, Bobenko, Schroeder 2007).
 
     An edge is flipped when the two cotangents opposite it sum to less than zero. Edges stay on the boundary, at edges
-    of more than two faces, and along the seam of a surface that cannot be oriented.
+    of more than two faces, and along the seam of a surface that cannot be oriented. `orients` reverses faces first, so
+    that the seam is short; it is not needed if neighbours are oriented alike as far as possible.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        As `intrinsic_triangulation` makes it; left untouched.
-    orients : bool
-        Whether to reverse faces first, so that the seam is short; not if neighbours are oriented alike as far as
-        possible.
-
-    Returns
-    -------
-    IntrinsicTriangulation
-        The same surface on the same vertices; `triangulation` itself if no edge is flipped.
+    Returns the same surface on the same vertices; `triangulation` itself if no edge is flipped.
     """
     given = oriented(triangulation) if orients and not triangulation.aligned.all() else triangulation
     edges = HalfEdges.of(given)
@@ -66,31 +56,14 @@ def delaunay_refinement(
 ) -> IntrinsicTriangulation:
     """Add circumcenters as vertices until no angle is below 25 degrees (Sharp, Soliman, Crane 2019, section 4.2).
 
-    Angles at a vertex of the mesh around which they sum to less than 60 degrees are left as they are.
-    The triangle with the largest circumcircle among the bad ones is first. Edges are flipped after each new vertex, so
-    that the triangulation stays intrinsic Delaunay. The surface stays the same, and so do the given vertices, which
-    come before the new ones.
+    Angles at a vertex of the mesh around which they sum to less than 60 degrees are left as they are. The triangle with
+    the largest circumcircle among the bad ones is first. Edges are flipped after each new vertex, so that the
+    triangulation stays intrinsic Delaunay. The surface stays the same, and so do the given vertices, which come before
+    the new ones. No vertex is added when there are `most_vertices`; `triangulation` itself is returned if none is.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        Intrinsic Delaunay, closed and oriented: every half-edge has an aligned twin.
-    most_vertices : int
-        No vertex is added when there are so many.
-    largest_radius : float
-        Largest circumradius, in the `unit` of the face.
-    unit : (m,) float64, optional
-        A length for each face, which the faces that are made of it inherit; 1 if not given.
-
-    Returns
-    -------
-    IntrinsicTriangulation
-        `triangulation` itself if no vertex is added.
-
-    Raises
-    ------
-    ValueError
-        If the surface has a boundary or is not oriented.
+    No circumradius is larger than `largest_radius` times the `unit` (m,) of the face, 1 if not given, which the faces
+    that are made of it inherit. `triangulation` must be intrinsic Delaunay, closed and oriented, so that every
+    half-edge has an aligned twin: a ValueError if it is not.
     """
     if (triangulation.twin < 0).any() or not triangulation.aligned.all():
         raise ValueError("refinement needs a closed and oriented surface: take the tufted cover")

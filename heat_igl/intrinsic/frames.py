@@ -206,22 +206,11 @@ class TangentFrames:
         return np.stack([length * np.cos(angle), length * np.sin(angle)], axis=-1)
 
     def corner_towards(self, vertices: IntArray, angles: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The corner (k,) into which directions at vertices point, and the angle (k,) in that face.
+        """The corner ``3 f + c`` into which directions at vertices point, and the angle (k,) in that face.
 
-        Parameters
-        ----------
-        vertices : (k,) int64
-            Vertices that a face uses.
-        angles : (k,) float64
-            In [0, 2 pi).
-
-        Returns
-        -------
-        corner : (k,) int64
-            Number ``3 f + c``.
-        turn : (k,) float64
-            From the side that leaves from the corner, not scaled. On the boundary it may be negative or larger than the
-            angle of the corner: by up to half the angle that is missing there, on either side.
+        `angles` (k,) are in [0, 2 pi), at vertices (k,) that a face uses. The angle in the face counts from the side
+        that leaves from the corner, and is not scaled. On the boundary it may be negative or larger than the angle of
+        the corner: by up to half the angle that is missing there, on either side.
         """
         F, polar = self.triangulation.F, self.angles
         vertex = F.ravel()
@@ -361,10 +350,7 @@ def _first_axes(
 def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> FloatArray:
     """`vectors` as (k, size) float64; one vector may come without a row.
 
-    Raises
-    ------
-    ValueError
-        If the shape is another, or a number is not finite; the message names the first offender.
+    A ValueError if the shape is another, or a number is not finite; the message names the first offender.
     """
     given = real_numbers(name, vectors)
     found = np.atleast_2d(given)

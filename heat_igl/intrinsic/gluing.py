@@ -34,23 +34,10 @@ def from_edge_lengths(
 ) -> IntrinsicTriangulation:
     """Triangles with given edge lengths, glued along sides with the same two vertices; degenerate ones are mollified.
 
-    Parameters
-    ----------
-    l : (m, 3) array_like
-        ``l[f, c]`` is the length of the edge opposite corner ``c`` of face ``f``.
-    F : (m, 3) int64
-        Faces, validated like those of a `Mesh`.
-    n : int
-        Number of vertices.
-    facets : Facets, optional
-        The facets of F, if they are known.
-    margin : float, optional
-        See `mollify`.
+    ``l[f, c]`` is the length of the edge opposite corner ``c`` of face ``f``. F (m, 3) are faces on n vertices,
+    validated like those of a `Mesh`, and `facets` theirs, if they are known. `margin` is that of `mollify`.
 
-    Raises
-    ------
-    MeshError
-        If `l` has the wrong shape or an entry that is not a length, or gives an edge two lengths.
+    A MeshError if `l` has the wrong shape or an entry that is not a length, or gives an edge two lengths.
     """
     found = connectivity.facets(F, n) if facets is None else facets
     lengths = _checked_lengths(l, F)
@@ -72,24 +59,12 @@ def from_edge_lengths(
 def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> IntrinsicTriangulation:
     """Triangles with given edge lengths that are glued as `twin` says; degenerate ones are mollified.
 
-    Edges may join the same two vertices, or a vertex with itself.
+    Edges may join the same two vertices, or a vertex with itself: F (m, 3) may have a vertex at several corners. ``l[f,
+    c]`` is the length of the edge opposite corner ``c`` of face ``f``. ``twin[f, c]`` is the half-edge ``3 g + d``,
+    side d of face g, that side c of face f is glued to; -1 on the boundary. An edge that joins a vertex with itself is
+    glued such that the faces are oriented alike.
 
-    Parameters
-    ----------
-    l : (m, 3) array_like
-        ``l[f, c]`` is the length of the edge opposite corner ``c`` of face ``f``.
-    F : (m, 3) int64
-        Faces, which may have a vertex at several corners.
-    n : int
-        Number of vertices.
-    twin : (m, 3) array_like of int
-        ``twin[f, c]`` is the half-edge ``3 g + d``, side d of face g, that side c of face f is glued to; -1 on the
-        boundary. An edge that joins a vertex with itself is glued such that the faces are oriented alike.
-
-    Raises
-    ------
-    MeshError
-        If `l` or `twin` has the wrong shape or a wrong entry, or `l` gives an edge two lengths.
+    A MeshError if `l` or `twin` has the wrong shape or a wrong entry, or `l` gives an edge two lengths.
     """
     lengths, half_edge = _checked_lengths(l, F), np.arange(F.size)
     glued = np.asarray(twin)
@@ -145,16 +120,10 @@ def intrinsic_triangulation(mesh: Mesh, margin: float | None = None) -> Intrinsi
 
 
 def each_face_once(triangulation: IntrinsicTriangulation) -> tuple[IntrinsicTriangulation, IntArray]:
-    """The triangulation with one of the faces that have all edges in common, the first.
+    """The triangulation with the first of the faces that have all edges in common, and which (k,) remain, ascending.
 
-    No shortest path crosses from one of them to another.
-
-    Returns
-    -------
-    once : IntrinsicTriangulation
-        The faces that remain; `triangulation` itself if no face is there twice. Its history carries points.
-    kept : (k,) int64
-        Which these are, ascending.
+    No shortest path crosses from one of them to another. It is `triangulation` itself if no face is there twice; its
+    history carries points.
     """
     F, m = triangulation.F, len(triangulation.F)
     order = np.argsort(F, axis=1)
@@ -219,19 +188,9 @@ def has_nonmanifold_edges(mesh: Mesh) -> bool:
 def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     """The tufted cover of `mesh`: two copies of each triangle, glued to a closed oriented surface on the same vertices.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Any triangle mesh of m faces.
+    It has 2 m triangles, with twice the area and no boundary: row f is the front of face f, row m + f the back.
+    Degenerate triangles are mollified. It is not yet Delaunay, see `intrinsic_delaunay`.
 
-    Returns
-    -------
-    IntrinsicTriangulation
-        2 m triangles, with twice the area and no boundary: row f is the front of face f, row m + f the back.
-        Degenerate triangles are mollified. Not yet Delaunay, see `intrinsic_delaunay`.
-
-    Notes
-    -----
     The cover of a closed, manifold, oriented mesh is two copies that meet only in the vertices; one half of their
     Laplacian is the Laplacian of the mesh. Around an edge, faces are joined in the order of their angles, like the
     boundary of a thin solid around the faces; Sharp and Crane show that any order gives a manifold.

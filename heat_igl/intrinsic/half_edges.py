@@ -54,12 +54,8 @@ class HalfEdges(NamedTuple):
     def of_mesh(cls, mesh: Mesh) -> tuple[HalfEdges, int]:
         """The triangles of a mesh, with lengths in units of ``2 ** exponent``, and the exponent.
 
-        It is 0, but for very large or small meshes the power of two just above the mean extent.
-
-        Raises
-        ------
-        MeshError
-            If there are too many triangles for 32-bit indices.
+        It is 0, but for very large or small meshes the power of two just above the mean extent. A MeshError if there
+        are too many triangles for 32-bit indices.
         """
         _require_room(mesh.n_faces, mesh.n_vertices)
         exponent = 0
@@ -72,13 +68,7 @@ class HalfEdges(NamedTuple):
 
     @classmethod
     def of(cls, triangulation: IntrinsicTriangulation) -> HalfEdges:
-        """Those of a triangulation.
-
-        Raises
-        ------
-        MeshError
-            If there are too many triangles for 32-bit indices.
-        """
+        """Those of a triangulation; a MeshError if there are too many triangles for 32-bit indices."""
         _require_room(len(triangulation.F), triangulation.n)
         ring = np.arange(len(triangulation.twin), dtype=np.int32)
         many = np.flatnonzero(triangulation.twin == -2)
@@ -131,14 +121,8 @@ class HalfEdges(NamedTuple):
     def numbered(self, n: int, start: int = 0) -> tuple[HalfEdges, AnyArray, AnyArray]:
         """The triangles numbered breadth-first from face `start` on, so that neighbours lie near each other in memory.
 
-        Returns
-        -------
-        edges : HalfEdges
-            By the new numbers; corners stay in place.
-        number : (n,) int32
-            New number of each of the n vertices.
-        face : (m,) int32
-            Old number of each face.
+        Returns them by the new numbers, with corners in place; the new number (n,) of each of the n vertices; and the
+        old number (m,) of each face.
         """
         *edges, number, face = numbering.breadth_first(self, n, start)
         return HalfEdges(*edges), number, face
@@ -155,27 +139,13 @@ def _require_room(m: int, n: int) -> None:
 
 
 def mollify(l: FloatArray, F: IntArray, margin: float | None = None) -> FloatArray:
-    """The length to add to the edges so that no triangle is degenerate (Sharp and Crane 2020, section 4.5).
+    """The length (m, 3) to add to the edges so that no triangle is degenerate (Sharp and Crane 2020, section 4.5).
 
-    Parameters
-    ----------
-    l : (m, 3) float64
-        Edge lengths, opposite each corner.
-    F : (m, 3) int64
-        Faces: each component has a mean edge length and an added length of its own.
-    margin : float, optional
-        1e-8 if not given.
+    It is the smallest ``e >= 0``, one for each component of the faces F (m, 3), for which the triangle inequalities of
+    ``l + e`` hold there by `margin` (1e-8 if not given) times the mean edge length; exactly 0 if they already do, so
+    that the lengths of a good mesh keep every bit. In components with faces whose corners all coincide, by that margin,
+    ``max(l, 1e-10 mean)`` takes the place of l, which keeps every triangle inequality.
 
-    Returns
-    -------
-    (m, 3) float64
-        The smallest ``e >= 0``, one for each component, for which the triangle inequalities of ``l + e`` hold there by
-        `margin` times the mean edge length; exactly 0 if they already do, so that the lengths of a good mesh keep
-        every bit. In components with faces whose corners all coincide, by that margin, ``max(l, 1e-10 mean)`` takes the
-        place of l, which keeps every triangle inequality.
-
-    Notes
-    -----
     A triangle with a base b between sides of length 1 knows its angles at the base to 1e-16 / b, and the base lengthens
     paths by b at most: both are small with b = 1e-10. With b = 1e-12 around three corners in one place, exact windows
     leave out a vertex in 1 of 900 queries.

@@ -9,22 +9,9 @@ from heat_igl.typing import FloatArray
 
 
 def apex(base: FloatArray, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Corner opposite the base of triangles whose base runs from the origin along the positive first axis.
+    """Corner (x, y), y >= 0, opposite the bases of triangles that run from the origin along the positive first axis.
 
-    Parameters
-    ----------
-    base : (k,) float64
-        Lengths of the bases.
-    left, right : (k,) float64
-        Lengths of the sides at the origin, and at the other end of the base.
-
-    Returns
-    -------
-    x, y : (k,) float64
-        Coordinates; y is never negative.
-
-    Notes
-    -----
+    `base`, `left` and `right` (k,) are the lengths of the bases, and of the sides at the origin and at the other end.
     The height y comes from the area by Kahan's form of Heron's formula: ``sqrt(left^2 - x^2)`` loses the digits of
     slivers.
     """

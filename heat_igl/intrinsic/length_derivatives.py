@@ -22,14 +22,9 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 
 class PlaceSlopes(NamedTuple):
-    """Points in faces that were given before any change, and the derivative of a number by their places.
+    """Points in faces (p,) that were given before any change, and the derivative of a number by their places.
 
-    Attributes
-    ----------
-    faces, barycentric : (p,) int64, (p, 3) float64
-        The points.
-    slopes : (p, 3) float64
-        By their coordinates, up to a constant in each row; or changes of these coordinates.
+    `slopes` (p, 3) are by their coordinates, up to a constant in each row; or they are changes of these coordinates.
     """
 
     faces: IntArray
@@ -42,24 +37,13 @@ def carry_lengths_back(
 ) -> tuple[FloatArray, FloatArray | None]:
     """The derivative by the sides of earlier faces, from that by the sides of a triangulation.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        m triangles, whose faces were turned and edges flipped, with no vertex added and no face doubled. Earlier faces
-        are those before, but after copies of faces were removed.
-    by_side : (m, 3) float64
-        Derivative by the length opposite each corner; an edge of two faces changes both of its sides.
-    places : PlaceSlopes, optional
-        Points that count as fixed in the given faces, with the derivative by their coordinates in the triangulation:
-        after a flip these depend on the lengths too.
+    Faces of the triangulation were turned and edges flipped, with no vertex added and no face doubled. Earlier faces
+    are those before, but after copies of faces were removed. `by_side` (m, 3) is the derivative by the length opposite
+    each corner; an edge of two faces changes both of its sides. `places` are points that count as fixed in the given
+    faces, with the derivative by their coordinates in the triangulation: after a flip these depend on the lengths too.
 
-    Returns
-    -------
-    by_side : (m, 3) float64
-        The same for the earlier faces.
-    by_place : (p, 3) float64 or None
-        The derivative by the points' coordinates in the given faces.
-
+    Returns the derivative (m, 3) by the sides of the earlier faces, and that (p, 3) by the points' coordinates in the
+    given faces, None without points.
     """
     vector = _joined(by_side, places)
     for change in reversed(_linear_changes(triangulation, places)):

@@ -146,23 +146,9 @@ class IntrinsicTriangulation:
         return bool((self.twin.reshape(-1, 3)[corner // 3] == -2).any())
 
     def locate(self, faces: IntArray, barycentric: FloatArray, on_back: bool = False) -> tuple[IntArray, FloatArray]:
-        """Points of the mesh, given in faces of the mesh, in these triangles.
+        """Points of the mesh, given by faces (k,) of the mesh and barycentric coordinates (k, 3), in these triangles.
 
-        Parameters
-        ----------
-        faces : (k,) int64
-            Faces that the triangulation was made from.
-        barycentric : (k, 3) float64
-            Coordinates in them.
-        on_back : bool
-            Of a cover, in the triangles on the back.
-
-        Returns
-        -------
-        faces : (k,) int64
-            Triangle of each point.
-        barycentric : (k, 3) float64
-            Coordinates in it.
+        Returns the triangle of each, and the coordinates in it; of a cover, those `on_back` if so asked.
         """
         for change in self.history:
             if on_back and isinstance(change, Covered):

@@ -78,14 +78,11 @@ def polar_angles(triangulation: IntrinsicTriangulation) -> PolarAngles:
     """The polar angles of a triangulation without flips.
 
     The reference edge of an inner vertex leaves from the corner with the smallest number ``3 f + c``: it leads to the
-    next corner of that face. On the boundary it is the boundary edge at which the faces begin counterclockwise, so
-    that angles run from 0 to pi.
+    next corner of that face. On the boundary it is the boundary edge at which the faces begin counterclockwise, so that
+    angles run from 0 to pi.
 
-    Raises
-    ------
-    MeshError
-        If more than two faces meet at an edge, two neighbours are oriented differently, or the faces at a vertex are
-        not one fan; the message names the first offender.
+    A MeshError if more than two faces meet at an edge, two neighbours are oriented differently, or the faces at a
+    vertex are not one fan; the message names the first offender.
     """
     F, n = triangulation.F, triangulation.n
     _require_oriented_manifold(triangulation)
@@ -132,14 +129,9 @@ def _require_oriented_manifold(triangulation: IntrinsicTriangulation) -> None:
 
 
 def carried_angles(angles: PolarAngles, flipped: IntrinsicTriangulation) -> PolarAngles:
-    """The polar angles of a triangulation after the flips of the history; reference directions stay.
+    """The polar angles of a triangulation after the flips of the history, which holds nothing else.
 
-    Parameters
-    ----------
-    angles : PolarAngles
-        Of the triangulation before all flips.
-    flipped : IntrinsicTriangulation
-        The triangulation now. The history holds flips only.
+    `angles` are those before all flips; reference directions stay.
     """
     outgoing, scale = angles.outgoing.copy(), angles.scale
     flips = [change for change in flipped.history if isinstance(change, Flipped)]

@@ -58,27 +58,13 @@ def call(
 ) -> Reply:
     """Call a function in a child process, and wait until it returns.
 
-    Parameters
-    ----------
-    function : str
-        ``"module:name"``, imported in the child. It is called with all arrays (read-only) and parameters as keyword
-        arguments, and returns a mapping of names to arrays or values that JSON can carry.
-    arrays : mapping of str to array
-        Passed through files.
-    parameters : mapping of str, optional
-        Values that JSON can carry.
-    library : str
-        A module that is imported before memory is measured.
-    timeout : float
-        Seconds after which the child is killed.
-    memory : float
-        Bytes by which the child's address space may grow during the call. Held on Linux; other systems have no bound
-        that a process can set for itself.
+    `function` is ``"module:name"``, imported in the child. It is called with all arrays (read-only) and parameters,
+    values that JSON can carry, as keyword arguments, and returns a mapping of names to arrays or such values. `library`
+    is a module that is imported before memory is measured. The child is killed after `timeout` seconds. Its address
+    space may grow by `memory` bytes during the call: held on Linux; other systems have no bound that a process can set
+    for itself.
 
-    Raises
-    ------
-    ReferenceSolverError
-        If the function raised, if the child died, or if the time is over.
+    A ReferenceSolverError if the function raised, if the child died, or if the time is over.
     """
     with tempfile.TemporaryDirectory(prefix="heat_igl_") as name:
         folder = Path(name)
