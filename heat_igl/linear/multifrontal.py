@@ -138,21 +138,8 @@ class Substitution:
 
     The tree is cut into pieces, which are subtrees, and the few fronts above them. Pieces are independent: each stores
     its updates of the rows above in an array of its own, and these are summed in the order of the pieces. So pieces run
-    in parallel, and the bits of a solution do not depend on the number of threads.
-
-    Parameters
-    ----------
-    fronts : Fronts
-        Layout of the factor.
-    L : (entries,) float64
-        The factor.
-
-    Attributes
-    ----------
-    width : int
-        Right-hand sides that are solved together.
-    few : int
-        Fewer right-hand sides than this are solved faster one by one.
+    in parallel, and the bits of a solution do not depend on the number of threads. `width` right-hand sides are solved
+    together, and fewer than `few` faster one by one.
     """
 
     width: int = _solves.width

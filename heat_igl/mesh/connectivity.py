@@ -38,17 +38,7 @@ class Groups(NamedTuple):
 
 
 def group_by_label(labels: IntArray, n: int, elements: IntArray | None = None) -> Groups:
-    """Sort elements by label, in linear time; equal labels keep their order.
-
-    Parameters
-    ----------
-    labels : (k,) int64
-        Label of each element, in ``range(n)``.
-    n : int
-        Number of labels.
-    elements : (k,) int64, optional
-        The elements; by default 0, 1, ..., k - 1.
-    """
+    """Elements (k,), by default 0 to k - 1, by their labels (k,) in ``range(n)``: linear time, equal ones in order."""
     elements = np.arange(len(labels)) if elements is None else elements
     # scipy converts a row to columns by counting.
     by_label = sp.csr_array((elements, labels, [0, len(labels)]), shape=(1, n)).tocsc()
@@ -91,25 +81,10 @@ class Facets(NamedTuple):
 
 
 def unique_rows(rows: IntArray, n: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Distinct rows of small non-negative integers, with the inverse map and the counts.
+    """Distinct rows (r, d) of integers in ``range(n)``: the first copy (k,) of each, the inverse (r,) and counts (k,).
 
-    Linear time; at least ten times as fast as `numpy.unique` with ``axis=0``.
-
-    Parameters
-    ----------
-    rows : (r, d) int64
-        Values in ``range(n)``.
-    n : int
-        Exclusive upper bound of the values; the sort needs a temporary array of n integers.
-
-    Returns
-    -------
-    first : (k,) int64
-        Position in `rows` of the first copy of each distinct row, rows in lexicographic order.
-    inverse : (r,) int64
-        ``rows == rows[first][inverse]``.
-    counts : (k,) int64
-        Number of copies of each.
+    ``rows == rows[first][inverse]``, and rows are in lexicographic order. Linear time, with a temporary array of n
+    integers; at least ten times as fast as `numpy.unique` with ``axis=0``.
     """
     ascending = np.arange(len(rows))
     for column in rows.T[::-1]:
@@ -205,22 +180,11 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
 
 
 def longest_paths(graph: sp.csr_array, components: IntArray) -> FloatArray:
-    """Length of a longest shortest path along edges in each component.
+    """Length (c,) of a longest shortest path along edges in each component, 0 for a vertex without edges.
 
     Two rounds of Dijkstra's algorithm, the second from the farthest vertices of the first: exact on a tree, and a lower
-    bound within a few percent on surfaces.
-
-    Parameters
-    ----------
-    graph : (n, n) csr_array
-        Edge lengths, each edge stored in one direction or both.
-    components : (n,) int64
-        Component labels 0, 1, ... of the vertices.
-
-    Returns
-    -------
-    (c,) float64
-        0 for a vertex without edges.
+    bound within a few percent on surfaces. The graph (n, n) has edge lengths, in one direction or both, and
+    `components` (n,) the labels 0, 1, ... of the vertices.
     """
     from scipy.sparse import csgraph
 
@@ -245,16 +209,8 @@ def shortest_edge_graph(edges: IntArray, lengths: FloatArray, n: int) -> sp.csr_
 def edge_distance(graph: sp.csr_array, sources: IntArray, *, count_edges: bool = False) -> FloatArray:
     """Length (n,) of the shortest path along edges from each vertex to the nearest source (Dijkstra 1959).
 
-    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source.
-
-    Parameters
-    ----------
-    graph : (n, n) csr_array
-        Edge lengths, each edge stored in one direction or both; a stored 0 is an edge of length 0.
-    sources : (k,) int64
-        Source vertices.
-    count_edges : bool
-        Count edges instead of adding up their lengths.
+    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source. The graph (n, n) has edge
+    lengths, in one direction or both; a stored 0 is an edge of length 0. With `count_edges`, each counts as 1.
     """
     from scipy.sparse import csgraph
 

@@ -14,19 +14,10 @@ from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 
 class Crossings(NamedTuple):
-    """Crossings of a level with faces and their edges.
+    """Crossings of a level with the faces (s,) that have vertices on both sides of it.
 
-    Attributes
-    ----------
-    faces : (s,) int64
-        The faces with vertices on both sides of the level.
-    apex : (s,) int64
-        The corner alone on one side.
-    toward : (s, 2) float64
-        Position of the level between the apex (0) and the next corner (1), and between the apex and the corner after
-        that.
-    is_below : (s,) bool
-        Whether the apex is below the level.
+    `apex` (s,) is the corner alone on one side, and `is_below` (s,) says whether that is below the level; `toward`
+    (s, 2) is where the level is between the apex, at 0, and the next corner, at 1, and the corner after that.
     """
 
     faces: IntArray
@@ -56,16 +47,9 @@ def crossings(mesh: Mesh, values: FloatArray, level: float) -> Crossings:
 
 
 class Segments(NamedTuple):
-    """Directed straight segments (s,) in faces.
+    """Directed straight segments in faces (s,), from `start` to `end`, (s, 3) in barycentric coordinates.
 
-    Attributes
-    ----------
-    faces : (s,) int64
-        The face of each segment.
-    start, end : (s, 3) float64
-        Barycentric coordinates of the two ends.
-    ends : (s, 2) int64
-        Labels of the two ends: ends at the same place have the same label.
+    The labels `ends` (s, 2) of two ends are the same if they are in one place.
     """
 
     faces: IntArray
@@ -109,18 +93,11 @@ def joined_segments(segments: Segments, mesh: Mesh) -> list[SurfaceCurve]:
 
 
 def _chains(ends: IntArray) -> list[tuple[IntArray, bool]]:
-    """Join segments to chains.
+    """Chains of segments, and whether each is closed, by the labels (s, 2) of their ends.
 
-    Parameters
-    ----------
-    ends : (s, 2) int64
-        Labels of the start and end of each segment. Two ends are joined if they, and no other, have the same label.
-
-    Returns
-    -------
-    list of (chain, is_closed)
-        A chain holds ``2 i`` for segment i and ``2 i + 1`` for segment i reversed. The segment with the smallest i of a
-        chain is not reversed. Chains are sorted by this i, and closed ones begin with it.
+    Two ends are joined if they, and no other, have the same label. A chain holds ``2 i`` for segment i and ``2 i + 1``
+    for segment i reversed. The segment with the smallest i of a chain is not reversed. Chains are sorted by this i, and
+    closed ones begin with it.
     """
     order = np.argsort(ends.ravel(), kind="stable")
     label = ends.ravel()[order]

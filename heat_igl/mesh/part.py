@@ -13,18 +13,11 @@ from heat_igl.typing import ArrayLike, BoolArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class MeshPart:
-    """Some faces of a mesh of n vertices and m faces, made by `MeshPart.of`.
+    """Some faces of a mesh of n vertices, made by `MeshPart.of`.
 
-    Attributes
-    ----------
-    mesh : Mesh
-        These faces, on all n vertices: what is not reached in the part is not reached in this mesh.
-    inside : (n,) bool
-        The vertices of the part. Others may not be sources.
-    faces : (k,) int64
-        The face of the whole mesh that each face is.
-    whole : (m, 3) or (m, 4) int64
-        The faces of the whole mesh.
+    `mesh` has these faces, on all n vertices: what is not reached in the part is not reached in this mesh. `inside`
+    (n,) are the vertices of the part, and others may not be sources; `faces` (k,) are its faces among those of the
+    `whole` mesh (m, 3) or (m, 4).
     """
 
     mesh: Mesh
@@ -34,19 +27,10 @@ class MeshPart:
 
     @classmethod
     def of(cls, mesh: object, region: ArrayLike) -> MeshPart:
-        """The part of a mesh that a mask selects.
+        """The part of a mesh that a mask selects: faces (m,), or those all of whose vertices (n,) it selects.
 
-        Parameters
-        ----------
-        mesh : Mesh
-            n vertices, m faces.
-        region : (n,) or (m,) array_like of bool
-            Of vertices, for the faces all of whose vertices are selected; or of faces. Where n is m, of vertices.
-
-        Raises
-        ------
-        MeshError
-            If `mesh` is no `Mesh`, or `region` is no such mask or selects no face.
+        Where n is m, the mask is of vertices. A MeshError if `mesh` is no `Mesh`, or `region` no such mask, or if it
+        selects no face.
         """
         if not isinstance(mesh, Mesh):
             raise MeshError(

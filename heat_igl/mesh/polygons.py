@@ -175,19 +175,11 @@ _FLAT = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class PolygonFans:
-    """The triangles between the sides and the virtual vertex of each polygon.
+    """The triangles between the sides and the virtual vertex of each of m polygons.
 
     A triangle stays as it is. A polygon whose virtual vertex does not see every side, as a very concave one, or one
-    without area, is taken as its triangles in ``mesh.triangles``.
-
-    Attributes
-    ----------
-    polygons : PolygonMesh
-        n vertices, m polygons.
-    mesh : Mesh
-        The triangles, in the order of the polygons, on these vertices and the virtual ones after them.
-    first : (m + 1,) int64
-        The triangles of polygon i are ``first[i]`` to ``first[i + 1]``.
+    without area, is taken as its triangles in ``polygons.triangles``. `mesh` has the triangles in the order of the
+    polygons, those of polygon i from ``first[i]`` to ``first[i + 1]``, and virtual vertices after the given ones.
     """
 
     polygons: PolygonMesh
@@ -210,20 +202,10 @@ class PolygonFans:
         return cls(polygons, Mesh(np.concatenate([polygons.V, points[has_fan]]), F[order]), first)
 
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Points in ``polygons.triangles``, carried to `mesh`.
+        """Points in triangles (k,) of ``polygons.triangles``, coordinates (k, 3), carried to those of `mesh`.
 
         A point of a planar polygon stays where it is, and so does one on a side; another moves to the triangle of the
         fan above or below it.
-
-        Parameters
-        ----------
-        faces, barycentric : (k,) int64, (k, 3) float64
-            Triangles of ``polygons.triangles``, and coordinates in them.
-
-        Returns
-        -------
-        faces, barycentric : (k,) int64, (k, 3) float64
-            Triangles of `mesh`, and coordinates in them.
         """
         polygon, moved, is_fanned = self._kept(faces)
         at = np.flatnonzero(is_fanned)
@@ -237,19 +219,9 @@ class PolygonFans:
     def carry_segments(
         self, faces: IntArray, start: FloatArray, end: FloatArray
     ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-        """Segments in ``polygons.triangles``, cut where they pass from one triangle of `mesh` to the next.
+        """Segments (s,) in ``polygons.triangles``, cut where they pass from one triangle of `mesh` to the next.
 
-        Parameters
-        ----------
-        faces, start, end : (s,) int64, (s, 3) float64, (s, 3) float64
-            Triangles of ``polygons.triangles``, and the coordinates of both ends in them.
-
-        Returns
-        -------
-        which : (k,) int64
-            The segment that each piece belongs to.
-        faces, start, end : (k,) int64, (k, 3) float64, (k, 3) float64
-            As the arguments, in `mesh`.
+        Returns the segment (k,) that each piece belongs to, and faces, start and end of the pieces in `mesh`.
         """
         polygon, moved, is_fanned = self._kept(faces)
         whole, cut = np.flatnonzero(~is_fanned), np.flatnonzero(is_fanned)

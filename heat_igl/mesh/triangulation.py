@@ -26,21 +26,12 @@ def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
 
 
 def triangulated(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[IntArray, IntArray]:
-    """Triangles of polygons, in the order of the polygons.
+    """Triangles (sum of (degree - 2), 3) of polygons, one after the other, and the polygons (k,) that cross themselves.
 
-    Parameters
-    ----------
-    V, corners, degree
-        As for `PolygonMesh`, each degree at least three.
-
-    Returns
-    -------
-    F : (sum of (degree - 2), 3) int64
-        The fan of each polygon around the first corner. If a triangle of the fan is turned over, or the fan goes
-        around that corner more than once, the polygon is concave, and ears are clipped instead (Meisters 1975), in
-        the plane that its vector area is normal to. A polygon that crosses itself there keeps the fan.
-    crossed : (k,) int64
-        The nearly planar polygons of which two sides cross each other: they have no inside that triangles could fill.
+    V, corners and degree are as for `PolygonMesh`. A polygon is the fan around the first corner. If a triangle of the
+    fan is turned over, or the fan goes around that corner more than once, the polygon is concave, and ears are clipped
+    instead (Meisters 1975), in the plane that its vector area is normal to. A polygon that crosses itself there keeps
+    the fan; if it is nearly planar, it has no inside that triangles could fill.
     """
     F = triangle_fans(corners, degree)
     if (degree == 3).all():

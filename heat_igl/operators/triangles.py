@@ -34,15 +34,8 @@ def intrinsic_operators(
 ) -> Operators:
     """The operators of triangles that are known by their edge lengths, gradients in the plane of each (d = 2).
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        The triangles.
-    paths : Mesh or Operators, optional
-        Gives the components and the longest path along edges, on the same vertices or the first of them; without it
-        both are found along the edges of the triangulation.
-    on_laplacian : callable, optional
-        Called with L as soon as it is known.
+    `paths` gives the components and the longest path along edges, on the same vertices or the first of them; without it
+    both are found along the edges of the triangulation. `on_laplacian` is called with L as soon as it is known.
     """
     F, lengths, n = triangulation.F, triangulation.l, triangulation.n
     L = cotangent_laplacian(igl.cotmatrix_entries(lengths), F, n)
@@ -92,16 +85,8 @@ def changed_operators(
     once, and L = D G holds. No weight is negative, not even on the boundary, which the cover does not have; `boundary`
     is that of the surface.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        The triangles to solve on.
-    faces : IntrinsicTriangulation
-        Those before any flip.
-    uncovered : IntrinsicTriangulation
-        The intrinsic Delaunay triangulation of `faces` on the same vertices.
-    paths, on_laplacian
-        As for `intrinsic_operators`; of a cover, `on_laplacian` gets twice L.
+    `faces` are those before any flip, and `uncovered` their intrinsic Delaunay triangulation on the same vertices;
+    `paths` and `on_laplacian` are as for `intrinsic_operators`, but of a cover `on_laplacian` gets twice L.
     """
     domain = intrinsic_operators(triangulation, paths, on_laplacian)
     V = paths.V if isinstance(paths, Mesh) else None

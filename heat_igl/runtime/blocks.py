@@ -26,22 +26,10 @@ WORKING_MEMORY = 2**31
 
 
 def block_size(n_faces: int, n_sets: int | None, n_threads: int) -> tuple[int, int]:
-    """Number of right-hand sides in a block, and number of threads.
+    """Number of right-hand sides in a block, of `n_sets` if that is known, and number of threads, at most `n_threads`.
 
-    Parameters
-    ----------
-    n_faces : int
-        Number of faces of the domain.
-    n_sets : int or None
-        Number of right-hand sides; None if unknown.
-    n_threads : int
-        Largest number of threads.
-
-    Returns
-    -------
-    (int, int)
-        Both at least 1. Together the blocks stay within `WORKING_MEMORY`. If that memory is not the limit, the block
-        size does not depend on the number of threads; neither do the bits of the results.
+    Both are at least 1. Together the blocks stay within `WORKING_MEMORY`. If that memory is not the limit, the block
+    size does not depend on the number of threads; neither do the bits of the results.
     """
     fit = int(WORKING_MEMORY // (_BYTES_PER_FACE * n_faces))
     threads = max(1, min(n_threads, fit, n_threads if n_sets is None else n_sets))
