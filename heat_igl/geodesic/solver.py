@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from heat_igl.geodesic.derivatives import DistanceDerivative
     from heat_igl.heat.directions import Directions
     from heat_igl.intrinsic import TangentFrames
+    from heat_igl.sweep import SweepEngine
     from heat_igl.sweep.simplex_derivative import SimplexDerivative
 
 
@@ -158,9 +159,7 @@ class GeodesicSolver(BatchedSolver):
     def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:
         self._triangles, originals = triangles, self._originals
         if chosen.engine == "sweep":
-            from heat_igl.sweep import SweepEngine
-
-            sweep = SweepEngine(triangles, originals)
+            sweep = _sweep_engine(triangles, originals)
             chosen = sweep_plan(sweep.measures, chosen)
             if chosen.engine == "sweep":
                 return chosen, sweep
@@ -168,7 +167,7 @@ class GeodesicSolver(BatchedSolver):
         domain = self._domain.triangles if isinstance(self._domain, PointCloud) else self._domain
         # Noisy points are measured where they were moved to.
         V = None if isinstance(domain, Operators) else domain.V
-        return chosen, guarded_windows(triangles, V, originals)
+        return chosen, guarded_windows(triangles, V, originals, _sweep_engine)
 
     def __repr__(self) -> str:
         tolerance = "" if self._plan.tolerance is None else f", tolerance={self._plan.tolerance:g}"
@@ -306,7 +305,7 @@ class GeodesicSolver(BatchedSolver):
             raise ValueError("directions need the positions of a mesh, which this solver does not have")
         surface = tangent_surface(domain)
         if isinstance(domain, PointCloud) and surface is not domain.triangles:
-            engine = guarded_windows(MeshTriangles(surface), surface.V)
+            engine = guarded_windows(MeshTriangles(surface), surface.V, None, _sweep_engine)
         return engine, tangent_frames(surface)
 
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative | SimplexDerivative]:
@@ -409,3 +408,9 @@ class GeodesicSolver(BatchedSolver):
     def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[None]]:
         rows = [self._engine.distance(sources, cutoff) for sources in source_sets]
         return np.stack(rows), [None] * len(rows)
+
+
+def _sweep_engine(triangles: Triangles, originals: IntArray | None) -> SweepEngine:
+    from heat_igl.sweep import SweepEngine
+
+    return SweepEngine(triangles, originals)

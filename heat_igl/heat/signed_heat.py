@@ -24,6 +24,7 @@ from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, one_sided
 from heat_igl.operators import Operators, operators
 from heat_igl.runtime import both, n_threads, warn_caller
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, require_resolved, source_set
+from heat_igl.sweep import SweepEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows import MeshTriangles, guarded_windows
 
@@ -97,7 +98,7 @@ class SignedHeatSolver:
         self._domain = parts.operators
         self._integration = NormalIntegration(self._mesh, self._faces, triangulation, parts)
         self._unsigned = HeatMethodSolver._of(parts)
-        self._exact = guarded_windows(MeshTriangles(self._mesh), self._mesh.V)
+        self._exact = guarded_windows(MeshTriangles(self._mesh), self._mesh.V, None, SweepEngine)
         self._integrates = not is_default
 
     def __repr__(self) -> str:

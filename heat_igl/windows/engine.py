@@ -544,10 +544,16 @@ class GuardedEngine(Engine):
         raise contradicted(f"{problem}, whatever method finds it")
 
 
-def guarded_windows(triangles: Triangles, V: FloatArray | None, originals: IntArray | None = None) -> GuardedEngine:
-    """Windows on triangles with positions V (n, 3), if known; a sweep answers where they contradict themselves.
+def guarded_windows(
+    triangles: Triangles,
+    V: FloatArray | None,
+    originals: IntArray | None = None,
+    other: Callable[[Triangles, IntArray | None], Engine] | None = None,
+) -> GuardedEngine:
+    """Windows on triangles with positions V (n, 3), if known; an `other` engine answers where they contradict
+    themselves.
 
-    Other arguments as for `WindowEngine`.
+    Triangles and originals as for `WindowEngine`, and for the other engine.
     """
     components = triangles.components if originals is None else triangles.components[originals]
     if V is None:
@@ -555,13 +561,7 @@ def guarded_windows(triangles: Triangles, V: FloatArray | None, originals: IntAr
     else:
         invariants = Invariants(triangles.given_faces, components, V)
     windows = WindowEngine(triangles, originals)
-    return GuardedEngine(windows, invariants, (partial(_sweep, triangles, originals),))
-
-
-def _sweep(triangles: Triangles, originals: IntArray | None) -> Engine:
-    from heat_igl.sweep.sweep import SweepEngine
-
-    return SweepEngine(triangles, originals)
+    return GuardedEngine(windows, invariants, () if other is None else (partial(other, triangles, originals),))
 
 
 def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:
