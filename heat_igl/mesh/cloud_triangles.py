@@ -155,8 +155,8 @@ def with_fans_joined(P: FloatArray, F: IntArray, pinched: IntArray) -> IntArray:
     """The triangles F (m, 3), and others between the fans of `pinched` vertices (k,) that have several with an end.
 
     Two parts of a surface that meet in one vertex alone are connected for distance, but not for vectors, which need a
-    tangent plane along the way. Between two fans goes the triangle with the smallest angle at the vertex that runs
-    along its sides against the neighbours, if there is one.
+    tangent plane along the way. Between two fans goes the triangle with the shortest third side that runs along its
+    sides against the neighbours, if there is one.
     """
     if not len(pinched):
         return F

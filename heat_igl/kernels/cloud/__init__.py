@@ -10,10 +10,9 @@ neighbours are near in memory. All kernels take rows, or a range of them, and sh
     quadric through it, onto which noisy points are moved.
 `empty_balls`
     Where a neighbourhood is far from flat, the neighbours on the same sheet: those that share an empty ball.
-`unrolling`
-    A neighbour in the tangent plane of a point: projected, or turned about the line in which two planes meet.
 `local_delaunay`
-    The Delaunay triangles around each point in its plane, its star: the hull of the inverted neighbours.
+    The Delaunay triangles around each point in its plane, its star: the hull of the inverted neighbours. These keep
+    their distances and the directions of their projections.
 `agreeing`
     In how many stars of its corners a triangle is. Those in all three never overlap.
 `fitting_triangles`

@@ -3,7 +3,6 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.cloud.fitting_triangles import ROUNDING, TURN
-from cython.cimports.heat_igl.kernels.cloud.unrolling import InPlane, in_plane
 from cython.cimports.libc.math import atan2
 
 
@@ -76,10 +75,12 @@ def _direction(
     j: cython.Py_ssize_t,
 ) -> cython.double:
     """Angle of point j around point i in the tangent plane of i."""
-    flat: InPlane = in_plane(
-        cython.address(P[i, 0]), cython.address(axes[i, 0, 0]), cython.address(P[j, 0]), cython.address(axes[j, 0, 0])
-    )
-    return atan2(flat.y, flat.x)
+    x: cython.double = 0.0
+    y: cython.double = 0.0
+    for c in range(3):
+        x += (P[j, c] - P[i, c]) * axes[i, 0, c]
+        y += (P[j, c] - P[i, c]) * axes[i, 1, c]
+    return atan2(y, x)
 
 
 @cython.cfunc

@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.math import INFINITY
 
 
 def joining_triangles(
@@ -10,7 +10,7 @@ def joining_triangles(
     triangles: cython.const[cython.int][:, ::1],
     pinched: cython.const[cython.longlong][::1],
 ):
-    """Triangles (k, 3) int32 between fans with an end at each `pinched` vertex, the smallest angle there first.
+    """Triangles (k, 3) int32 between fans with an end at each `pinched` vertex, that with the shortest side first.
 
     `triangles` (m, 3) are all those around the pinched vertices and around the neighbours of these, at most two at an
     edge. Each triangle runs along its sides against its neighbours, no edge gets a third one, and at no corner does
@@ -55,8 +55,8 @@ def _join(
     following: cython.int[:, ::1],
     count: cython.Py_ssize_t,
 ) -> cython.bint:
-    """Put the triangle between two fans of a vertex with the smallest angle there into row `count`, if there is one."""
-    closest: cython.double = -2.0
+    """Put the triangle between two fans of a vertex with the shortest third side into row `count`, if there is one."""
+    shortest: cython.double = INFINITY
     of_a: cython.int = head[vertex]
     while of_a >= 0:
         # Around the vertex, the corner after it begins a triangle, and the one before it ends it.
@@ -64,13 +64,15 @@ def _join(
         of_b: cython.int = head[vertex]
         while of_b >= 0:
             b: cython.int = found[of_b // 3, (of_b + 1) % 3]
-            alike: cython.double = _cosine(P, vertex, a, b)
-            if alike > closest and _fits(found, head, following, vertex, a, b):
-                closest = alike
+            square: cython.double = 0.0
+            for x in range(3):
+                square += (P[b, x] - P[a, x]) * (P[b, x] - P[a, x])
+            if square < shortest and _fits(found, head, following, vertex, a, b):
+                shortest = square
                 found[count, 0], found[count, 1], found[count, 2] = vertex, a, b
             of_b = following[of_b // 3, of_b % 3]
         of_a = following[of_a // 3, of_a % 3]
-    return closest > -2.0
+    return shortest < INFINITY
 
 
 @cython.cfunc
@@ -143,22 +145,3 @@ def _left_out(
         else:
             h = following[h // 3, h % 3]
     return left if at == a else -1
-
-
-@cython.cfunc
-@cython.nogil
-def _cosine(
-    P: cython.const[cython.double][:, ::1], vertex: cython.Py_ssize_t, a: cython.Py_ssize_t, b: cython.Py_ssize_t
-) -> cython.double:
-    """Cosine of the angle at the vertex."""
-    along: cython.double = 0.0
-    of_a: cython.double = 0.0
-    of_b: cython.double = 0.0
-    for x in range(3):
-        to_a: cython.double = P[a, x] - P[vertex, x]
-        to_b: cython.double = P[b, x] - P[vertex, x]
-        along += to_a * to_b
-        of_a += to_a * to_a
-        of_b += to_b * to_b
-    size: cython.double = sqrt(of_a) * sqrt(of_b)
-    return along / size if size > 0.0 else 1.0

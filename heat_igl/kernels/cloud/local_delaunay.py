@@ -2,7 +2,6 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.unrolling import InPlane, in_plane
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 
@@ -87,22 +86,19 @@ def _neighbours_around(
             continue
         if size == FEW and reach == INFINITY:
             reach = _reach(_visible_hull(size, star, stack), star, stack)
-        # In the plane, distances are shorter by a few percent at most, see `in_plane`; the others are farther away.
-        if _squared_distance(P, i, j) > 1.2 * reach:
-            break
-        flat: InPlane = in_plane(
-            cython.address(P[i, 0]),
-            cython.address(axes[i, 0, 0]),
-            cython.address(P[j, 0]),
-            cython.address(axes[j, 0, 0]),
-        )
-        x, y = flat.x, flat.y
-        square: cython.double = x * x + y * y
-        # A point above the centre has no direction in the plane.
-        if square <= 0.0:
-            continue
+        dx: cython.double = P[j, 0] - P[i, 0]
+        dy: cython.double = P[j, 1] - P[i, 1]
+        dz: cython.double = P[j, 2] - P[i, 2]
+        square: cython.double = dx * dx + dy * dy + dz * dz
         if square > reach:
+            break
+        x: cython.double = dx * axes[i, 0, 0] + dy * axes[i, 0, 1] + dz * axes[i, 0, 2]
+        y: cython.double = dx * axes[i, 1, 0] + dy * axes[i, 1, 1] + dz * axes[i, 1, 2]
+        # A point above the centre has no direction in the plane.
+        if x * x + y * y <= 1e-12 * square:
             continue
+        # The direction is that of the projection, and the distance that in space.
+        scale: cython.double = 1.0 / sqrt((x * x + y * y) * square)
         # Grows with the angle, and needs no arctangent.
         angle: cython.double = y / (fabs(x) + fabs(y))
         if x < 0.0:
@@ -111,22 +107,10 @@ def _neighbours_around(
         while b > 0 and star[b - 1, ANGLE] > angle:
             _copy(star, members, b - 1, b)
             b -= 1
-        star[b, ANGLE], star[b, X], star[b, Y] = angle, x / square, y / square
+        star[b, ANGLE], star[b, X], star[b, Y] = angle, scale * x, scale * y
         members[b] = cython.cast(cython.int, j)
         size += 1
     return size
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _squared_distance(
-    P: cython.const[cython.double][:, ::1], i: cython.Py_ssize_t, j: cython.Py_ssize_t
-) -> cython.double:
-    dx: cython.double = P[j, 0] - P[i, 0]
-    dy: cython.double = P[j, 1] - P[i, 1]
-    dz: cython.double = P[j, 2] - P[i, 2]
-    return dx * dx + dy * dy + dz * dz
 
 
 @cython.cfunc
