@@ -8,21 +8,21 @@ from conftest import perturbed
 
 from heat_igl import HeatMethodSolver, Mesh, MeshError, SourceError, shapes
 from heat_igl.geodesic import SolverChoice
-from heat_igl.runtime import PeakMemory, blocks, over_rows
+from heat_igl.runtime import PeakMemory, over_rows, threads
 
 
 def test_blocks_keep_to_the_memory_and_use_the_threads():
-    assert blocks.block_size(10_000, 1000, 2) == (8, 2)
-    assert blocks.block_size(10_000, None, 2) == (8, 2)
-    assert blocks.block_size(10_000, 6, 2) == (8, 2)
-    assert blocks.block_size(10_000, 1, 4) == (8, 1)
-    size, threads = blocks.block_size(6_400_000, 64, 2)
-    assert threads == 2
+    assert threads.block_size(10_000, 1000, 2) == (8, 2)
+    assert threads.block_size(10_000, None, 2) == (8, 2)
+    assert threads.block_size(10_000, 6, 2) == (8, 2)
+    assert threads.block_size(10_000, 1, 4) == (8, 1)
+    size, n = threads.block_size(6_400_000, 64, 2)
+    assert n == 2
     assert 1 < size < 8
-    assert blocks.block_size(20_000_000, 64, 2) == (1, 2)
-    assert blocks.block_size(60_000_000, 64, 2) == (1, 1)
+    assert threads.block_size(20_000_000, 64, 2) == (1, 2)
+    assert threads.block_size(60_000_000, 64, 2) == (1, 1)
     # The bits of the results do not depend on the threads.
-    assert blocks.block_size(10_000, 6, 64)[0] == blocks.block_size(10_000, 6, 1)[0]
+    assert threads.block_size(10_000, 6, 64)[0] == threads.block_size(10_000, 6, 1)[0]
 
 
 @pytest.mark.parametrize("threads", ["1", "2"])
@@ -65,7 +65,7 @@ def test_in_order_works_on_several_threads_and_draws_no_more_than_it_has_room_fo
         both_busy.wait()
         return 10 * i
 
-    results = blocks.in_order(work, items(), 2)
+    results = threads.in_order(work, items(), 2)
     assert list(itertools.islice(results, 4)) == [0, 10, 20, 30]
     assert len(drawn) <= 6
     both_busy.abort()
@@ -78,11 +78,11 @@ def test_an_error_in_the_items_comes_after_the_results_before_it(n_threads):
         yield from range(5)
         raise KeyError("the sixth")
 
-    results = blocks.in_order(sum, blocks.in_blocks(items(), 2), n_threads)
+    results = threads.in_order(sum, threads.in_blocks(items(), 2), n_threads)
     found = []
     with pytest.raises(KeyError, match="the sixth"):
         found.extend(itertools.chain.from_iterable([r] for r in results))
-    results = blocks.in_order(sum, blocks.in_blocks(items(), 2), n_threads)
+    results = threads.in_order(sum, threads.in_blocks(items(), 2), n_threads)
     assert [next(results) for _ in range(3)] == [1, 5, 4]
 
 
@@ -134,9 +134,9 @@ def test_rows_do_not_depend_on_blocks_or_threads(sphere, method, monkeypatch):
     for n_threads in ("1", "2"):
         monkeypatch.setenv("HEAT_IGL_NUM_THREADS", n_threads)
         for most in (1, 5, 8):
-            monkeypatch.setattr(blocks, "_MOST", most)
+            monkeypatch.setattr(threads, "_MOST", most)
             assert np.abs(solver.distances(sets) - one_by_one).max() < 1e-9 * np.pi
-    monkeypatch.setattr(blocks, "_MOST", 8)
+    monkeypatch.setattr(threads, "_MOST", 8)
     monkeypatch.setattr("heat_igl.heat.batches.n_threads", lambda: 3)
     three = solver.distances(sets)
     assert (three == solver.distances(sets)).all()
@@ -183,7 +183,7 @@ def test_stated_memory_bound(monkeypatch):
     out = np.zeros((32, mesh.n_vertices), np.float32)
     solver.distances(range(32), out=out)
     allowed = 8 * 40 * mesh.n_faces
-    monkeypatch.setattr(blocks, "WORKING_MEMORY", allowed)
+    monkeypatch.setattr(threads, "WORKING_MEMORY", allowed)
     with PeakMemory() as peak:
         solver.distances(range(32), out=out)
     if peak.bytes is None:

@@ -33,6 +33,10 @@ _CORNER = np.vstack([np.eye(3), np.zeros(3)]), [[0, 1, 2, 3]]
 # Largest number of isolines; a larger number indicates a wrong spacing.
 _MOST_LINES = 10000
 
+CurvesOption = Annotated[
+    Path, typer.Option(metavar="OBJ", help="Polylines (records l), as `isolines` and `path` write them; projected.")
+]
+
 
 def distance(
     mesh: opt.MeshArgument,
@@ -171,11 +175,6 @@ def _summary(path: Path, mesh: Mesh | PointCloud, phi: FloatArray, cutoff: float
         beyond = "" if cutoff is None else ", or beyond the cutoff"
         rows.append(("unreachable", f"{unreachable} vertices{beyond}", unreachable))
     return [*rows, ("mean", f"{mean:.6g}", mean)]
-
-
-CurvesOption = Annotated[
-    Path, typer.Option(metavar="OBJ", help="Polylines (records l), as `isolines` and `path` write them; projected.")
-]
 
 
 def path(

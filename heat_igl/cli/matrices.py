@@ -35,6 +35,9 @@ _DENSE, _SPARSE = (".npy", ".csv", ".mat"), (".npz", ".mat")
 _QUERIES = 64
 _ROWS = 512
 
+# Meshes of a data set on which queries are timed for the estimate.
+_MESHES = 8
+
 
 def matrix(
     mesh: opt.MeshArgument,
@@ -130,10 +133,6 @@ def write_matrix(path: Path, suffix: str, found: Any) -> None:
     elif not isinstance(found, np.memmap):
         with path.open("wb") as file:
             np.save(file, found)
-
-
-# Meshes of a data set on which queries are timed for the estimate.
-_MESHES = 8
 
 
 def batch(

@@ -31,14 +31,34 @@ _STANDARD_OUTPUT = Path("-")
 # What writes files of a format, and the extra that brings it.
 _LIBRARIES = {".dxf": "ezdxf io", ".vtu": "meshio io", ".gii": "nibabel io"}
 
+# Name and text of a line, and what JSON holds in place of the text, if anything.
+Row = tuple[str, str] | tuple[str, str, Any]
+MeshArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MESH",
+        help="OFF, OBJ, PLY, STL, MESH, MSH, VTU, GIFTI or FreeSurfer file; or a point cloud: XYZ or NPY, and "
+        "with --points PLY or OBJ.",
+    ),
+]
+PointsOption = Annotated[bool, typer.Option("--points", help="The file holds points; faces are not read.")]
+RegionOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE|NAME",
+        help="What paths may enter, where this is not 0: an NPY, GIFTI or CIFTI file, or a vertex attribute.",
+    ),
+]
+SourcesOption = Annotated[
+    list[int] | None, typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
+]
+NormalizeOption = Annotated[bool, typer.Option("--normalize", help="Divide by the square root of the area.")]
+ToleranceOption = Annotated[float, typer.Option(help="Largest error over the distance; windows are exact.")]
+
 
 def say(message: str) -> None:
     """Print one line to standard error."""
     print(f"heat-igl: {' '.join(message.split())}", file=sys.stderr)
-
-
-# Name and text of a line, and what JSON holds in place of the text, if anything.
-Row = tuple[str, str] | tuple[str, str, Any]
 
 
 def plan_row(plan: Plan) -> Row:
@@ -196,22 +216,6 @@ def _write_distance(path: Path, mesh: Mesh | PointCloud, distance: FloatArray) -
             file.write("\n".join(["vertex,distance", *lines, ""]).encode("ascii"))
 
 
-MeshArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="MESH",
-        help="OFF, OBJ, PLY, STL, MESH, MSH, VTU, GIFTI or FreeSurfer file; or a point cloud: XYZ or NPY, and "
-        "with --points PLY or OBJ.",
-    ),
-]
-PointsOption = Annotated[bool, typer.Option("--points", help="The file holds points; faces are not read.")]
-RegionOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="FILE|NAME",
-        help="What paths may enter, where this is not 0: an NPY, GIFTI or CIFTI file, or a vertex attribute.",
-    ),
-]
 JsonOption = Annotated[
     Path | None,
     typer.Option(
@@ -227,9 +231,6 @@ PictureOption = Annotated[
 CurveOutput = Annotated[
     Path,
     typer.Option("--output", help="OBJ, PLY, VTP, CSV, SVG or DXF file for the curves.", callback=check_curves),
-]
-SourcesOption = Annotated[
-    list[int] | None, typer.Option(metavar="VERTEX", help="Source vertex, counted from 0; repeat for several.")
 ]
 
 
@@ -269,7 +270,6 @@ def position(text: str, name: str = "--at") -> list[float]:
 
 
 DtypeOption = Annotated[str, typer.Option(help="Of the distances.", callback=one_of(("float16", "float32", "float64")))]
-NormalizeOption = Annotated[bool, typer.Option("--normalize", help="Divide by the square root of the area.")]
 MethodOption = Annotated[
     str | None,
     choice(DistanceMethod, "Default: auto, windows on triangles; heat with one of the options of heat."),
@@ -278,7 +278,6 @@ TimeStepOption = Annotated[
     float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)
 ]
 BoundaryOption = Annotated[str, choice(Boundary, "Heat: what heat does at the boundary.")]
-ToleranceOption = Annotated[float, typer.Option(help="Largest error over the distance; windows are exact.")]
 
 
 def values_of(mesh: Path, option: str, text: str) -> AnyArray:

@@ -13,7 +13,6 @@ import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
 import heat_igl
 from heat_igl import reference
@@ -38,8 +37,9 @@ from heat_igl.io import read_mesh_or_cloud
 from heat_igl.mesh import as_simplices
 from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.sources import vertex_sources
-from heat_igl.validation import METHODS, ValidationReport, ValidationRow, draw_sources
+from heat_igl.validation import METHODS, ValidationRow, draw_sources
 
+_NARROW = "mean %", "max %", "precompute s", "solve ms", "memory MB"
 _DEFAULT_METHODS = "heat,sweep,windows,meshlab,igl"
 
 
@@ -91,32 +91,13 @@ def validate(
     if json_file is not None:
         print_json(report.to_dict(), json_file)
     if not prints_json(json_file):
-        _print(report)
+        # The columns that a terminal has space for, and all to anything else.
+        print(report.to_markdown(_NARROW) if Console().is_terminal else report.to_markdown(), end="")
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
         found = ", ".join(f"{row.method} {_verdict(row)}" for row in exceeding)
         say(f"the mean error is not at most {fail_above:g} %: {found}")
         raise typer.Exit(1)
-
-
-def _print(report: ValidationReport) -> None:
-    """Print the columns that a terminal has space for, and all to anything else."""
-    console = Console(highlight=False)
-    heading, *_, remarks = report.to_markdown().split("\n\n")
-    if not console.is_terminal:
-        print(report.to_markdown(), end="")
-        return
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    columns = "mean %", "max %", "precompute s", "solve ms", "memory MB"
-    table.add_column("method")
-    for column in columns:
-        table.add_column(column, justify="right")
-    for row in report.rows:
-        table.add_row(*row.cells(columns))
-    console.print(heading.replace("**", ""))
-    console.print(table)
-    if remarks.startswith("- "):
-        console.print(remarks.rstrip(), markup=False)
 
 
 def _verdict(row: ValidationRow) -> str:

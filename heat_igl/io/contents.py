@@ -21,6 +21,8 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 _NUMBER = re.compile(rb"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 _SPACE, _SLASH = 32, 47
 
+_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4}
+
 
 def ragged(start: IntArray, length: IntArray) -> IntArray:
     """The concatenation of ``range(start[i], start[i] + length[i])``."""
@@ -234,9 +236,6 @@ def warn_if_cut(path: Path, data: bytes, last: int, n: int) -> None:
             "line is complete",
             AccuracyWarning,
         )
-
-
-_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4}
 
 
 def select(path: Path, blocks: list[tuple[str, IntArray]]) -> Cells:

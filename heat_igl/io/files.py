@@ -24,6 +24,20 @@ from heat_igl.io.storage import form_suffix, is_packed, pack, replacing, unpacke
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_simplices, usable_normals, warn_of_seams
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
+# Formats of points alone.
+POINT_SUFFIXES = (".xyz", ".npy")
+# Formats of other libraries, whose objects `as_mesh` takes.
+_READ_ELSEWHERE = {
+    ".vtp": "pass pyvista.read(path), or write .vtu",
+    ".pcd": "pass open3d.io.read_point_cloud(path)",
+}
+_ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
+# Largest value of a colour, and the smallest difference from length 1 of what is no normal.
+_BRIGHTEST = 255
+_NOT_OF_LENGTH_1 = 0.01
+_Points = tuple[FloatArray, FloatArray | None]
+_Attributes = Mapping[str, FloatArray]
+
 
 class _Format(NamedTuple):
     read: Callable[[Path, bytes], Contents]
@@ -45,16 +59,7 @@ _FORMATS = {
 } | dict.fromkeys(by_nibabel.FREESURFER_SUFFIXES, _Format(by_nibabel.read, by_nibabel.write, packed=False))
 
 MESH_SUFFIXES = tuple(_FORMATS)
-# Formats of points alone.
-POINT_SUFFIXES = (".xyz", ".npy")
-# Formats of other libraries, whose objects `as_mesh` takes.
-_READ_ELSEWHERE = {
-    ".vtp": "pass pyvista.read(path), or write .vtu",
-    ".pcd": "pass open3d.io.read_point_cloud(path)",
-}
 _PACKED = tuple(suffix for suffix, form in _FORMATS.items() if form.packed)
-
-_ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
@@ -358,14 +363,6 @@ def checked_attributes(attributes: Mapping[str, ArrayLike], n: int) -> dict[str,
             raise MeshError(f"{name} holds integers beyond 2**53, which double precision cannot store exactly")
         found[name] = stored
     return found
-
-
-# Largest value of a colour, and the smallest difference from length 1 of what is no normal.
-_BRIGHTEST = 255
-_NOT_OF_LENGTH_1 = 0.01
-
-_Points = tuple[FloatArray, FloatArray | None]
-_Attributes = Mapping[str, FloatArray]
 
 
 def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:

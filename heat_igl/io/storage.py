@@ -13,6 +13,8 @@ from pathlib import Path
 
 from heat_igl.errors import MeshError
 
+_SUFFIX = ".gz"
+
 
 @contextlib.contextmanager
 def complete_file(path: Path) -> Iterator[Path]:
@@ -43,9 +45,6 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
     except OSError as error:
         raise MeshError(f"{path} cannot be written: {error.strerror or error}") from error
-
-
-_SUFFIX = ".gz"
 
 
 def is_packed(path: Path) -> bool:

@@ -29,6 +29,12 @@ from heat_igl.typing import BoolArray
 _BYTES_SURFACE = 45.0
 _BYTES_VOLUME = 100.0
 
+Backend = Literal["auto", "scipy", "multifrontal"]
+_ANALYSES: dict[str, Callable[[sp.csc_matrix], Analysis]] = {
+    "scipy": SuperLUAnalysis,
+    "multifrontal": MultifrontalAnalysis,
+}
+
 
 def factor_bytes(n: int, n_entries: int) -> float:
     """An estimate of the memory that a factor of an (n, n) matrix takes while it is made, before it is.
@@ -45,14 +51,6 @@ def factor_bytes(n: int, n_entries: int) -> float:
 def is_of_volume(n: int, n_entries: int) -> bool:
     """Whether an (n, n) matrix with so many entries is taken for that of a volume."""
     return n_entries > 10 * n
-
-
-Backend = Literal["auto", "scipy", "multifrontal"]
-
-_ANALYSES: dict[str, Callable[[sp.csc_matrix], Analysis]] = {
-    "scipy": SuperLUAnalysis,
-    "multifrontal": MultifrontalAnalysis,
-}
 
 
 def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:

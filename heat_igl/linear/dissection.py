@@ -27,6 +27,11 @@ _SHARE = 1 / 64
 # Small components are dissected together, up to this many vertices at a time.
 _TOGETHER = 256
 
+# The number of pieces of the tree that are solved in parallel, roughly; and the fewest entries of a piece, so that it
+# is worth a thread.
+_PIECES = 6
+_SMALLEST_PIECE = 1_500_000
+
 
 class Dissection(NamedTuple):
     """Vertices in order of elimination, in blocks that are eliminated together.
@@ -115,12 +120,6 @@ def _apart(ends: IntArray, neighbours: IntArray) -> list[tuple[tuple[IntArray, I
         inside = slice(ends[low], ends[high])
         parts.append(((ends[low : high + 1] - ends[low], neighbours[inside] - np.int32(low)), low, high))
     return parts
-
-
-# The number of pieces of the tree that are solved in parallel, roughly; and the fewest entries of a piece, so that it
-# is worth a thread.
-_PIECES = 6
-_SMALLEST_PIECE = 1_500_000
 
 
 class Fronts(NamedTuple):

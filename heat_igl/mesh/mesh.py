@@ -31,6 +31,14 @@ _OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary", "cro
 
 ArrayT = TypeVar("ArrayT", bound=AnyArray)
 
+# Elements whose neighbours are looked at.
+_SAMPLE = 32
+# Volume over that of a regular tetrahedron with the same longest edge. A square that is folded along its diagonal, by
+# any angle, has at most 0.354, the corner of a cube 0.5.
+_THIN = 0.4
+# The same for elements that are planar but for rounding.
+_FLAT = 1e-10
+
 
 def _frozen(array: ArrayT) -> ArrayT:
     array.setflags(write=False)
@@ -356,15 +364,6 @@ class Mesh:
             Prints as a table; lists of defects hold indices.
         """
         return mesh_report(self)
-
-
-# Elements whose neighbours are looked at.
-_SAMPLE = 32
-# Volume over that of a regular tetrahedron with the same longest edge. A square that is folded along its diagonal, by
-# any angle, has at most 0.354, the corner of a cube 0.5.
-_THIN = 0.4
-# The same for elements that are planar but for rounding.
-_FLAT = 1e-10
 
 
 def first_quadrilateral(V: FloatArray, F: IntArray) -> int | None:

@@ -13,6 +13,9 @@ from heat_igl.mesh.connectivity import enumerate_runs, next_in_run
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
+# A triangle whose height over a side is below this share of that side has no orientation, and its polygon gets no fan.
+_FLAT = 1e-12
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PolygonMesh:
@@ -167,10 +170,6 @@ def _check(corners: IntArray, degree: IntArray, n: int) -> None:
             f"{name(int(np.argmax(repeated)))} repeats a vertex ({int(repeated.sum())} of {len(degree)} polygons do): "
             "split such polygons, or remove them if they have no area"
         )
-
-
-# A triangle whose height over a side is below this share of that side has no orientation, and its polygon gets no fan.
-_FLAT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)

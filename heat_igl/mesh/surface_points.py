@@ -22,6 +22,11 @@ ON_SIDE = 1e-12
 # that, so they may also be negative, or miss a sum of 1, by this much.
 ON_SIDE_COMPUTED = 1e-9
 
+# A face is flat when twice its area is at most this share of the square of the longest side.
+_FLAT = 1e-12
+# The square of a larger coordinate, summed over three, may overflow; libigl then returns a face that is none.
+_FARTHEST = 1e150
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SurfacePoints:
@@ -261,12 +266,6 @@ def _in_space(mesh: MeshLike, faces: IntArray, barycentric: FloatArray) -> Float
     require_triangles(mesh)
     require_faces(faces, mesh.n_faces)
     return np.asarray(np.einsum("kc,kcx->kx", barycentric, mesh.V[mesh.F[faces]]))
-
-
-# A face is flat when twice its area is at most this share of the square of the longest side.
-_FLAT = 1e-12
-# The square of a larger coordinate, summed over three, may overflow; libigl then returns a face that is none.
-_FARTHEST = 1e150
 
 
 class ClosestPoints(NamedTuple):

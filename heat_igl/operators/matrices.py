@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from heat_igl.operators.metric_derivatives import MetricSides
     from heat_igl.operators.metric_simplices import MetricSimplices
 
+# Which triangulation of a triangle mesh the operators belong to.
+Laplacian = Literal["auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"]
+# Called with L, or a multiple of it, as soon as it is known: the order of elimination needs no more than the pattern.
+OnLaplacian = Callable[[sp.csc_matrix], None]
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -132,13 +137,6 @@ class TriangleElements:
         triangulation = self.triangulation
         edges = triangulation.edges
         return EdgeLengths(triangulation.tail(edges), triangulation.head(edges), triangulation.l.ravel()[edges])
-
-
-# Which triangulation of a triangle mesh the operators belong to.
-Laplacian = Literal["auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"]
-
-# Called with L, or a multiple of it, as soon as it is known: the order of elimination needs no more than the pattern.
-OnLaplacian = Callable[[sp.csc_matrix], None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,9 @@ from heat_igl.errors import MissingExtraError
 _OURS = (str(Path(__file__).parents[1]) + os.sep, functools.__file__)
 _held = threading.local()
 
+# Seconds before the first line on a terminal, and between lines.
+_PATIENCE = 5.0
+
 
 def warn_caller(message: str, category: type[Warning]) -> None:
     """Warn with the file and line of the innermost caller outside this package."""
@@ -42,10 +45,6 @@ def held_warnings() -> Iterator[list[tuple[str, type[Warning]]]]:
         yield collected
     finally:
         _held.warnings = before
-
-
-# Seconds before the first line on a terminal, and between lines.
-_PATIENCE = 5.0
 
 
 @contextmanager

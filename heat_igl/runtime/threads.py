@@ -1,15 +1,20 @@
-"""The number of threads, and pools of threads that share the processors."""
+"""Threads that share the processors, and many right-hand sides in blocks on them, with rows of results."""
 
 from __future__ import annotations
 
 import os
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
+import numpy as np
+import numpy.typing as npt
+
+from heat_igl.errors import shown
 from heat_igl.kernels.signals import obey
+from heat_igl.typing import AnyArray
 
 Item = TypeVar("Item")
 First = TypeVar("First")
@@ -20,6 +25,13 @@ Result = TypeVar("Result")
 _divided = threading.local()
 # Blocks of rows for each thread, so that the last one ends soon after the others.
 _BLOCKS_PER_THREAD = 4
+
+# Largest number of right-hand sides in a block. They share one pass over the factors; larger blocks gain nothing.
+_MOST = 8
+# Peak memory of the three steps, in bytes per face and right-hand side.
+_BYTES_PER_FACE = 40
+# Limit in bytes for all threads together, unless a single right-hand side needs more.
+WORKING_MEMORY = 2**31
 
 
 def n_threads() -> int:
@@ -124,3 +136,112 @@ def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[Firs
     with pool(2) as workers:
         other = workers.submit(second)
         return first(), other.result()
+
+
+def block_size(n_faces: int, n_sets: int | None, n_threads: int) -> tuple[int, int]:
+    """Number of right-hand sides in a block, of `n_sets` if that is known, and number of threads, at most `n_threads`.
+
+    Both are at least 1. Together the blocks stay within `WORKING_MEMORY`. If that memory is not the limit, the block
+    size does not depend on the number of threads; neither do the bits of the results.
+    """
+    fit = int(WORKING_MEMORY // (_BYTES_PER_FACE * n_faces))
+    threads = max(1, min(n_threads, fit, n_threads if n_sets is None else n_sets))
+    return max(1, min(_MOST, fit // threads)), threads
+
+
+def in_blocks(items: Iterable[Item], size: int) -> Iterator[list[Item]]:
+    """Yield lists of `size` items; the last list may be shorter. Items before an exception in `items` are yielded."""
+    failure: Exception | None = None
+    block: list[Item] = []
+    iterator = iter(items)
+    while failure is None:
+        try:
+            block.append(next(iterator))
+        except StopIteration:
+            break
+        except Exception as error:
+            failure = error
+        if len(block) == size:
+            yield block
+            block = []
+    if block:
+        yield block
+    if failure is not None:
+        raise failure
+
+
+def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: int) -> Iterator[Result]:
+    """Yield the results of ``map(work, items)``, computed on several threads, in order.
+
+    At most ``n_threads`` items are in progress or finished but not yet yielded. If `items` raises, the results for
+    the items before the exception are yielded first.
+    """
+    if n_threads == 1:
+        yield from map(work, items)
+        return
+    failure: Exception | None = None
+    pending: deque[Future[Result]] = deque()
+    iterator = iter(items)
+    workers = pool(n_threads)
+    try:
+        while True:
+            while failure is None and len(pending) < n_threads:
+                try:
+                    item = next(iterator)
+                except StopIteration:
+                    break
+                except Exception as error:
+                    failure = error
+                else:  # what a handler of signals raises here ends all at once
+                    pending.append(workers.submit(work, item))
+            if not pending:
+                break
+            yield pending.popleft().result()
+    finally:
+        # After Ctrl-C, or when no more results are wanted, what is in progress ends.
+        workers.abandon()
+    if failure is not None:
+        raise failure
+
+
+def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
+    """The floating-point type of returned distances; float64 if `dtype` is None.
+
+    Raises
+    ------
+    ValueError
+        If `dtype` is neither float64 nor float32.
+    """
+    try:
+        found = np.dtype(np.float64 if dtype is None else dtype)
+    except TypeError:
+        raise ValueError(f"dtype must be float64 or float32, not {shown(dtype)}") from None
+    if found not in (np.float64, np.float32):
+        raise ValueError(f"dtype must be float64 or float32, not {found}")
+    return found
+
+
+def row_writer(out: Any) -> Callable[[AnyArray], None]:
+    """A function that writes successive blocks of rows to `out` (k, n), from the first row on.
+
+    If `out` has chunks, as zarr arrays have, rows are collected until they fill a chunk or reach the end of `out`:
+    writing a part of a chunk would compress the whole chunk again. Other arrays receive every block at once.
+    """
+    chunks = getattr(out, "shards", None) or getattr(out, "chunks", None)
+    height = int(chunks[0]) if chunks else 1
+    waiting: list[AnyArray] = []
+    position = 0
+
+    def write(rows: AnyArray) -> None:
+        nonlocal position
+        waiting.append(rows)
+        n_waiting = sum(len(block) for block in waiting)
+        is_last = position + n_waiting == out.shape[0]
+        n_ready = n_waiting if is_last else n_waiting - n_waiting % height
+        if n_ready:
+            ready = waiting[0] if len(waiting) == 1 else np.concatenate(waiting)
+            out[position : position + n_ready] = ready[:n_ready]
+            waiting[:] = [ready[n_ready:].copy()] if n_ready < n_waiting else []
+            position += n_ready
+
+    return write

@@ -14,6 +14,11 @@ from heat_igl.mesh import ON_SIDE, Mesh, MeshPart, SurfaceCurve, SurfacePoints, 
 from heat_igl.mesh.surface_points import points_beside, require_faces
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
+_NOWHERE = np.empty(0, np.int64)
+_ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask with one entry per vertex"
+# At an offset, doubles may be so far apart in mean edge lengths: all distances beyond it are rounded by half of that.
+_COARSEST = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class SourcePoints:
@@ -54,7 +59,6 @@ class SourceSegments:
         )
 
 
-_NOWHERE = np.empty(0, np.int64)
 NO_POINTS = SourcePoints(_NOWHERE, np.empty((0, 3)), _NOWHERE, np.empty(0))
 NO_SEGMENTS = SourceSegments(_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWHERE, np.empty(0))
 
@@ -111,11 +115,6 @@ def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntAr
     first = np.ones(len(order), bool)
     first[1:] = ordered[1:] != ordered[:-1]
     return np.asarray(order[first])
-
-
-_ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask with one entry per vertex"
-# At an offset, doubles may be so far apart in mean edge lengths: all distances beyond it are rounded by half of that.
-_COARSEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

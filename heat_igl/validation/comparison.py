@@ -32,6 +32,21 @@ from heat_igl.validation import metrics
 from heat_igl.validation.metrics import BoundViolations
 from heat_igl.validation.report import ValidationReport, ValidationRow
 
+Progress = Callable[[str, int, int], None]
+Run = tuple[FloatArray, dict[str, Any]]
+"""Distances (k, n) of a method, and their cost: fields of `ValidationRow` by name."""
+# Methods that run in this process, as `geodesic_distance` names them; the others are native references.
+_OWN: tuple[DistanceMethod, ...] = ("heat", "sweep", "windows")
+_NATIVE = {
+    "meshlab": "meshlab",
+    "meshlab_heat": "meshlab_heat",
+    "igl": "igl_heat",
+    "potpourri3d": "potpourri3d_heat",
+    "exact": "exact",
+}
+#: The names of methods that `validate` takes.
+METHODS = (*_OWN, *_NATIVE)
+
 
 class Solver(Protocol):
     """The interface of a method; `GeodesicSolver` has it."""
@@ -43,22 +58,6 @@ class Solver(Protocol):
 
 Prepare = Callable[[Any], Solver]
 Method = str | tuple[str, Prepare]
-Progress = Callable[[str, int, int], None]
-Run = tuple[FloatArray, dict[str, Any]]
-"""Distances (k, n) of a method, and their cost: fields of `ValidationRow` by name."""
-
-# Methods that run in this process, as `geodesic_distance` names them; the others are native references.
-_OWN: tuple[DistanceMethod, ...] = ("heat", "sweep", "windows")
-_NATIVE = {
-    "meshlab": "meshlab",
-    "meshlab_heat": "meshlab_heat",
-    "igl": "igl_heat",
-    "potpourri3d": "potpourri3d_heat",
-    "exact": "exact",
-}
-
-#: The names of methods that `validate` takes.
-METHODS = (*_OWN, *_NATIVE)
 
 
 def _resolved(method: Method) -> tuple[str, Prepare | None]:

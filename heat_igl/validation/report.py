@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,11 @@ _COLUMNS = {
     "solve ms": ("solve_seconds", 1e3),
     "memory MB": ("peak_memory", 1e-6),
 }
+
+# Errors from 0.001 % to 10 %, the range in which methods differ. All panels share it, so that they can be compared.
+_LOWEST, _HIGHEST = 1e-5, 1e-1
+_ACROSS, _ROW_INCHES = 3, 3.2
+_PIXELS_ACROSS, _LARGEST_ROWS = 560, 450  # of the picture of the surface
 
 
 @dataclass(frozen=True)
@@ -96,10 +101,10 @@ class ValidationRow:
         """The row as values that JSON can carry; an infinite error becomes the string ``"inf"``."""
         return {name: plain(value) for name, value in asdict(self).items()}
 
-    def cells(self, columns: Iterable[str] = tuple(_COLUMNS)) -> list[str]:
+    def cells(self, columns: Sequence[str] = tuple(_COLUMNS)) -> list[str]:
         """The cells of a table below some of the columns of `ValidationReport.to_markdown`, the method first."""
         if self.failure is not None:
-            return [self.method, "failed"] + ["-"] * (len(list(columns)) - 1)
+            return [self.method, "failed"] + ["-"] * (len(columns) - 1)
         found = []
         for column in columns:
             path, factor = _COLUMNS[column]
@@ -185,8 +190,11 @@ class ValidationReport:
             "rows": [row.to_dict() for row in self.rows],
         }
 
-    def to_markdown(self) -> str:
-        """A table with one line per method, errors in percent, and below it why a method failed or warned."""
+    def to_markdown(self, columns: Sequence[str] = tuple(_COLUMNS)) -> str:
+        """A table with one line per method, errors in percent, and below it why a method failed or warned.
+
+        All columns, or those of some names.
+        """
         against = f"errors against {self.reference}" if self.reference else "no reference"
         if self.failure is not None:
             against = f"no errors, since {self.reference} failed"
@@ -194,10 +202,10 @@ class ValidationReport:
             f"**{self.name}**: {self.mesh.n_vertices} vertices, {self.mesh.n_faces} faces, "
             f"{len(self.source_sets)} {'set' if len(self.source_sets) == 1 else 'sets'} of sources, {against}",
             "",
-            "| " + " | ".join(("method", *_COLUMNS)) + " |",
-            "|---" + "|---:" * len(_COLUMNS) + "|",
+            "| " + " | ".join(("method", *columns)) + " |",
+            "|---" + "|---:" * len(columns) + "|",
         ]
-        lines += ["| " + " | ".join(row.cells()) + " |" for row in self.rows]
+        lines += ["| " + " | ".join(row.cells(columns)) + " |" for row in self.rows]
         said = [] if self.failure is None else [(f"reference {self.reference}", self.failure)]
         said += [(row.method, text) for row in self.rows for text in (row.failure, *row.notes) if text]
         remarks = ["", *(f"- {method}: {text}" for method, text in said)] if said else []
@@ -242,12 +250,6 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     return value.item() if hasattr(value, "item") else str(value)
-
-
-# Errors from 0.001 % to 10 %, the range in which methods differ. All panels share it, so that they can be compared.
-_LOWEST, _HIGHEST = 1e-5, 1e-1
-_ACROSS, _ROW_INCHES = 3, 3.2
-_PIXELS_ACROSS, _LARGEST_ROWS = 560, 450  # of the picture of the surface
 
 
 def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[str, FloatArray]) -> Figure:
