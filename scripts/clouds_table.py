@@ -254,11 +254,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     options = parsed(__doc__, argv, "*", ("distances", "turns", "log-maps", "scans"), sources=6, repeats=15, **several)
     head = {"points on": "{points on}", "number": "{number}", "noise": "{noise:g}"}
     if options.table == "distances":
-        columns = (
-            head
-            | {"doubtful, %": "{doubtful:.2f}{warned}"}
-            | {f"{m}, %": f"{{{m}[error]:.2g}}" for m in options.methods}
-        )
+        columns = head | {f"{m}, %": f"{{{m}[error]:.2g}}" for m in options.methods}
         columns |= {f"{m}, s + s": f"{{{m}[made]:.2g}} + {{{m}[asked]:.2g}}" for m in options.methods}
         table = Table(collected(distances(options)), columns)
     elif options.table == "turns":
