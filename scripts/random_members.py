@@ -68,6 +68,7 @@ from heat_igl.mesh import region_boundary
 from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
+from heat_igl.validation.shapes import lattice_faces
 from heat_igl.validation.zoo import FAMILIES, hull
 from heat_igl.windows import ExactSurface, exact_distance
 from heat_igl.windows.tables import MARGIN, from_mesh
@@ -116,6 +117,18 @@ def seeded(makes: dict[str, Callable[[Random], Mesh]]) -> dict[str, Callable[[in
     return {name: lambda seed, make=make: make(np.random.default_rng(seed)) for name, make in makes.items()}
 
 
+def long_tube(rng: Random) -> Mesh:
+    """Rings of few vertices, up to 1.6 times as far from the next as from the one before; ridges that are straight."""
+    around, along = rng.integers(3, 9), int(rng.integers(10, 31))
+    turn = rng.choice([0.0, 0.5]) * np.arange(along)[:, None]
+    angle = 2 * np.pi * (np.arange(around) + turn) / around
+    height = np.broadcast_to(np.cumsum(rng.uniform(1.2, 1.6) ** np.arange(along))[:, None], angle.shape)
+    V = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
+    V = V @ np.linalg.qr(rng.normal(size=(3, 3)))[0] if rng.random() < 0.5 else V
+    V = V.astype(np.float32).astype(float) if rng.random() < 0.5 else V
+    return Mesh(V, lattice_faces(along, around, wrap_columns=True))
+
+
 COARSE = seeded(
     {
         "star": lambda rng: spikes(hull(on_sphere(int(rng.integers(8, _COARSE)), rng)), rng, 0.6),
@@ -123,9 +136,18 @@ COARSE = seeded(
         "torus of 30 vertices": rough(shapes.torus(6, 5), 0.3),
         "book of 3 pages": rough(shapes.book(3, 3), 0.3),
         "needles": needles,
+        "long tube": long_tube,
     }
 )
-EXACT = {name: make for name, make in FAMILIES.items() if make.__module__.endswith("nearly_flat")} | COARSE
+NEARLY_FLAT = (
+    "nearly flat cylinder",
+    "nearly flat cone",
+    "pipe reducer",
+    "geometrically spaced rings",
+    "nearly flat grid",
+    "grid of integers",
+)
+EXACT = {name: FAMILIES[name] for name in NEARLY_FLAT} | COARSE
 
 
 def straight_lines(mesh: Mesh, sources: Sequence[int]) -> FloatArray:

@@ -66,6 +66,14 @@ def test_every_window_is_a_path(name, seed, source, monkeypatch):
     np.testing.assert_allclose(exact_distance(mesh.V, mesh.F, source), truth, rtol=1e-12)
 
 
+def test_vertices_in_line_behind_many_that_are_nearly_flat():
+    """Angles along a ridge exceed 2 pi by 1e-13 and more: a million sides behind, halves of a window miss a vertex."""
+    mesh = FAMILIES["geometrically spaced rings"](71525)
+    for source in (38, 52):
+        truth = pygeodesic_distance(mesh, source)
+        assert np.abs(exact_distance(mesh.V, mesh.F, source) - truth).max() < 1e-12 * truth.max()
+
+
 @pytest.mark.parametrize("wrong", ["aligned", "twin"])
 def test_half_edges_that_are_not_glued_alike_are_refused(wrong):
     """Windows would go around between them without an end."""

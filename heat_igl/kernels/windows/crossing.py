@@ -10,11 +10,11 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, release, take
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
+    FLATNESS,
     JOINS,
     LEFT_OF_APEX,
     MARGIN,
     NARROW,
-    NEAR,
     OVERLAP,
     RIGHT_OF_APEX,
     ROUNDING,
@@ -531,13 +531,28 @@ def _arrive(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _straight(w: cython.pointer(Window), apex: cython.pointer(Apex)) -> cython.double:
-    """Distance of the apex by the straight line of a window."""
-    x: cython.double = apex.x - w.x
-    y: cython.double = apex.y + w.depth
+def _straight(w: cython.pointer(Window), x: cython.double, y: cython.double) -> cython.double:
+    """Distance of a point of the face by the straight line of a window, or of what extends it."""
     if w.is_plane:
-        return w.offset + (w.x * apex.x + w.depth * apex.y)
-    return w.offset + sqrt(x * x + y * y)
+        return w.offset + (w.x * x + w.depth * y)
+    return w.offset + sqrt((x - w.x) * (x - w.x) + (y + w.depth) * (y + w.depth))
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _may_reach(
+    w: cython.pointer(Window), apex: cython.pointer(Apex), x: cython.double, m: cython.double, off: cython.double
+) -> cython.bint:
+    """Whether the path to the apex over an end of a window may be as long as the straight line, to rounding.
+
+    The line passes the end at a distance of `off` over the length of (x, m). The path is longer by half the square of
+    that over the length of its last part, or by more.
+    """
+    last: cython.double = apex.left_length if apex.left_length > apex.right_length else apex.right_length
+    if w.is_plane:
+        return off * off <= 2.0 * ROUNDING * last * fabs(_straight(w, apex.x, apex.y))
+    return off * off <= 2.0 * ROUNDING * last * (w.offset + fabs(x) + m) * (x * x + m * m)
 
 
 @cython.cfunc
@@ -562,8 +577,8 @@ def _reach_apex(
         if w.is_plane:
             x = backward(w, apex.x, apex.y)
             m = 1.0
-            a = w.start - x
-            b = w.stop - x
+            a = (w.start - x) * w.depth
+            b = (w.stop - x) * w.depth
         else:
             x = apex.x - w.x
             m = apex.y + w.depth
@@ -571,26 +586,27 @@ def _reach_apex(
             b = (w.stop - w.x) * m - w.depth * x
         if b < 0.0:
             w.side = LEFT_OF_APEX
-            if b < -NEAR * apex.length * m:
+            if not _may_reach(w, apex, x, m, b):
                 continue
             b = w.stop
         elif a > 0.0:
             w.side = RIGHT_OF_APEX
-            if a > NEAR * apex.length * m:
+            if not _may_reach(w, apex, x, m, a):
                 continue
             b = w.start
         else:
             w.side = AROUND_APEX
-            distance = _straight(w, apex)
+            distance = _straight(w, apex.x, apex.y)
             if distance < apex.nearest:
                 apex.nearest = distance
                 apex.best = i
             continue
-        # The apex is just beside the window: the path over the end of the window comes from the same direction as a
-        # straight one, unless it is longer. It gives way to a path that is as long to rounding: one from a root nearby
-        # may leave in another direction, and one that bends at a vertex of the end passes it on the right side.
+        # The apex is beside the window, maybe between two halves that a vertex turned against each other: the path over
+        # the end of the window comes from the same direction as a straight one, unless it is longer. It gives way to a
+        # path that is as long to rounding: one from a root nearby may leave in another direction, and one that bends at
+        # a vertex of the end passes it on the right side.
         distance = bent(w, b, apex.x, apex.y) * (1.0 + ROUNDING)
-        if distance <= _straight(w, apex) * (1.0 + 2.0 * ROUNDING):
+        if distance <= _straight(w, apex.x, apex.y) * (1.0 + 2.0 * ROUNDING):
             at = min(max(backward(w, apex.x, apex.y), 0.0), apex.length)
             _arrive(s, h, w, apex, distance, at)
     if apex.best >= 0:
@@ -738,6 +754,37 @@ def _is_behind(
 
 
 @cython.cfunc
+@cython.nogil
+def _is_reached_between(
+    s: cython.pointer(Search),
+    h: cython.int,
+    windows: cython.pointer(Window),
+    n: cython.int,
+    apex: cython.pointer(Apex),
+) -> cython.bint:
+    """Whether the apex is reached if it lies between two halves of a window, turned against each other by rounding."""
+    j: cython.int
+    u: cython.pointer(Window)
+    w: cython.pointer(Window)
+    for i in range(n):
+        u = windows + i
+        near: cython.double = 10.0 * FLATNESS * (fabs(u.x) + u.depth)
+        if u.side != LEFT_OF_APEX or u.is_plane:
+            continue
+        for j in range(n):
+            w = windows + j
+            if (
+                w.side == RIGHT_OF_APEX
+                and w.root == u.root
+                and fabs(u.x - w.x) + fabs(u.depth - w.depth) <= near
+                and w.start - u.stop <= near
+                and not is_within(s.upper[s.vertex[h]], bent(u, u.stop, apex.x, apex.y), _longest(apex))
+            ):
+                return False
+    return True
+
+
+@cython.cfunc
 @cython.inline
 @cython.nogil
 def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
@@ -778,6 +825,7 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     assert is_covered(s, s.to_left, i, windows, n, h)
     apex = _opposite(s, h)
     _reach_apex(s, h, windows, n, cython.address(apex))
+    assert _is_reached_between(s, h, windows, n, cython.address(apex))
     if s.first_target != cython.NULL and s.first_target[h // 3] >= 0:
         _measure(s, h, windows, n, apex.x, apex.y)
     for i in range(n):
@@ -830,16 +878,11 @@ def _measure(
         y = s.target[3 * j + h % 3] * apex_y
         for i in range(n):
             w = windows + i
-            at = backward(w, x, y)
-            if at < w.start:
-                if at < w.start - NEAR * length:
-                    continue
-                at = w.start
-            if at > w.stop:
-                if at > w.stop + NEAR * length:
-                    continue
-                at = w.stop
+            place = backward(w, x, y)
+            at = min(max(place, w.start), w.stop)
             distance = bent(w, at, x, y)
+            if at != place and distance > _straight(w, x, y) + ROUNDING * (distance + length):
+                continue
             if y == 0.0:
                 # On the side itself: the copy in the face before knows the last face of the path.
                 distance += s.tolerance * distance

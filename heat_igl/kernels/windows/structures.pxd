@@ -184,9 +184,6 @@ cdef extern from *:
     #define WIDEST 0.01
     // What is narrower, as a fraction of a side, is no window.
     #define NARROW 1e-14
-    // A vertex missed by less than this fraction of a side is reached over the end of the window, which is longer by
-    // the square of that.
-    #define NEAR 1e-7
     // Windows whose roots are closer than this fraction of their distance have the same root.
     #define SAME 2e-14
     // Two halves of a window are turned against each other by less than this angle: a hundred flat vertices.
@@ -207,7 +204,6 @@ cdef extern from *:
     double ROUNDING
     double WIDEST
     double NARROW
-    double NEAR
     double SAME
     double TURNED
     double OVERLAP
