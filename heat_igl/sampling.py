@@ -25,6 +25,17 @@ from heat_igl.runtime import TimeLeft
 from heat_igl.sources import named_vertices, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
+__all__ = [
+    "VoronoiCells",
+    "as_solver",
+    "diameter",
+    "distance_matrix",
+    "dual_triangulation",
+    "farthest_cells",
+    "farthest_points",
+    "voronoi_cells",
+]
+
 
 def checked_vertices(name: str, vertices: ArrayLike, n: int) -> IntArray:
     """Indices of distinct `vertices`, in the given order; a `SourceError` that calls them `name` for any others."""

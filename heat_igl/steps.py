@@ -20,6 +20,30 @@ from heat_igl.operators import Operators, TriangleElements, with_rotations
 from heat_igl.runtime import LARGEST_EXPONENT, LOWEST_HEAT, RANGE_LIMIT
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
+__all__ = [
+    "Boundary",
+    "HeatFlow",
+    "NormalizedDivergence",
+    "PoissonProblem",
+    "VectorHeatFlow",
+    "analysis",
+    "damping",
+    "diffuse",
+    "fitted_laplacian",
+    "integrate",
+    "normalize",
+    "smallest_time_step",
+    "smallest_time_steps",
+]
+
+Boundary = Literal["neumann", "dirichlet", "average"]
+# Share of a front's rate of decay from which on a direction is trusted fully; docs/engines_theory.md compares values.
+# Fronts of a fitted flow scatter less.
+_FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
+# At an insulated boundary a front meets the mirror image of itself and falls a little more slowly. A fitted flow is
+# damped there from this share of the rate; without damping a regular grid is 1.84 % wrong instead of 1.68.
+_AT_BOUNDARY = 0.8
+
 
 def fitted_laplacian(domain: Operators, t: float | FloatArray) -> sp.csc_matrix:
     """L with the weight of each edge fitted to heat that falls like exp(-d / sqrt(t)), however long the edge.
@@ -98,16 +122,6 @@ def _fit(x: FloatArray) -> FloatArray:
     beyond = np.minimum(x[far], 600.0)
     fitted[far] = beyond**2 / 4 / (np.i0(beyond) - 1)
     return np.asarray(fitted)
-
-
-Boundary = Literal["neumann", "dirichlet", "average"]
-
-# Share of a front's rate of decay from which on a direction is trusted fully; docs/engines_theory.md compares values.
-# Fronts of a fitted flow scatter less.
-_FULL_RATE, _FULL_RATE_FITTED = 0.9, 0.95
-# At an insulated boundary a front meets the mirror image of itself and falls a little more slowly. A fitted flow is
-# damped there from this share of the rate; without damping a regular grid is 1.84 % wrong instead of 1.68.
-_AT_BOUNDARY = 0.8
 
 
 def analysis(L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:

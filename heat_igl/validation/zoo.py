@@ -40,6 +40,9 @@ Generator = np.random.Generator
 # Times six: a tetrahedron is left out below it, since its corners lie in a plane up to rounding.
 _LEAST_VOLUME = 1e-12
 
+SHAPES: list[Shape] = []
+FAMILIES: dict[str, Callable[[int], Mesh]] = {}
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -54,7 +57,6 @@ class Shape:
     held_out: bool
 
 
-SHAPES: list[Shape] = []
 """All shapes, family after family."""
 
 
@@ -74,7 +76,6 @@ def shape(
     return register
 
 
-FAMILIES: dict[str, Callable[[int], Mesh]] = {}
 """All kinds with random members, by name: seed -> mesh, the same bits at every call."""
 
 
