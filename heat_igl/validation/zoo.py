@@ -41,7 +41,10 @@ Generator = np.random.Generator
 _LEAST_VOLUME = 1e-12
 
 SHAPES: list[Shape] = []
+"""All shapes, family after family."""
+
 FAMILIES: dict[str, Callable[[int], Mesh]] = {}
+"""All kinds with random members, by name: seed -> mesh, the same bits at every call."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +77,6 @@ def shape(
         return make
 
     return register
-
-
-"""All kinds with random members, by name: seed -> mesh, the same bits at every call."""
 
 
 def family(name: str) -> Callable[[Callable[[Generator], Mesh]], Callable[[int], Mesh]]:
