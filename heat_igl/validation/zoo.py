@@ -60,9 +60,6 @@ class Shape:
     held_out: bool
 
 
-"""All shapes, family after family."""
-
-
 def shape(
     family: str, *, held_out: bool = False, **variants: Any
 ) -> Callable[[Callable[..., Mesh]], Callable[..., Mesh]]:
