@@ -35,7 +35,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -499,17 +499,26 @@ def on_grids(options: argparse.Namespace, _: Random) -> Iterator[Row]:
         yield row
 
 
-# Bodies with tensors that change smoothly.
+# Tensors that change smoothly.
 
 
-def twist(x: FloatArray, k: float) -> tuple[FloatArray, FloatArray]:
-    """Points (..., 3) turned about the third axis by k z, and the metric that the map pulls back."""
-    c, s = np.cos(k * x[..., 2]), np.sin(k * x[..., 2])
+def twist(x: FloatArray, angle: FloatArray, by: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (..., 3) turned about the third axis by an angle with the gradient `by`, and the metric of the map."""
+    c, s = np.cos(angle), np.sin(angle)
     image = np.stack([c * x[..., 0] - s * x[..., 1], s * x[..., 0] + c * x[..., 1], x[..., 2]], axis=-1)
     J = np.zeros((*x.shape, 3))
     J[..., 0, 0], J[..., 0, 1], J[..., 1, 0], J[..., 1, 1], J[..., 2, 2] = c, -s, s, c, 1
-    J[..., 0, 2], J[..., 1, 2] = -k * image[..., 1], k * image[..., 0]
+    J[..., 0, :] -= image[..., 1:2] * by
+    J[..., 1, :] += image[..., 0:1] * by
     return image, np.swapaxes(J, -1, -2) @ J
+
+
+def twisted_body(x: FloatArray, k: float) -> tuple[FloatArray, FloatArray]:
+    return twist(x, k * x[..., 2], np.array([0, 0, k]))
+
+
+def twisted_disk(x: FloatArray, k: float) -> tuple[FloatArray, FloatArray]:
+    return twist(x, k * (x**2).sum(axis=-1), 2 * k * x)
 
 
 def cylinder(rings: int, rng: Random) -> Mesh:
@@ -528,7 +537,13 @@ def smooth(rows: int, rng: Random) -> Iterator[tuple[str, Mesh, Callable[[FloatA
             mesh = cylinder(rings, rng)
             source = int(np.linalg.norm(mesh.V - [0.4, 0.3, 0.5], axis=1).argmin())
             name = f"twisted, 1 : {((k + np.hypot(k, 2)) / 2) ** 2:.2g}"
-            yield name, mesh, lambda x, k=k: twist(x, k)[1], source, straight(twist(mesh.V, k)[0], source)
+            yield name, mesh, lambda x, k=k: twisted_body(x, k)[1], source, straight(twisted_body(mesh.V, k)[0], source)
+    for k, (where, place) in product((3.0, 5.0), (("the centre", 0.0), ("beside", 0.4))):
+        for rings in (rows // 6, rows // 3, 2 * rows // 3, 4 * rows // 3):
+            mesh = shapes.disk(rings)
+            source = int(np.linalg.norm(mesh.V - [place, 0.75 * place, 0], axis=1).argmin())
+            name = f"disc, 1 : {(k + np.hypot(k, 1)) ** 2:.3g}, from {where}"
+            yield name, mesh, lambda x, k=k: twisted_disk(x, k)[1], source, straight(twisted_disk(mesh.V, k)[0], source)
     for c, place in ((3, 0.5), (20, 0.5), (20, 0.0)):
         for cells in (rows // 6, rows // 4, 5 * rows // 12):
             mesh = moved_inside(shapes.box(cells), rng, 0.25 / cells)
@@ -647,8 +662,8 @@ COLUMNS = {
     | mean_and_largest(border="source on the border", beside="1.5 edges away", middle="in the middle", **HALF),
     "faces": {"metric per face": "{case}"} | mean_and_largest(default="default", **HALF),
     "grids": {"grid": "{grid}"} | errors_and_seconds(default="default", fmm="scikit-fmm", konal="pykonal"),
-    "smooth": {"body": "{body}", "vertices": "{n}", "tetrahedra": "{m}"}
-    | errors_and_seconds(fim="fim-python", face="per tetrahedron", vertex="at the vertices"),
+    "smooth": {"domain": "{body}", "vertices": "{n}", "simplices": "{m}"}
+    | errors_and_seconds(fim="fim-python", face="per simplex", vertex="at the vertices"),
     "polygons": {
         "": "{mesh}", "triangles without virtual vertices, %": "{triangles:.2g}",
         "with virtual vertices (default), %": "{virtual:.2g}",

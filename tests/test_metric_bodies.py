@@ -186,7 +186,7 @@ def test_planes_of_triangles_are_turned_into_each_other():
     fibres = along_x + np.array([0, 0.5, 0])
 
     def turning(directions):
-        g = fibre_metric(directions, 1.0, 20.0)[:, None]
+        g = fibre_metric(directions, 1.0, 20.0)
         return HopfLaxEngine(MetricSimplices.in_metric(folded, g, 1.0)).resolution[0]
 
     assert turning(fibres) == pytest.approx(1, rel=1e-6)

@@ -43,10 +43,10 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
         m triangles or tetrahedra.
     metric : (m, 3, 3), (n, 3, 3) or (m, 2, 2) array_like
         Symmetric and positive definite. (m, 3, 3) in space, of which a triangle takes what lies in its plane. (n, 3, 3)
-        at each vertex, of a metric whose logarithm is linear in between: take this where the metric is smooth, as then
-        distance is of second order. If n = m, (m, 3, 3) is per face. (m, 2, 2) in the plane of each triangle: the first
-        axis along the edge from corner 0 to corner 1, the second towards corner 2. Unit: squared length in the metric
-        per squared length of the mesh.
+        at each vertex, of a metric whose inverse root, the velocity, is linear in between: take this where the metric
+        is smooth, as then distance is of second order. If n = m, (m, 3, 3) is per face. (m, 2, 2) in the plane of each
+        triangle: the first axis along the edge from corner 0 to corner 1, the second towards corner 2. Unit: squared
+        length in the metric per squared length of the mesh.
     laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
         Of triangles, see `operators`.
 
@@ -70,7 +70,7 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
 
         Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of the Hopf-Lax
         formula, of first order, sharpened to second where the metric and the distance are smooth. Where the tensors of
-        neighbours are those of a smooth field, they are carried to the vertices first.
+        neighbours are those of a smooth field, their velocities are carried to the vertices first.
 
     Raises
     ------
@@ -269,7 +269,7 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Lapl
     # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T: edges times C have the lengths of the metric.
     p = mesh.F.shape[1] - 1
     if p == 3:
-        return _TetrahedronOperators(mesh, g, MetricSimplices.in_metric(mesh, g[:, None], least))
+        return _TetrahedronOperators(mesh, g, MetricSimplices.in_metric(mesh, g, least))
     factor = np.linalg.cholesky(g)
     corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
     # Relative to the first corner: digits would be lost far from the origin.
@@ -288,14 +288,15 @@ def _contrast(g: FloatArray) -> float:
     return float(np.exp(np.ptp(np.linalg.slogdet(g)[1]) / (2 * g.shape[1])))
 
 
-def _of_smooth_metric(mesh: Mesh, corners: FloatArray, least: float, laplacian: Laplacian) -> Operators:
-    """The operators of simplices with a metric (m, p + 1, 3, 3) at each corner, as `operators_in_metric`."""
-    simplices = MetricSimplices.in_metric(mesh, corners, least)
+def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:
+    """The operators of simplices with a metric (n, 3, 3) at each vertex, as `operators_in_metric`."""
+    simplices = MetricSimplices.in_metric(mesh, g, least, at_vertices=True)
+    mean = g[mesh.F].mean(axis=1)
     if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, corners.mean(axis=1), simplices)
+        return _TetrahedronOperators(mesh, mean, simplices)
     axes = plane_axes(mesh)
-    inside = axes @ corners.mean(axis=1) @ np.swapaxes(axes, 1, 2)
-    sides = simplices.lengths[:, ::-1]  # opposite each corner
+    inside = axes @ mean @ np.swapaxes(axes, 1, 2)
+    sides = simplices.measured[2][:, ::-1]  # opposite each corner
     if (sides.sum(axis=1) > 2 * (1 + _ROUNDING) * longest_sides(sides)).all():
         domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
         return replace(domain, contrast=_contrast(inside))
@@ -332,7 +333,7 @@ def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, lapl
         simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, least)
     else:
         axes = plane_axes(mesh)
-        simplices = MetricSimplices.in_metric(mesh, (np.swapaxes(axes, 1, 2) @ g @ axes)[:, None], least)
+        simplices = MetricSimplices.in_metric(mesh, np.swapaxes(axes, 1, 2) @ g @ axes, least)
     return replace(domain, simplices=simplices, contrast=_contrast(g))
 
 
@@ -482,15 +483,14 @@ def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float]:
 
 
 def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float]:
-    """The metric (m, p + 1, 3, 3) at the corners of faces, from one per vertex, and its least length."""
+    """The metric (n, 3, 3) from one per vertex, and its least length on faces."""
     symmetric = _symmetric(g)
-    corners = symmetric[mesh.F]
     if mesh.is_tetrahedral:
         smallest = np.where(mesh.referenced, np.linalg.eigvalsh(symmetric)[:, 0], np.inf)
     else:
         axes, smallest = plane_axes(mesh)[:, None], np.full(mesh.n_vertices, np.inf)
-        np.minimum.at(smallest, mesh.F, np.linalg.eigvalsh(axes @ corners @ np.swapaxes(axes, 2, 3))[..., 0])
-    return np.asarray(corners), _least_length(smallest, g)
+        np.minimum.at(smallest, mesh.F, np.linalg.eigvalsh(axes @ symmetric[mesh.F] @ np.swapaxes(axes, 2, 3))[..., 0])
+    return symmetric, _least_length(smallest, g)
 
 
 def _symmetric(g: FloatArray) -> FloatArray:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.kernels.sweep import hopf_lax
 from heat_igl.mesh import Mesh
+from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import FloatArray, IntArray
 
 # Differences between tensors that are taken for rounding.
@@ -24,8 +26,8 @@ class MetricSimplices:
     corners : (m, p + 1) int64
         Vertices of each triangle (p = 2) or tetrahedron (p = 3).
     lengths : (m, pairs) float64
-        Distances between the corners of each, in its own metric, pairs in the order of `np.tril_indices`; empty if they
-        are those between positions `V`.
+        Distances between the corners of each, pairs in the order of `np.tril_indices`; empty if they are those between
+        positions `V` or in a metric.
     n : int
         Number of vertices.
     V : (n, 3) float64 or None
@@ -35,8 +37,10 @@ class MetricSimplices:
     least : float
         Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
     tensors : (m, q, 3, 3) float64 or None
-        A metric that is not the same everywhere: of each simplex (q = 1), or at each of its corners (q = p + 1), with
-        logarithms of lengths that are linear in between.
+        A metric that is not the same everywhere, of each simplex (q = 1), or of triangles at each corner (q = 3).
+    velocity : (m, p + 1, 6) float64 or None
+        The inverse root of a metric at each corner, linear in between; across a triangle it is 1. Of the symmetric
+        matrix the entries on and above the diagonal, row by row.
     is_given : bool
         Whether tensors, or positions without tensors, are those that the user gave in space: then distance has
         derivatives by them.
@@ -49,6 +53,7 @@ class MetricSimplices:
     place: FloatArray | None = None
     least: float = 1.0
     tensors: FloatArray | None = None
+    velocity: FloatArray | None = None
     is_given: bool = False
 
     @classmethod
@@ -57,29 +62,34 @@ class MetricSimplices:
         return cls(mesh.F, np.empty(0), mesh.n_vertices, mesh.V, mesh.V, is_given=True)
 
     @classmethod
-    def in_metric(cls, mesh: Mesh, tensors: FloatArray, least: float) -> MetricSimplices:
-        """The faces of a mesh with a metric (m, q, 3, 3) on each, or at each of its corners, and its `least` length.
+    def in_metric(cls, mesh: Mesh, g: FloatArray, least: float, at_vertices: bool = False) -> MetricSimplices:
+        """The faces of a mesh with a metric (m, 3, 3) on each, or (n, 3, 3) at each vertex, and its `least` length.
 
         Where it is the same everywhere, distance is that in space after a linear map.
         """
         p = mesh.F.shape[1] - 1
-        first = tensors[0, 0]
-        if p == 3 and np.abs(tensors - first).max() <= _ROUNDING * np.abs(first).max():
+        if p == 3 and np.abs(g - g[0]).max() <= _ROUNDING * np.abs(g[0]).max():
             # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
-            mapped = cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(first), mesh.F))
+            mapped = cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(g[0]), mesh.F))
             return replace(mapped, is_given=False)
-        is_given = tensors.shape[1] > 1
-        if p == 3 and not is_given:
-            tensors, fitted = _at_corners(mesh, tensors[:, 0])
-            is_given, least = tensors.shape[1] == 1, min(least, fitted)
-        simplices = cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors, is_given)
-        squares = simplices.squared_lengths()
-        lengths = np.sqrt(squares[:, 0])
-        if tensors.shape[1] > 1:
-            # Along an edge, the logarithm of the squared length is linear: Simpson's rule of an exponential function.
-            a, b = (np.sqrt(squares[:, end, np.arange(len(end))]) for end in np.tril_indices(p + 1, -1))
-            lengths = (a + 4 * np.sqrt(a * b) + b) / 6
-        return replace(simplices, lengths=lengths)
+        tensors, W = None, None
+        if p == 2:
+            tensors = g[mesh.F] if at_vertices else g[:, None]
+            if at_vertices:
+                axes = plane_axes(mesh)
+                normal = np.cross(axes[:, 0], axes[:, 1])
+                inside = inverse_root(axes[:, None] @ tensors @ np.swapaxes(axes, 1, 2)[:, None])
+                W = np.swapaxes(axes, 1, 2)[:, None] @ inside @ axes[:, None]
+                W += (normal[:, :, None] * normal[:, None])[:, None]
+        elif at_vertices:
+            W = inverse_root(g)[mesh.F]
+        else:
+            W, fitted = _at_corners(mesh, inverse_root(g))
+            least = min(least, fitted)
+            tensors = g[:, None] if W is None else None
+        velocity = None if W is None else np.ascontiguousarray(W[..., *np.triu_indices(3)])
+        is_given = at_vertices or (p == 3 and W is None)
+        return cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors, velocity, is_given)
 
     @classmethod
     def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
@@ -91,14 +101,33 @@ class MetricSimplices:
         tensors = across @ products @ np.swapaxes(across, 1, 2)
         return cls(F, sides[:, ::-1], len(V), None, V, least, tensors[:, None])
 
-    def squared_lengths(self) -> FloatArray:
-        """Squared distances (m, q, pairs) between the corners, in each of the `tensors`; pairs as in `lengths`."""
-        if self.place is None or self.tensors is None:
-            raise ValueError("these simplices have lengths, and no tensors")
-        if self.tensors.shape[1] == 1 and len(self.lengths):
-            return np.ascontiguousarray(self.lengths[:, None] ** 2)
+    @cached_property
+    def measured(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """What `lengths_in_velocity` returns; in one metric for each simplex all squares agree, and the slack is 1."""
         corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
-        return np.asarray(hopf_lax.squared_lengths(corners, V, np.ascontiguousarray(self.tensors)))
+        if self.velocity is not None:
+            found: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+            found = hopf_lax.lengths_in_velocity(corners, V, self.velocity)
+            return found
+        if len(self.lengths):
+            squares = np.ascontiguousarray(self.lengths[:, None] ** 2)
+        elif self.tensors is not None:
+            squares = np.asarray(hopf_lax.squared_lengths(corners, V, np.ascontiguousarray(self.tensors)))
+        else:
+            raise ValueError("these simplices have neither lengths nor a metric")
+        mean = np.ascontiguousarray(squares[:, 0])
+        return squares, mean, np.sqrt(mean), np.ones(len(mean))
+
+    def metric(self, chosen: IntArray) -> FloatArray:
+        """The tensors (k, q, 3, 3) of chosen simplices."""
+        if self.tensors is not None:
+            return self.tensors[chosen]
+        if self.velocity is None:
+            raise ValueError("these simplices have lengths, and no tensors")
+        full = np.empty((len(chosen), self.velocity.shape[1], 3, 3))
+        i, j = np.triu_indices(3)
+        full[..., i, j] = full[..., j, i] = self.velocity[chosen]
+        return np.asarray(np.linalg.inv(full @ full))
 
     @property
     def edges(self) -> tuple[IntArray, FloatArray]:
@@ -106,7 +135,7 @@ class MetricSimplices:
         ends = self.corners[:, np.stack(np.tril_indices(self.corners.shape[1], -1), axis=1)].reshape(-1, 2)
         if self.V is not None:
             return ends, np.linalg.norm(self.V[ends[:, 0]] - self.V[ends[:, 1]], axis=1)
-        return ends, self.lengths.ravel()
+        return ends, self.measured[2].ravel()
 
     def halved(self) -> MetricSimplices:
         """Tetrahedra in space, each cut into eight at the middles of the edges; the vertices keep their numbers.
@@ -140,27 +169,31 @@ class MetricSimplices:
         return np.unique(np.sort(self.edges[0], axis=1), axis=0, return_inverse=True)
 
 
-def _at_corners(mesh: Mesh, g: FloatArray) -> tuple[FloatArray, float]:
-    """The tensors g (m, 3, 3) of tetrahedra as samples of a smooth field: (m, 4, 3, 3) at their corners.
+def inverse_root(g: FloatArray) -> FloatArray:
+    """The symmetric matrices g^(-1/2), for g (..., p, p)."""
+    sizes, axes = np.linalg.eigh(g)
+    return np.asarray((axes / np.sqrt(sizes)[..., None, :]) @ np.swapaxes(axes, -1, -2))
 
-    Around each vertex, a linear function is fitted to the logarithms of the tensors. The tensor at the vertex is taken
-    from it if it explains all of their variance, and is that of each tetrahedron if it leaves a quarter or more, as it
-    leaves of a step: jumps stay where they are. (m, 1, 3, 3) if the field is smooth nowhere. The second result is the
-    least length of a unit vector in the tensors at vertices.
+
+def _at_corners(mesh: Mesh, W: FloatArray) -> tuple[FloatArray | None, float]:
+    """The velocities W (m, 3, 3) of tetrahedra as samples of a smooth field: (m, 4, 3, 3) at their corners.
+
+    Around each vertex, a linear function is fitted. The velocity at the vertex is taken from it if it explains all of
+    the variance and is positive definite there, and is that of each tetrahedron if it leaves a quarter or more, as it
+    leaves of a step: jumps stay where they are. None if the field is smooth nowhere. The second result is the least
+    length of a unit vector at vertices.
     """
     m, n = mesh.n_faces, mesh.n_vertices
     i, j = np.triu_indices(3)
     off = np.where(i == j, 1, np.sqrt(2))
-    sizes, axes = np.linalg.eigh(g)
-    logs = ((axes * np.log(sizes)[:, None]) @ np.swapaxes(axes, 1, 2))[:, i, j] * off
-    level = logs.mean(axis=0)
-    logs -= level
+    values = W[:, i, j] * off
+    level = values.mean(axis=0)
+    values -= level
     X = mesh.V - mesh.V.mean(axis=0)
     centre = X[mesh.F].mean(axis=1)
-    products = [centre[:, :, None] * values[:, None] for values in (centre, logs)]
-    one = np.ones((m, 1))
+    products = [centre[:, :, None] * part[:, None] for part in (centre, values)]
     moments = np.concatenate(
-        [one, centre, logs, *(x.reshape(m, -1) for x in products), (logs**2).sum(1, keepdims=True)], 1
+        [np.ones((m, 1)), centre, values, *(x.reshape(m, -1) for x in products), (values**2).sum(1, keepdims=True)], 1
     )
     of_corners = sp.csr_array((np.ones(4 * m), mesh.F.ravel(), np.arange(0, 4 * m + 1, 4)), shape=(m, n))
     at = of_corners.T.tocsr()
@@ -173,20 +206,19 @@ def _at_corners(mesh: Mesh, g: FloatArray) -> tuple[FloatArray, float]:
     variance = sums[:, 37] - (mean**2).sum(axis=1)
     fitted = np.linalg.pinv(spread, hermitian=True) @ slope
     explained = (fitted * slope).sum(axis=(1, 2))
-    is_constant = variance <= _ROUNDING * (1 + sums[:, 37])
+    is_constant = variance <= _ROUNDING * ((level**2).sum() + sums[:, 37])
     share = np.clip(1 - 4 * (1 - explained / np.where(is_constant, 1, variance)), 0, 1) * ~is_constant
     if not share.any():
-        return g[:, None], np.inf
+        return None, np.inf
     found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
     count = np.maximum(at.sum(axis=1), 1)[:, None]
     least = share[mesh.F].min(axis=1)[:, None]
     for _ in range(10):
-        # A mean over neighbours flattens curves: until the means over the corners are the given tensors.
-        found += at @ ((logs - of_corners @ found / 4) * least) / count
-    found += level
-    log = np.empty((n, 3, 3))
-    log[:, i, j] = log[:, j, i] = found / off
-    sizes, axes = np.linalg.eigh(log)
-    at_vertex = (axes * np.exp(sizes)[:, None]) @ np.swapaxes(axes, 1, 2)
+        # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
+        found += at @ ((values - of_corners @ found / 4) * least) / count
+    at_vertex = np.empty((n, 3, 3))
+    at_vertex[:, i, j] = at_vertex[:, j, i] = (found + level) / off
+    sizes = np.linalg.eigvalsh(at_vertex)
+    share[sizes[:, 0] <= 0] = 0
     part = share[mesh.F][..., None, None]
-    return np.asarray((1 - part) * g[:, None] + part * at_vertex[mesh.F]), float(np.exp(sizes.min() / 2))
+    return np.asarray((1 - part) * W[:, None] + part * at_vertex[mesh.F]), float(1 / sizes.max())

@@ -78,6 +78,7 @@ class _FacetUpdate:
     ) -> None:
         self._is_trusted, self._same = is_sloped & is_new, same & is_sloped[:, :, None] & is_sloped[:, None]
         self.share, self._bend = share.copy(), bend
+        self._of: AnyArray | None = None
 
     def place(self, at: _Inputs) -> None:
         """Move the places to where values are least, by Newton's method; shares that come to 0 stay."""
@@ -128,20 +129,39 @@ class _FacetUpdate:
         # At a corner T is its distance; that of a source is 0, where the square has no root to derive.
         T = np.where(self._is_corner, mean, np.sqrt(np.where(self._is_corner, 1.0, mean**2 - (x * hang).sum(axis=1))))
         to_T = np.where(self._is_corner[:, None], D, (mean[:, None] * D - hang) / np.where(T == 0, 1, T)[:, None])
-        by = np.einsum("kqij,kj->kqi", product, x)
-        square = np.einsum("kqi,ki->kq", by, x)
-        near = np.sqrt(square[:, 0])
         if product.shape[1] == 1:
-            g = by[:, 0] / near[:, None]
-            return T, near, to_T + g, -g
-        by *= 2 / square[..., None]
-        level = np.log(square[:, 1:])
-        far = np.exp(0.5 * (x * level).sum(axis=1))
-        middle = 4 * np.sqrt(near * far)
-        a, b = (near + 0.5 * middle)[:, None] / 12, (far + 0.5 * middle)[:, None] / 12
-        bent = np.einsum("kj,kji->ki", x, by[:, 1:])
-        lean = a * (level - np.log(square[:, :1]) - by[:, 0]) - b * bent
-        return T, (near + middle + far) / 6, to_T + a * by[:, 0] + b * (level + bent), lean
+            by = np.einsum("kij,kj->ki", product[:, 0], x)
+            length = np.sqrt((x * by).sum(axis=1))
+            g = by / length[:, None]
+            return T, length, to_T + g, -g
+        W, e = self._velocity(at, e)
+        mean = np.trace(W, axis1=2, axis2=3) / e.shape[2]
+        one, two = mean[:, 0], (x * mean[:, 1:]).sum(axis=1)
+        middle = np.linalg.inv((W[:, 0] + np.einsum("kj,kjab->kab", x, W[:, 1:])) / 2)
+        w = np.einsum("kab,kjb,kj->ka", middle, e, x)
+        near = np.sqrt((w**2).sum(axis=1))
+        u = np.einsum("kab,kb->ka", middle, w) / near[:, None]
+        growth = 2 / 3 + (one + two) ** 2 / (12 * one * two)
+        longer, by = (near * (two**2 - one**2) / (12 * one * two))[:, None], np.einsum("ka,kjab,kb->kj", u, W, w) / 2
+        along = np.einsum("ka,kja->kj", u, e)
+        g = growth[:, None] * (along - by[:, 1:]) + longer * mean[:, 1:] / two[:, None]
+        lean = growth[:, None] * (by[:, :1] - along - by[:, 1:]) - longer * (mean[:, 1:] / one[:, None] - 1)
+        return T, near * growth, to_T + g, lean
+
+    def _velocity(self, at: _Inputs, e: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """The inverse roots (k, q, p, p) of tensors, and vectors e (k, p, p), in the planes of triangles."""
+        if e.shape[1] == 3:
+            if np.iscomplexobj(at.tensors):
+                return _inverse_root(at.tensors), e
+            if self._of is not at.tensors:
+                self._of, self._W = at.tensors, _inverse_root(at.tensors)
+            return self._W, e
+        x, y = e[:, 0], e[:, 1]
+        x = x / np.sqrt((x**2).sum(axis=1, keepdims=True))
+        y = y - (x * y).sum(axis=1, keepdims=True) * x
+        axes = np.stack([x, y / np.sqrt((y**2).sum(axis=1, keepdims=True))], axis=1)
+        W = _inverse_root(axes[:, None] @ at.tensors @ np.swapaxes(axes, 1, 2)[:, None])
+        return W, e @ np.swapaxes(axes, 1, 2)
 
     def _sag(self, at: _Inputs, D: AnyArray, e: AnyArray, product: AnyArray) -> AnyArray:
         """By how much squared distance sags between two corners (k, p, p), as `HopfLax.sag_between`."""
@@ -191,6 +211,18 @@ class _FacetUpdate:
                 sag = _larger(sag, _larger(rise - from_i, -from_j - rise) - level)
                 result[:, i, j] = result[:, j, i] = np.where(doubted | flat | ~self._same[:, i, j], 0, sag)
         return result
+
+
+def _inverse_root(g: AnyArray) -> AnyArray:
+    """The matrices g^(-1/2) (..., p, p), with the derivative where g is complex (Daleckii and Krein 1965)."""
+    sizes, axes = np.linalg.eigh(np.real(g))
+    root, back = np.sqrt(sizes), np.swapaxes(axes, -1, -2)
+    W = (axes / root[..., None, :]) @ back
+    if not np.iscomplexobj(g):
+        return np.asarray(W)
+    change = np.imag(g) + np.swapaxes(np.imag(g), -1, -2)
+    rows, columns = root[..., None], root[..., None, :]
+    return np.asarray(W - 1j * (axes @ (back @ change @ axes / (2 * rows * columns * (rows + columns))) @ back))
 
 
 def _size(x: AnyArray) -> AnyArray:
@@ -395,7 +427,7 @@ class FixedPointDerivative(SimplexDerivative):
     def by_speed(self, g: ArrayLike) -> FloatArray:
         """The gradient (m,) by the speeds given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
         by_metric, tensors = self.by_metric(g), self._simplices.tensors
-        if tensors is None or tensors.shape[1] > 1:
+        if tensors is None or self._simplices.velocity is not None:
             raise ValueError("the solver knows no speeds, but a metric at the vertices: use by_metric")
         return np.asarray(-2 * np.trace(by_metric, axis1=1, axis2=2) * tensors[:, 0, 0, 0] ** 1.5)
 
@@ -411,10 +443,9 @@ class FixedPointDerivative(SimplexDerivative):
 
     def _inputs(self) -> _Inputs:
         simplices, facet, distance = self._simplices, self._vertices[:, 1:], self._state[:, 0]
-        tensors, place = simplices.tensors, simplices.place
-        if tensors is None or place is None:
-            raise ValueError("these simplices have lengths, and no tensors")
-        tensors = tensors[self._simplex]
+        place, tensors = simplices.place, simplices.metric(self._simplex)
+        if place is None:
+            raise ValueError("these simplices have no positions")
         if tensors.shape[1] > 1:
             tensors = np.take_along_axis(tensors, self._corner[:, :, None, None], axis=1)
         start = self._sources.vertex_offset[self._first]

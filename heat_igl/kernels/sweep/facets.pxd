@@ -13,6 +13,37 @@ cdef enum:
     MOST_HALVINGS = 8
 
 
+cdef inline void multiply(const double* W, const double* e, double* into) noexcept nogil:
+    # Symmetric matrices have their entries on and above the diagonal, row by row.
+    into[0] = W[0] * e[0] + W[1] * e[1] + W[2] * e[2]
+    into[1] = W[1] * e[0] + W[3] * e[1] + W[4] * e[2]
+    into[2] = W[2] * e[0] + W[4] * e[1] + W[5] * e[2]
+
+
+cdef inline void invert(const double* W, double* into) noexcept nogil:
+    cdef int k
+    cdef double per
+    into[0] = W[3] * W[5] - W[4] * W[4]
+    into[1] = W[2] * W[4] - W[1] * W[5]
+    into[2] = W[1] * W[4] - W[2] * W[3]
+    into[3] = W[0] * W[5] - W[2] * W[2]
+    into[4] = W[1] * W[2] - W[0] * W[4]
+    into[5] = W[0] * W[3] - W[1] * W[1]
+    per = 1.0 / (W[0] * into[0] + W[1] * into[1] + W[2] * into[2])
+    for k in range(6):
+        into[k] *= per
+
+
+cdef inline double mean_velocity(const double* W, int p) noexcept nogil:
+    # Over directions; across a triangle, p = 2, it is 1.
+    return (W[0] + W[3] + W[5] - (3 - p)) / p
+
+
+cdef inline double simpson(double a, double b) noexcept nogil:
+    # By how much longer a line takes at velocities that grow from a to b than at the one in the middle.
+    return 2.0 / 3.0 + (a + b) * (a + b) / (12.0 * a * b)
+
+
 cdef class Facet:
     cdef int p, q
     cdef double start
@@ -22,13 +53,18 @@ cdef class Facet:
     cdef double share[3]
     cdef double g[3]
     cdef double H[3][3]
-    # Of the last value: T and its derivatives; lengths at v, in the middle and at x, and what they came from.
-    cdef double T, near, middle, far
+    # Vectors to the corners, and velocity at v and at the corners: the inverse root of the metric, and its mean.
+    cdef double E[3][3]
+    cdef double W[4][6]
+    cdef double s[4]
+    # Of the last value.
+    cdef double T, near, sx, factor, factor_1
     cdef double rise[3]
-    cdef double square[4]
-    cdef double log[3]
-    cdef double by[4][3]
-    cdef double bent[3]
+    cdef double own[3]
+    cdef double w[3]
+    cdef double u[3]
+    cdef double inverse[6]
+    cdef double a[3][3]
 
     cdef bint is_flat(self) noexcept nogil
     cdef double dual(self, int k, const double* e) noexcept nogil
@@ -36,6 +72,6 @@ cdef class Facet:
     cdef double length(self, const double* x) noexcept nogil
     cdef double lean(self, int i) noexcept nogil
     cdef double value(self, const double* x) noexcept nogil
-    cdef void curve(self, const double* x) noexcept nogil
+    cdef void curve(self) noexcept nogil
     cdef double newton(self, double limit) noexcept nogil
     cdef (double, double) on_triangle(self, double* x) noexcept nogil

@@ -1,8 +1,16 @@
 """The least of T(x) + |v - x| over the points x of a facet, with T of second order on it."""
 
 import cython
-from cython.cimports.heat_igl.kernels.sweep.facets import FLAT, MOST_HALVINGS, MOST_STEPS, PLACED
-from cython.cimports.libc.math import INFINITY, exp, fabs, log, sqrt
+from cython.cimports.heat_igl.kernels.sweep.facets import (
+    FLAT,
+    MOST_HALVINGS,
+    MOST_STEPS,
+    PLACED,
+    invert,
+    multiply,
+    simpson,
+)
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 
 @cython.cclass
@@ -30,6 +38,10 @@ class Facet:
     @cython.nogil
     def dual(self, k: cython.int, e: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """The square of the slope that rises by e towards the corners, in the inverse of the metric k of `product`."""
+        if self.q > 1:
+            w: cython.double[3]
+            multiply(cython.address(self.W[k][0]), e, w)
+            return w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
         m = cython.address(self.product[9 * k])
         if self.p == 2:
             return (m[4] * e[0] * e[0] - 2.0 * m[1] * e[0] * e[1] + m[0] * e[1] * e[1]) / (m[0] * m[4] - m[1] * m[1])
@@ -60,47 +72,71 @@ class Facet:
     def length(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """|v - x| for shares x, with its derivatives `g` by these.
 
-        The logarithm of the squared length in one direction is linear between the corners: lengths are those of the
-        inverse metric as well, and the integral along the line is Simpson's rule of an exponential function.
+        Velocity W, the inverse root of the metric, is linear between the corners. With W in the middle, a straight line
+        e takes the time |W^-1 e|; where fibres turn, so does a path that goes along them. How the mean velocity grows
+        is Simpson's rule, see `simpson`.
         """
-        to: cython.double = 0.0
-        for k in range(self.q):
-            m = cython.address(self.product[9 * k])
-            by = cython.address(self.by[k][0])
+        if self.q == 1:
+            m = cython.address(self.product[0])
             for i in range(3):
-                by[i] = m[3 * i] * x[0] + m[3 * i + 1] * x[1] + m[3 * i + 2] * x[2]
-            square: cython.double = x[0] * by[0] + x[1] * by[1] + x[2] * by[2]
+                self.g[i] = m[3 * i] * x[0] + m[3 * i + 1] * x[1] + m[3 * i + 2] * x[2]
+            square: cython.double = x[0] * self.g[0] + x[1] * self.g[1] + x[2] * self.g[2]
             if not square > 0.0:
                 return 0.0
-            self.square[k] = square
-            if k > 0:
-                self.log[k - 1] = log(square)
-                to += x[k - 1] * self.log[k - 1]
+            self.near = sqrt(square)
             for i in range(3):
-                by[i] *= 2.0 / square
-        self.near = sqrt(self.square[0])
-        if self.q == 1:
-            for i in range(3):
-                self.g[i] = 0.5 * self.near * self.by[0][i]
+                self.g[i] /= self.near
+                self.own[i] = self.g[i]
             return self.near
-        self.far = exp(0.5 * to)
-        self.middle = 4.0 * sqrt(self.near * self.far)
+        e: cython.double[3]
+        W: cython.double[6]
+        for k in range(3):
+            e[k] = x[0] * self.E[0][k] + x[1] * self.E[1][k] + x[2] * self.E[2][k]
+        for k in range(6):
+            W[k] = 0.5 * (self.W[0][k] + x[0] * self.W[1][k] + x[1] * self.W[2][k] + x[2] * self.W[3][k])
+        I = cython.address(self.inverse[0])
+        invert(W, I)
+        multiply(I, e, self.w)
+        self.near = sqrt(self.w[0] * self.w[0] + self.w[1] * self.w[1] + self.w[2] * self.w[2])
+        if not self.near > 0.0:
+            return 0.0
+        multiply(I, self.w, self.u)
+        sv: cython.double = self.s[0]
+        sx: cython.double = x[0] * self.s[1] + x[1] * self.s[2] + x[2] * self.s[3]
+        self.sx = sx
+        self.factor = simpson(sv, sx)
+        self.factor_1 = (sx * sx - sv * sv) / (12.0 * sv * sx * sx)
         for i in range(3):
-            self.bent[i] = x[0] * self.by[1][i] + x[1] * self.by[2][i] + x[2] * self.by[3][i]
-            # Of the logarithms of the squared lengths at v and at x; lengths change by half of that.
-            self.g[i] = (self.near + 0.5 * self.middle) / 12.0 * self.by[0][i]
-            self.g[i] += (self.far + 0.5 * self.middle) / 12.0 * (self.log[i] + self.bent[i])
-        return (self.near + self.middle + self.far) / 6.0
+            self.u[i] /= self.near
+        for i in range(self.p):
+            multiply(cython.address(self.W[i + 1][0]), self.w, e)
+            for k in range(3):
+                e[k] = self.E[i][k] - 0.5 * e[k]
+            self.own[i] = self.u[0] * e[0] + self.u[1] * e[1] + self.u[2] * e[2]
+            multiply(I, e, cython.address(self.a[i][0]))
+            self.g[i] = self.factor * self.own[i] + self.near * self.factor_1 * self.s[i + 1]
+        return self.factor * self.near
 
     @cython.cfunc
     @cython.nogil
     def lean(self, i: cython.int) -> cython.double:
         """What the last `length` gains by moving v towards corner i."""
         if self.q == 1:
-            return -0.5 * self.near * self.by[0][i]
-        gain: cython.double = self.log[i] - log(self.square[0]) - self.by[0][i]
-        return (self.near + 0.5 * self.middle) / 12.0 * gain - (self.far + 0.5 * self.middle) / 12.0 * self.bent[i]
+            return -self.own[i]
+        d: cython.double[6]
+        e: cython.double[3]
+        for k in range(6):
+            d[k] = 0.5 * (self.W[i + 1][k] - self.W[0][k])
+        multiply(d, self.w, e)
+        gain: cython.double = 0.0
+        for k in range(3):
+            gain -= self.u[k] * (self.E[i][k] + e[k])
+        sv: cython.double = self.s[0]
+        by: cython.double = (sv * sv - self.sx * self.sx) / (12.0 * self.sx * sv * sv)
+        return self.factor * gain + self.near * by * (self.s[i + 1] - sv)
 
+    @cython.cfunc
+    @cython.nogil
     def value(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """T(x) + |v - x| for shares x of the corners, inf if there is none; sets its derivatives `g`."""
         mean: cython.double = x[0] * self.D[0] + x[1] * self.D[1] + x[2] * self.D[2]
@@ -119,29 +155,33 @@ class Facet:
             self.g[i] += self.rise[i]
         return self.start + self.T + L
 
-    def curve(self, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
-        """Set the second derivatives `H` of the last `value`, which was that at x."""
-        half: cython.double = 0.5 * self.middle
-        a: cython.double = 0.5 * self.near if self.q == 1 else (self.near + half) / 12.0
-        aa: cython.double = 0.5 * a if self.q == 1 else (self.near + 0.5 * half) / 24.0
-        b: cython.double = (self.far + half) / 12.0
-        bb: cython.double = (self.far + 0.5 * half) / 24.0
-        one = cython.address(self.by[0][0])
+    def curve(self) -> cython.void:
+        """Set the second derivatives `H` of the last `value`."""
+        e: cython.double[3]
+        bend: cython.double = 0.0
+        if self.q > 1:
+            bend = self.near * self.s[0] / (6.0 * self.sx * self.sx * self.sx)
         for i in range(self.p):
             for j in range(i + 1):
                 found: cython.double = self.D[i] * self.D[j] - 0.5 * self.sag[i][j] - self.rise[i] * self.rise[j]
-                found = found / self.T + 2.0 * a / self.square[0] * self.product[3 * i + j]
-                found += (aa - a) * one[i] * one[j]
-                if self.q > 1:
-                    u: cython.double = self.log[i] + self.bent[i]
-                    w: cython.double = self.log[j] + self.bent[j]
-                    to: cython.double = self.by[i + 1][j] + self.by[j + 1][i]
-                    for k in range(1, self.q):
-                        along: cython.double = 2.0 / self.square[k] * self.product[9 * k + 3 * i + j]
-                        to += x[k - 1] * (along - self.by[k][i] * self.by[k][j])
-                    found += b * to + bb * u * w + half / 48.0 * (one[i] * w + one[j] * u)
+                found /= self.T
+                across: cython.double = -self.own[i] * self.own[j]
+                if self.q == 1:
+                    found += (across + self.product[3 * i + j]) / self.near
+                else:
+                    for k in range(3):
+                        across += self.a[i][k] * self.a[j][k]
+                    across /= self.near
+                    multiply(cython.address(self.W[i + 1][0]), cython.address(self.a[j][0]), e)
+                    across -= 0.5 * (self.u[0] * e[0] + self.u[1] * e[1] + self.u[2] * e[2])
+                    multiply(cython.address(self.W[j + 1][0]), cython.address(self.a[i][0]), e)
+                    across -= 0.5 * (self.u[0] * e[0] + self.u[1] * e[1] + self.u[2] * e[2])
+                    mixed: cython.double = self.own[i] * self.s[j + 1] + self.own[j] * self.s[i + 1]
+                    found += self.factor * across + self.factor_1 * mixed + bend * self.s[i + 1] * self.s[j + 1]
                 self.H[i][j] = self.H[j][i] = found
 
+    @cython.cfunc
+    @cython.nogil
     def newton(self, limit: cython.double) -> cython.double:
         """The least value over the facet, by Newton's method from `share`, which is changed; inf if not below `limit`.
 
@@ -167,7 +207,7 @@ class Facet:
         for _step in range(MOST_STEPS):
             if best == INFINITY:
                 return best
-            self.curve(x)
+            self.curve()
             db: cython.double = 0.0
             de: cython.double = 0.0
             if self.p == 2:

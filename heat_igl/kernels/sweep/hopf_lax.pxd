@@ -25,6 +25,7 @@ cdef class HopfLax(Facet):
     cdef const int[::1] first
     cdef const int[::1] incident
     cdef const double[:, :, ::1] squares
+    cdef const double[:, :, ::1] velocity
     cdef const double[:, ::1] mean
     cdef const double[:, :, ::1] gradient
     cdef const double[:, ::1] V

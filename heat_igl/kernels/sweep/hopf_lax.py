@@ -15,7 +15,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
-from cython.cimports.heat_igl.kernels.sweep.facets import Facet
+from cython.cimports.heat_igl.kernels.sweep.facets import Facet, invert, mean_velocity, multiply, simpson
 from cython.cimports.heat_igl.kernels.sweep.hopf_lax import (
     EQUAL,
     FIRST_GAIN,
@@ -61,44 +61,105 @@ def squared_lengths(
     return found
 
 
+def lengths_in_velocity(
+    corners: cython.const[cython.int][:, ::1],
+    V: cython.const[cython.double][:, ::1],
+    velocity: cython.const[cython.double][:, :, ::1],
+):
+    """Of simplices with a velocity (m, p + 1, 6) at each corner, linear in between.
+
+    Returns
+    -------
+    squares : (m, p + 1, pairs) float64
+        Squared distances between the corners, in the metric of each corner.
+    mean, lengths : (m, pairs) float64
+        The same in that of the centre, and lengths of the edges.
+    slack : (m,) float64
+        By which factor lengths may be shorter in the middle of an edge than in the metric of the centre.
+    """
+    size: cython.int = corners.shape[1]
+    shape = corners.shape[0], size * (size - 1) // 2
+    found = np.zeros((shape[0], size, shape[1])), np.zeros(shape), np.zeros(shape), np.ones(shape[0])
+    squares: cython.double[:, :, ::1] = found[0]
+    mean: cython.double[:, ::1] = found[1]
+    lengths: cython.double[:, ::1] = found[2]
+    slack: cython.double[::1] = found[3]
+    n_pairs: cython.int = shape[1]
+    here: cython.double[6]
+    e: cython.double[18]
+    W: cython.double[6]
+    with cython.nogil:
+        for s in range(corners.shape[0]):
+            for k in range(6):
+                W[k] = 0.0
+            for i in range(size):
+                for j in range(i):
+                    for x in range(3):
+                        e[3 * _pair(i, j) + x] = V[corners[s, j], x] - V[corners[s, i], x]
+                for k in range(6):
+                    W[k] += velocity[s, i, k] / size
+            _squares(W, e, n_pairs, cython.address(mean[s, 0]))
+            for i in range(size):
+                _squares(cython.address(velocity[s, i, 0]), e, n_pairs, cython.address(squares[s, i, 0]))
+                for j in range(i):
+                    for k in range(6):
+                        W[k] = 0.5 * (velocity[s, i, k] + velocity[s, j, k])
+                    _squares(W, e, n_pairs, here)
+                    one: cython.double = mean_velocity(cython.address(velocity[s, i, 0]), size - 1)
+                    two: cython.double = mean_velocity(cython.address(velocity[s, j, 0]), size - 1)
+                    lengths[s, _pair(i, j)] = sqrt(here[_pair(i, j)]) * simpson(one, two)
+                    for k in range(n_pairs):
+                        if here[k] < slack[s] * mean[s, k]:
+                            slack[s] = here[k] / mean[s, k]
+            slack[s] = sqrt(slack[s])
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+def _squares(
+    W: cython.pointer[cython.const[cython.double]],
+    e: cython.pointer[cython.const[cython.double]],
+    n: cython.int,
+    into: cython.pointer[cython.double],
+) -> cython.void:
+    """The squares of |W^-1 e| for n vectors e."""
+    inverse: cython.double[6]
+    w: cython.double[3]
+    invert(W, inverse)
+    for k in range(n):
+        multiply(inverse, e + 3 * k, w)
+        into[k] = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+
+
 def measured(
     corners: cython.const[cython.int][:, ::1],
     V: cython.const[cython.double][:, ::1],
     squares: cython.const[cython.double][:, :, ::1],
+    mean: cython.const[cython.double][:, ::1],
 ):
-    """What `HopfLax` takes of simplices beside their `squared_lengths`.
+    """What `HopfLax` takes of simplices beside their lengths.
 
     Returns
     -------
-    mean, widest, slack, gradient
+    widest, gradient
         As there.
     growth : (m,) float64
         The square of the volume in the mean metric, over that in space, as a power of two.
     """
     size: cython.int = corners.shape[1]
     m = corners.shape[0]
-    means, widths, slacks = np.zeros((m, squares.shape[2])), np.zeros(m), np.ones(m)
-    gradients, growths = np.zeros((m, size, 3)), np.zeros(m)
-    mean: cython.double[:, ::1] = means
+    widths, gradients, growths = np.zeros(m), np.zeros((m, size, 3)), np.zeros(m)
     widest: cython.double[::1] = widths
-    slack: cython.double[::1] = slacks
     gradient: cython.double[:, :, ::1] = gradients
     growth: cython.double[::1] = growths
     e: cython.double[3][3]
     P: cython.double[3][3]
     with cython.nogil:
         for s in range(corners.shape[0]):
-            for i in range(squares.shape[2]):
-                least: cython.double = INFINITY
-                total: cython.double = 0.0
-                for k in range(squares.shape[1]):
-                    total += squares[s, k, i]
-                    least = min(least, squares[s, k, i])
+            for k in range(squares.shape[1]):
+                for i in range(squares.shape[2]):
                     widest[s] = max(widest[s], squares[s, k, i])
-                mean[s, i] = total / squares.shape[1]
-                if total > 0.0:
-                    slack[s] = min(slack[s], least / mean[s, i])
-            slack[s] = sqrt(slack[s])
             for i in range(size - 1):
                 for x in range(3):
                     e[i][x] = V[corners[s, i + 1], x] - V[corners[s, 0], x]
@@ -124,7 +185,7 @@ def measured(
             square: cython.double = P[0][0] * (P[1][1] * P[2][2] - P[1][2] * P[1][2])
             square += 2.0 * P[0][1] * P[1][2] * P[0][2] - P[1][1] * P[0][2] * P[0][2] - P[2][2] * P[0][1] * P[0][1]
             growth[s] = log2(square / (fabs(volume) if size == 3 else volume * volume))
-    return means, widths, slacks, gradients, growths
+    return widths, gradients, growths
 
 
 @cython.cfunc
@@ -151,8 +212,11 @@ class HopfLax(Facet):
     squares : (m, q, pairs) float64
         Squared distances between the corners of each simplex, in its metric (q = 1), or in that of each of its corners
         (q = p + 1); pairs of corners in the order of `np.tril_indices`.
+    velocity : (m, p + 1, 6) float64
+        If q > 1, the velocity at the corners, whose entries on and above the diagonal come row by row: the inverse root
+        of the metric. It is linear in between.
     mean : (m, pairs) float64
-        The mean of these over the metrics.
+        Squared distances in one metric for each simplex, in which T is found that is linear.
     widest, slack : (m,) float64
         The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
     bend : (m,) float64
@@ -163,9 +227,10 @@ class HopfLax(Facet):
         Positions.
     """
 
-    def __init__(self, corners, first, incident, squares, mean, widest, slack, bend, gradient, V):
+    def __init__(self, corners, first, incident, squares, velocity, mean, widest, slack, bend, gradient, V):
         self.corners, self.first, self.incident, self.squares = corners, first, incident, squares
-        self.mean, self.widest, self.slack, self.gradient, self.V = mean, widest, slack, gradient, V
+        self.velocity, self.mean, self.widest, self.slack = velocity, mean, widest, slack
+        self.gradient, self.V = gradient, V
         self.bend, self.p, self.q = bend, corners.shape[1] - 1, squares.shape[1]
         self.unit = sqrt(np.mean(widest))
 
@@ -485,17 +550,23 @@ class HopfLax(Facet):
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """Fill `product`: of v's metric first, then of those of the corners of the facet."""
-        for k in range(self.q):
-            at: cython.int = 0
-            if self.q > 1:
-                at = c if k == 0 else self.side[k - 1]
-            sq = cython.address(self.squares[s, at, 0])
-            m = cython.address(self.product[9 * k])
+        at: cython.int
+        sq = cython.address(self.squares[s, c if self.q > 1 else 0, 0])
+        m = cython.address(self.product[0])
+        for i in range(self.p):
+            m[4 * i] = sq[_pair(c, self.side[i])]
+            for j in range(i):
+                between: cython.double = m[4 * i] + m[4 * j] - sq[_pair(self.side[i], self.side[j])]
+                m[3 * i + j] = m[3 * j + i] = 0.5 * between
+        if self.q > 1:
+            for i in range(self.p + 1):
+                at = c if i == 0 else self.side[i - 1]
+                for k in range(6):
+                    self.W[i][k] = self.velocity[s, at, k]
+                self.s[i] = mean_velocity(self.W[i], self.p)
             for i in range(self.p):
-                m[4 * i] = sq[_pair(c, self.side[i])]
-                for j in range(i):
-                    between: cython.double = m[4 * i] + m[4 * j] - sq[_pair(self.side[i], self.side[j])]
-                    m[3 * i + j] = m[3 * j + i] = 0.5 * between
+                for k in range(3):
+                    self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
 
     def curved(self, s: cython.int, c: cython.int, best: cython.double, limit: cython.double) -> cython.double:
         """The least value at corner c of simplex s with T of second order, after that of first order; sets `share`.
@@ -600,10 +671,13 @@ class HopfLax(Facet):
         if not self.is_sloped[v] or self.rests_on(v, self.corners[s, c]):
             return 0.0
         e: cython.double[3]
-        for j in range(self.p):
-            e[j] = 0.0
-            for k in range(3):
-                e[j] += self.slope[v, k] * (self.V[self.corners[s, self.side[j]], k] - self.V[self.corners[s, c], k])
+        for j in range(3):
+            e[j] = self.slope[v, j] if self.q > 1 else 0.0
+            if self.q == 1 and j < self.p:
+                for k in range(3):
+                    e[j] += self.slope[v, k] * (
+                        self.V[self.corners[s, self.side[j]], k] - self.V[self.corners[s, c], k]
+                    )
         square: cython.double = self.dual(i + 1 if self.q > 1 else 0, e)
         square = log(square) if square > 0.0 else 1.0
         return max(1.0 - square * square, 0.0)
