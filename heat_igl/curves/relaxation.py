@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import SourceError
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices
-from heat_igl.runtime import n_threads, side_by_side
+from heat_igl.runtime import over_rows
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -138,8 +137,7 @@ class _Relaxation:
                 found = self._solver.directions(int(sites[i]))
                 rows[i], angles[i] = found.distance, found.departure
 
-        bounds = np.linspace(0, len(sites), min(n_threads(), len(sites)) + 1).astype(int)
-        side_by_side(work, [slice(*ends) for ends in pairwise(bounds.tolist())])
+        over_rows(work, len(sites), len(sites))
         return rows, angles
 
     def _cells(self, rows: FloatArray) -> tuple[IntArray, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from heat_igl.kernels.paths import straightest
 from heat_igl.mesh import MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
 from heat_igl.mesh.cloud_orientation import on_one_side
 from heat_igl.mesh.surface_points import require_faces
-from heat_igl.runtime import n_threads, side_by_side
+from heat_igl.runtime import over_rows
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -184,8 +183,7 @@ class Tracer:
             given = (begin.faces[part], begin.barycentric[part], turn[part], size[part])
             kernel.trace(self._triangles, *given, faces[part], barycentric[part], lengths[part])
 
-        bounds = np.linspace(0, k, (n_threads() if k >= _FEW else 1) + 1).astype(int)
-        side_by_side(work, [slice(*ends) for ends in pairwise(bounds)])
+        over_rows(work, k, k) if k >= _FEW else work(slice(k))
         return SurfacePoints(*on_one_side(faces, barycentric, self._mesh.n_faces))
 
     @staticmethod
