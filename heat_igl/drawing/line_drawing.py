@@ -73,8 +73,7 @@ def write_line_drawing(
     depth = rasterize(to_pixels(seen.turned, scale, centre), seen.F, _PIXELS, _PIXELS).depth
     groups: dict[str, list[tuple[FloatArray, bool]]] = {"visible": [], "hidden": []}
     for curve in lines:
-        line = (curve.positions(mesh) - seen.centre) / seen.unit @ seen.turn.T
-        for is_seen, run in visible_runs(to_pixels(line, scale, centre), depth, _BEHIND * _PIXELS):
+        for is_seen, run in visible_runs(to_pixels(seen.line(curve, mesh), scale, centre), depth, _BEHIND * _PIXELS):
             # Pixels count downwards, the plane of the drawing upwards; its unit is that of the mesh.
             drawn = (run[:, :2] - centre) * [1, -1] / scale * seen.unit
             groups["visible" if is_seen else "hidden"].append((_corners(drawn), False))

@@ -97,7 +97,7 @@ def plot(
     mesh = _drawn(mesh)
     check_style(style)
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
-    return lay_out(seen, _lines_in_space(mesh, curves, seen), style, colours(colormap), label, "unreachable")
+    return lay_out(seen, [seen.line(curve, mesh) for curve in curves], style, colours(colormap), label, "unreachable")
 
 
 def plot_field(
@@ -151,7 +151,7 @@ def plot_field(
         mesh, values, name="values", sources=sources, spacing=spacing, limits=limits, view=view, up=up
     )  # fmt: skip
     style: Style = "plain" if spacing is None else "lines"
-    return lay_out(seen, _lines_in_space(mesh, curves, seen), style, table, label, "no value")
+    return lay_out(seen, [seen.line(curve, mesh) for curve in curves], style, table, label, "no value")
 
 
 def plot_labels(
@@ -210,7 +210,7 @@ def plot_labels(
             raise ValueError(f"distance must have shape {given.shape}, one per vertex, but it has {measured.shape}")
         if not isinstance(mesh, PointCloud):  # whose discs have one label each
             seen = replace(seen, borders=_borders(seen, given, measured / seen.unit))
-    return lay_out(seen, _lines_in_space(mesh, curves, seen), "plain", table, "", "no label")
+    return lay_out(seen, [seen.line(curve, mesh) for curve in curves], "plain", table, "", "no label")
 
 
 def _colour_numbers(labels: IntArray, edges: IntArray, n_colours: int) -> IntArray:
@@ -263,9 +263,3 @@ def _drawn(mesh: MeshLike) -> Mesh | PointCloud:
     """What is drawn: triangles or tetrahedra, or the points of a cloud."""
     found = as_mesh(mesh)
     return found if isinstance(found, PointCloud) else as_simplices(found)
-
-
-def _lines_in_space(mesh: Mesh | PointCloud, curves: Sequence[SurfaceCurve], seen: Scene) -> list[FloatArray]:
-    """The vertices of each curve (k, 3) in viewer coordinates: right, up and near."""
-    surface = as_simplices(mesh)
-    return [(curve.positions(surface) - seen.centre) / seen.unit @ seen.turn.T for curve in curves]

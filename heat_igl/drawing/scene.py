@@ -10,7 +10,7 @@ import numpy as np
 from heat_igl.drawing.discs import discs
 from heat_igl.drawing.raster import default_rotation, rotation
 from heat_igl.errors import MissingExtraError, real_numbers, require_choice
-from heat_igl.mesh import Mesh, PointCloud, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_simplices
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
@@ -54,6 +54,10 @@ class Scene:
     def turned(self) -> FloatArray:
         """Positions (n, 3) in viewer coordinates: right, up and near."""
         return np.asarray(self.V @ self.turn.T)
+
+    def line(self, curve: SurfaceCurve, mesh: MeshLike) -> FloatArray:
+        """The vertices (k, 3) of a curve on the mesh that is shown, in viewer coordinates."""
+        return np.asarray((curve.positions(mesh) - self.centre) / self.unit @ self.turn.T)
 
 
 def scene(
