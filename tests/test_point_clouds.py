@@ -20,7 +20,7 @@ from heat_igl import (
     read_point_cloud,
     shapes,
 )
-from heat_igl.drawing.discs import discs
+from heat_igl.drawing.scene import discs
 from heat_igl.geodesic import SolverChoice
 from heat_igl.io import ply
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars

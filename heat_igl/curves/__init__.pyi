@@ -1,4 +1,3 @@
-from heat_igl.curves.bezier import geodesic_bezier as geodesic_bezier
 from heat_igl.curves.cutting import CutMesh as CutMesh
 from heat_igl.curves.cutting import MeshPiece as MeshPiece
 from heat_igl.curves.cutting import cut as cut
@@ -6,6 +5,7 @@ from heat_igl.curves.drawn_curves import curve_on as curve_on
 from heat_igl.curves.drawn_curves import curve_through as curve_through
 from heat_igl.curves.drawn_curves import signed_distance as signed_distance
 from heat_igl.curves.geodesics import GeodesicPathSolver as GeodesicPathSolver
+from heat_igl.curves.geodesics import geodesic_bezier as geodesic_bezier
 from heat_igl.curves.geodesics import geodesic_path as geodesic_path
 from heat_igl.curves.geodesics import straighten as straighten
 from heat_igl.curves.handles import handle_loops as handle_loops

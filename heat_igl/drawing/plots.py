@@ -21,11 +21,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from heat_igl.drawing.discs import slopes
 from heat_igl.drawing.figure import Picture, lay_out
 from heat_igl.drawing.html_view import Page, page
 from heat_igl.drawing.line_drawing import write_line_drawing
-from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene
+from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene, slopes
 from heat_igl.errors import as_array, real_numbers
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_mesh, as_simplices
 from heat_igl.sources import Sources
