@@ -63,9 +63,6 @@ cdef class Shortener:
     cdef SegmentList segments
     cdef double length
 
-    cdef int follow(
-        self, const int[::1] face, const int[:, ::1] join, const double[:, ::1] ends, bint is_closed
-    ) except -2 nogil
     cdef void begin(self, int face, Place start) noexcept nogil
     cdef int last_face(self) noexcept nogil
     cdef bint turn(self, int v, int goal) except -1 nogil

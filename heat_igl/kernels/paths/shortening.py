@@ -74,45 +74,35 @@ class Shortener:
 
         First comes -1, or the number of the join at which only a vertex holds a loop together; then there is no curve.
         """
+        start: Place
+        end: Place
+        stuck: cython.Py_ssize_t = -1
+        for c in range(3):
+            start.c[c], end.c[c] = ends[0, c], ends[1, c]
         # A loop is straightened from many bases.
         self.largest_loss = 0.0 if is_closed else LARGEST_LOSS
+        self.segments.n, self.length = 0, 0.0
         with cython.nogil:
-            stuck = self.follow(face, join, ends, is_closed)
+            self.begin(face[0], start)
+            for i in range(join.shape[0]):
+                v: cython.int = join[i, 2]
+                f: cython.int = face[i + 1 if i + 1 < face.shape[0] else 0]
+                if join[i, 0] >= 0:
+                    self.strip.push(join[i, 0], join[i, 1])
+                elif v >= 0 and not self.turn(v, f):
+                    # Only this vertex joins the two faces.
+                    if is_closed:
+                        stuck = i
+                        break
+                    self.ends.end = at_corner(corner_of(self.s, self.last_face(), v))
+                    self.length += self.settle()
+                    self.emit()
+                    self.begin(f, at_corner(corner_of(self.s, f, v)))
             if stuck < 0:
+                self.ends.end = end
                 self.length += self.shorten_loop() if is_closed else self.improve(self.settle())
                 self.emit()
         return stuck, self.length, *self.segments.arrays()
-
-    def follow(
-        self,
-        face: cython.const[cython.int][::1],
-        join: cython.const[cython.int][:, ::1],
-        ends: cython.const[cython.double][:, ::1],
-        is_closed: cython.bint,
-    ) -> cython.int:
-        """Make the strip of a course; -1, or the join at which a loop is stuck."""
-        start: Place
-        end: Place
-        self.segments.n = 0
-        self.length = 0.0
-        for c in range(3):
-            start.c[c], end.c[c] = ends[0, c], ends[1, c]
-        self.begin(face[0], start)
-        for i in range(join.shape[0]):
-            v: cython.int = join[i, 2]
-            f: cython.int = face[i + 1 if i + 1 < face.shape[0] else 0]
-            if join[i, 0] >= 0:
-                self.strip.push(join[i, 0], join[i, 1])
-            elif v >= 0 and not self.turn(v, f):
-                # Only this vertex joins the two faces.
-                if is_closed:
-                    return i
-                self.ends.end = at_corner(corner_of(self.s, self.last_face(), v))
-                self.length += self.settle()
-                self.emit()
-                self.begin(f, at_corner(corner_of(self.s, f, v)))
-        self.ends.end = end
-        return -1
 
     def begin(self, face: cython.int, start: Place) -> cython.void:
         """Begin a strip."""
