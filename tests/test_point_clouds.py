@@ -206,6 +206,16 @@ def test_one_point_in_a_hundred_is_an_outlier():
     assert mean_error(found[:3000], arcs(P, 0)) < 0.003
 
 
+@pytest.mark.parametrize("height", [0.05, 1.0])
+def test_a_few_points_above_a_surface_belong_to_it_if_they_are_near(height):
+    """Six points of a square, at less than two spacings and far above it."""
+    P, few = plane(1000), np.array([[0.01 * np.cos(a), 0.01 * np.sin(a), height] for a in np.arange(6)])
+    few[:, :2] += 0.5
+    found = GeodesicSolver(PointCloud(np.concatenate([P, few]))).distance(0)
+    assert np.isfinite(found[:1000]).all()
+    assert np.isfinite(found[1000:]).all() if height < 0.1 else np.isinf(found[1000:]).all()
+
+
 def test_density_that_grows_a_hundredfold():
     x, y = np.random.default_rng(0).random((2, 20_000))
     for across in ((100**x - 1) / 99, np.where(x < 0.5, x / 50, 2 * x - 1)):
@@ -776,6 +786,16 @@ def test_two_fans_are_joined_where_they_are_nearest():
     joined = with_fans_joined(P, F, np.array([2]))
     np.testing.assert_array_equal(joined[:4], F)
     assert np.sort(joined[4:], axis=1).tolist() == [[1, 2, 4]]
+
+
+def test_beside_a_closed_fan_triangles_stay_only_where_they_are_the_connection():
+    """A triangle at the middle of a hexagon, whose other side is joined to the rim or not."""
+    hexagon, flap, link = [[0, i, i % 6 + 1] for i in range(1, 7)], [[0, 7, 8]], [[2, 1, 7], [1, 8, 7]]
+    P = np.random.default_rng(0).random((9, 3))
+    for F, expected in ((hexagon + flap + link, hexagon + link), (hexagon + flap, hexagon + flap)):
+        given = np.array(F, np.int32)
+        np.testing.assert_array_equal(pinched_vertices(given, 9, glued_sides(given, 9)), [0])
+        np.testing.assert_array_equal(with_fans_joined(P, given, np.array([0])), expected)
 
 
 def test_vectors_on_both_sides_are_those_on_one(monkeypatch):

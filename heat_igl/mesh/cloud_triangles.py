@@ -3,7 +3,8 @@
 In the union of the local triangulations (Sharp and Crane 2020, section 6), nearly all triangles are in the stars of all
 three corners. These never overlap, since each star is planar. If stars differ, on four points near a circle or on
 noisy points, triangles of more stars come first, and of these the smaller ones; others that do not fit are left out.
-Then loops of outer edges are filled in space, and points in no triangle are inserted into the nearest one.
+Then loops of outer edges are filled in space, and points of parts that are too small for a surface are inserted into
+the nearest triangle.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) ->
     both = np.concatenate([F, candidates])
     F = both[fitting_triangles(P, near.axes, both, len(F))]
     F = np.concatenate([agreed[~is_open], F])
-    return _with_isolated_points(P, with_loops_filled(P, F, near.reach, is_settled), near)
+    return _with_small_parts(P, with_loops_filled(P, F, near.reach, is_settled), near)
 
 
 def _triangles_of_stars(
@@ -95,23 +96,38 @@ def _triangles_of_stars(
     return corners[count == 3], rows[order], is_settled.astype(bool)
 
 
-def _with_isolated_points(P: FloatArray, F: IntArray, near: Neighbourhoods) -> IntArray:
-    """The triangles, of which those are split that are nearest to points that noise has put above or behind others."""
-    used = np.zeros(len(P), bool)
-    used[F] = True
-    points = np.flatnonzero(~used).astype(np.int32)
-    while len(points) and len(F):
-        nearest, distance = PointTree(P[F].mean(axis=1), np.arange(len(F))).nearest(P[points], 1)
-        # Outliers are farther away than a neighbour would be.
-        close = distance <= near.radius[F[nearest[:, 0], 0]]
+def _with_small_parts(P: FloatArray, F: IntArray, near: Neighbourhoods) -> IntArray:
+    """The triangles, of which those are split that are nearest to points of small parts.
+
+    A part of fewer points than a neighbourhood, as single points that noise has put above others, is no surface of its
+    own if it is near another.
+    """
+    part = connected_components(F, len(P))
+    size = np.bincount(part)
+    is_small = (size < near.index.shape[1])[part]
+    kept, points = F[~is_small[F[:, 0]]], np.flatnonzero(is_small)
+    if not len(points) or not len(kept):
+        return F
+    nearest, distance = _middles(P, kept).nearest(P[points], 1)
+    # Outliers are farther away than a neighbour would be.
+    is_far = distance > near.radius[kept[nearest[:, 0], 0]]
+    stays = np.bincount(part[points[is_far]], minlength=len(size)) > 0
+    points = points[~stays[part[points]]].astype(np.int32)
+    F = F[~is_small[F[:, 0]] | stays[part[F[:, 0]]]]
+    while len(points):
         # One point in each triangle and round.
-        face, chosen = np.unique(nearest[close, 0], return_index=True)
-        point = points[close][chosen]
+        face, chosen = np.unique(_middles(P, F).nearest(P[points], 1)[0][:, 0], return_index=True)
+        point = points[chosen]
         a, b, c = F[face].T
         F = np.concatenate([F, np.stack([b, c, point], axis=1), np.stack([c, a, point], axis=1)])
         F[face, 2] = point
-        points = np.delete(points[close], chosen)
+        points = np.delete(points, chosen)
     return F
+
+
+def _middles(P: FloatArray, F: IntArray) -> PointTree:
+    """The middles of triangles."""
+    return PointTree(P[F].mean(axis=1), np.arange(len(F)))
 
 
 def at_all_corners(is_chosen: BoolArray, F: IntArray) -> BoolArray:
@@ -127,13 +143,18 @@ def at_some_corner(is_chosen: BoolArray, F: IntArray) -> BoolArray:
 
 def pinched_vertices(F: IntArray, n: int, glued: GluedSides) -> IntArray:
     """The vertices (k,), of n, at which several fans of the triangles F (m, 3) meet, for their `glued_sides`."""
-    first, second, runs_alike = glued
-    ends = [np.stack([corner(first, e), corner(second, np.where(runs_alike, e, 3 - e))], axis=1) for e in (1, 2)]
-    # Corners of a vertex are in one fan if edges join their triangles.
-    fan = components(np.concatenate(ends), F.size)
+    fan = _fans(F, glued)
     of_fan = np.zeros(int(fan.max(initial=-1)) + 1, np.int64)
     of_fan[fan] = F.ravel()
     return np.flatnonzero(np.bincount(of_fan, minlength=n) > 1)
+
+
+def _fans(F: IntArray, glued: GluedSides) -> IntArray:
+    """The fan (3 m,) of each corner: corners of a vertex are in one fan if edges join their triangles."""
+    first, second, runs_alike = glued
+    ends = [np.stack([corner(first, e), corner(second, np.where(runs_alike, e, 3 - e))], axis=1) for e in (1, 2)]
+    fan: IntArray = components(np.concatenate(ends), F.size)
+    return fan
 
 
 def glued_sides(F: IntArray, n: int) -> GluedSides:
@@ -156,7 +177,7 @@ def with_fans_joined(P: FloatArray, F: IntArray, pinched: IntArray) -> IntArray:
 
     Two parts of a surface that meet in one vertex alone are connected for distance, but not for vectors, which need a
     tangent plane along the way. Between two fans goes the triangle with the shortest third side that runs along its
-    sides against the neighbours, if there is one.
+    sides against the neighbours. Where there is none, the largest fan stays, unless parts or points would be cut off.
     """
     if not len(pinched):
         return F
@@ -164,7 +185,21 @@ def with_fans_joined(P: FloatArray, F: IntArray, pinched: IntArray) -> IntArray:
     is_near[pinched] = True
     is_near[F[at_some_corner(is_near, F)]] = True
     added = joining_triangles(P, F[at_some_corner(is_near, F)].astype(np.int32), pinched)
-    return np.concatenate([F, added.astype(F.dtype)])
+    return _with_largest_fans(np.concatenate([F, added.astype(F.dtype)]), len(P))
+
+
+def _with_largest_fans(F: IntArray, n: int) -> IntArray:
+    """The triangles F (m, 3) in the largest fan of each corner, and others that are between parts of these."""
+    fan, vertex = _fans(F, glued_sides(F, n)), F.ravel()
+    order = np.lexsort((-fan, np.bincount(fan)[fan], vertex))
+    largest = np.empty(n, np.int64)
+    # Of several values written to one place, the last stays.
+    largest[vertex[order]] = fan[order]
+    stays = (fan == largest[vertex]).reshape(-1, 3).all(axis=1)
+    part = connected_components(F[stays], n)[F]
+    stays |= (part != part[:, :1]).any(axis=1)
+    found: IntArray = F[stays]
+    return found
 
 
 def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_settled: BoolArray) -> IntArray:
