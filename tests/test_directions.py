@@ -141,6 +141,26 @@ def test_log_maps_of_the_plane_from_points_beside_a_vertex(share):
         assert abs(ahead[0] * expected[1] - ahead[1] * expected[0]) < 1e-13 * ahead @ expected
 
 
+@pytest.mark.parametrize("bend", [1e-9, 1e-8, 5e-8])
+@pytest.mark.parametrize("vertex", range(1, 21))
+def test_a_path_that_hardly_bends_leaves_towards_the_bend(bend, vertex):
+    """Around a saddle, from a point in a face: straight on past its vertex, other faces lie there."""
+    k, turn = np.arange(20), np.linspace(0, 2 * np.pi, 20, endpoint=False)
+    rim = np.stack([np.cos(turn), np.sin(turn), 0.5 * np.sin(2 * turn)], axis=1)
+    mesh = Mesh(np.concatenate([np.zeros((1, 3)), rim]), np.stack([0 * k, 1 + k, 1 + (k + 1) % 20], axis=1))
+    length = np.linalg.norm(rim, axis=1)
+    angle = np.arccos(np.einsum("nx,nx->n", rim, np.roll(rim, -1, axis=0)) / (length * np.roll(length, -1)))
+    ends = np.cumsum(angle)
+    at = (ends[vertex - 1] - angle[vertex - 1] + np.pi + bend) % ends[-1]
+    face = int(np.searchsorted(ends, at))
+    before, behind = at - ends[face] + angle[face], ends[face] - at
+    weights = 0.5 * np.sin([behind, before]) / np.sin(angle[face]) / length[[face, (face + 1) % 20]]
+    log = log_map(mesh, SurfacePoints([face], [[1 - weights.sum(), *weights]]))
+    (x, y), (u, v) = log[0], log[vertex]
+    assert abs(x * v - y * u) < 1e-14
+    np.testing.assert_allclose(np.hypot(u, v), 0.5 + length[vertex - 1], rtol=1e-14)
+
+
 @pytest.mark.parametrize("share", [1e-5, 1e-8, 1e-9, 1e-10, 3e-11])
 @pytest.mark.parametrize("rise", [0.6, -0.6])
 def test_log_maps_from_points_beside_the_apex_of_a_cone(share, rise):
