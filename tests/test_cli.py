@@ -58,18 +58,17 @@ def two_spheres(tmp_path):
     return path
 
 
-def test_distance_writes_what_the_library_returns_and_a_picture(ball):
-    done = command(
-        "distance", ball, "--source", 12, "--source", 40, "--output", "out.ply", "--picture", "out.png",
-        cwd=ball.parent,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+def test_distance_writes_what_the_library_returns_and_a_picture(ball, capsys, monkeypatch):
+    monkeypatch.chdir(ball.parent)
+    arguments = "--source 12 --source 40 --output out.ply --picture out.png"
+    assert cli.run(["distance", str(ball), *arguments.split()]) == 0
+    printed, said = capsys.readouterr()
+    assert said == ""
     written = io.read_attributes(ball.parent / "out.ply")["distance"]
     np.testing.assert_array_equal(written, heat_igl.geodesic_distance(shapes.icosphere(2), [12, 40]))
     assert written[[12, 40]].tolist() == [0, 0]
     assert (ball.parent / "out.png").read_bytes().startswith(b"\x89PNG")
-    assert f"{written.max():.6g} at vertex {written.argmax()}" in done.stdout
+    assert f"{written.max():.6g} at vertex {written.argmax()}" in printed
     assert files(ball.parent) == {"sphere.off", "out.ply", "out.png"}
 
 

@@ -46,7 +46,7 @@ def with_speeds(mesh: Mesh) -> Operators:
     return speed_operators(mesh, np.random.default_rng(0).choice([0.5, 1, 3], mesh.n_faces))
 
 
-@pytest.fixture(params=DOMAINS, ids=str)
+@pytest.fixture(params=DOMAINS, ids=str, scope="module")
 def domain(request):
     return DOMAINS[request.param]()
 
