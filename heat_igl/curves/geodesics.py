@@ -15,7 +15,7 @@ import numpy as np
 
 from heat_igl.curves.places import CommonFaces, Waypoints, corners, mixed_places
 from heat_igl.errors import MeshError, SourceError, names_guessed, shown, truth
-from heat_igl.intrinsic import HalfEdges, corner_angles
+from heat_igl.intrinsic import HalfEdges, corner_angles, lengths_to_divide_by
 from heat_igl.kernels.paths import routes, shortening, strips
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.mesh.connectivity import group_by_label
@@ -25,8 +25,6 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # The compiled module, whose signatures are those of Cython.
 _tables: Any = strips
-# Edges are at least this long, in mean edge lengths: the kernel divides by lengths.
-_SHORTEST = 1e-12
 # Of each face the edge `length` opposite each corner, the `angle` at each, `vertex` and `edge` numbers. Corner c lies
 # `along` of the way from corner c + 2 to c + 1, and `above` this edge, in lengths of the edge.
 _FACE = np.dtype(
@@ -125,8 +123,7 @@ def shortener(mesh: Mesh) -> tuple[Any, Any]:
 
 def _faces(mesh: Mesh) -> AnyArray:
     """The faces (m,) as the kernels read them, see `_FACE`."""
-    # Not mollified: mollification gives a flat triangle some height, and would bend the paths across it.
-    lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
+    lengths = lengths_to_divide_by(mesh)
     face = np.empty(mesh.n_faces, _FACE)
     face["length"], face["angle"] = lengths, corner_angles(lengths)
     # The side from corner c to corner c + 2, and the one to corner c + 1.

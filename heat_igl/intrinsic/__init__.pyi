@@ -10,6 +10,7 @@ from heat_igl.intrinsic.gluing import from_edge_lengths as from_edge_lengths
 from heat_igl.intrinsic.gluing import from_gluing as from_gluing
 from heat_igl.intrinsic.gluing import has_nonmanifold_edges as has_nonmanifold_edges
 from heat_igl.intrinsic.gluing import intrinsic_triangulation as intrinsic_triangulation
+from heat_igl.intrinsic.gluing import lengths_to_divide_by as lengths_to_divide_by
 from heat_igl.intrinsic.gluing import oriented as oriented
 from heat_igl.intrinsic.gluing import tufted_cover as tufted_cover
 from heat_igl.intrinsic.half_edges import HalfEdges as HalfEdges

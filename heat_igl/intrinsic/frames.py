@@ -7,18 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import igl
 import numpy as np
 
 from heat_igl.errors import MeshError, as_array, real_numbers
-from heat_igl.intrinsic.gluing import intrinsic_triangulation
+from heat_igl.intrinsic.gluing import intrinsic_triangulation, lengths_to_divide_by
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
 from heat_igl.intrinsic.vertex_angles import PolarAngles, polar_angles
 from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_simplices, tangent_surface
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
-
-# Edges are at least this long, in mean edge lengths: directions are divided by lengths.
-_SHORTEST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,9 +282,7 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
     mesh, n = tangent_surface(given), as_simplices(given).n_vertices
     if mesh.is_tetrahedral:
         raise MeshError("tangent frames need triangles, but the mesh is tetrahedral")
-    # Not mollified: mollification gives a flat triangle some height, and would bend lines across it.
-    lengths = np.maximum(igl.edge_lengths(mesh.V, mesh.F), _SHORTEST * mesh.edge_lengths.mean())
-    triangulation = replace(intrinsic_triangulation(mesh), l=lengths, lengthening=0.0)
+    triangulation = replace(intrinsic_triangulation(mesh), l=lengths_to_divide_by(mesh), lengthening=0.0)
     angles = polar_angles(triangulation)
     sides = _unit(mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F])
     face_normals = _unit(

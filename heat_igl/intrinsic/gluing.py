@@ -17,7 +17,7 @@ import numpy as np
 from heat_igl.errors import MeshError, real_numbers
 from heat_igl.intrinsic.half_edges import mollify
 from heat_igl.intrinsic.history import BACK_CORNERS, Covered, Merged, Turned
-from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, half_edge_head, half_edge_tail
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
 from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -51,7 +51,7 @@ def from_edge_lengths(
     twin = np.where(found.n_faces[found.of_face.ravel()] == 1, -1, -2)
     twin[a], twin[b] = b, a
     aligned = np.ones(F.size, bool)
-    aligned[a] = aligned[b] = half_edge_tail(F, a) == half_edge_head(F, b)
+    aligned[a] = aligned[b] = F.ravel()[next_half_edge(a)] == F.ravel()[previous_half_edge(b)]
     added = mollify(lengths, F, margin)
     return IntrinsicTriangulation(F, lengths + added, twin, aligned, n, lengthening=float(added.max()))
 
@@ -77,7 +77,7 @@ def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> Intrinsic
     is_inner = mate != -1
     wrong = is_inner & ((mate < 0) | (mate >= F.size) | (mate == half_edge))
     a, b = half_edge[is_inner & ~wrong], mate[is_inner & ~wrong]
-    ends, other = ((half_edge_tail(F, h), half_edge_head(F, h)) for h in (a, b))
+    ends, other = (F.ravel()[[next_half_edge(h), previous_half_edge(h)]] for h in (a, b))
     aligned = np.ones(F.size, bool)
     aligned[a] = (ends[0] == other[1]) & (ends[1] == other[0])
     wrong[a] = (mate[b] != a) | ~(aligned[a] | ((ends[0] == other[0]) & (ends[1] == other[1])))
@@ -117,6 +117,14 @@ def _require_one_length(lengths: FloatArray, a: IntArray, b: IntArray) -> None:
 def intrinsic_triangulation(mesh: Mesh, margin: float | None = None) -> IntrinsicTriangulation:
     """The triangles of `mesh` by their edge lengths; degenerate ones are mollified, see `mollify`."""
     return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets, margin)
+
+
+def lengths_to_divide_by(mesh: Mesh) -> FloatArray:
+    """The length (m, 3) of the edge opposite each corner, at least 1e-12 mean edge lengths.
+
+    Not mollified: mollification gives a flat triangle some height, and would bend lines across it.
+    """
+    return np.asarray(np.maximum(igl.edge_lengths(mesh.V, mesh.F), 1e-12 * mesh.edge_lengths.mean()))
 
 
 def each_face_once(triangulation: IntrinsicTriangulation) -> tuple[IntrinsicTriangulation, IntArray]:
@@ -175,7 +183,7 @@ def oriented(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
     F, lengths = np.take_along_axis(F, corner, 1), np.take_along_axis(triangulation.l, corner, 1)
     aligned = np.ones(F.size, bool)
     inner = np.flatnonzero(twin >= 0)
-    aligned[inner] = half_edge_tail(F, inner) == half_edge_head(F, twin[inner])
+    aligned[inner] = F.ravel()[next_half_edge(inner)] == F.ravel()[previous_half_edge(twin[inner])]
     history = (*triangulation.history, Turned(turned))
     return replace(triangulation, F=F, l=lengths, twin=twin, aligned=aligned, history=history)
 

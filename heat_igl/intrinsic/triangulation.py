@@ -34,16 +34,6 @@ def sides_from(half_edge: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     return half_edge, next_half_edge(half_edge), previous_half_edge(half_edge)
 
 
-def half_edge_tail(F: IntArray, half_edge: IntArray) -> IntArray:
-    """Vertex at the tail of each half-edge, in the direction around the face."""
-    return np.asarray(F.ravel()[next_half_edge(half_edge)])
-
-
-def half_edge_head(F: IntArray, half_edge: IntArray) -> IntArray:
-    """Vertex at which each half-edge ends."""
-    return np.asarray(F.ravel()[previous_half_edge(half_edge)])
-
-
 @dataclass(frozen=True, eq=False)
 class IntrinsicTriangulation:
     """Triangles given by their edge lengths and their gluing.
@@ -87,11 +77,11 @@ class IntrinsicTriangulation:
 
     def tail(self, half_edge: IntArray) -> IntArray:
         """Vertex at the tail of each half-edge, in the direction around the face."""
-        return half_edge_tail(self.F, half_edge)
+        return np.asarray(self.F.ravel()[next_half_edge(half_edge)])
 
     def head(self, half_edge: IntArray) -> IntArray:
         """Vertex at which each half-edge ends."""
-        return half_edge_head(self.F, half_edge)
+        return np.asarray(self.F.ravel()[previous_half_edge(half_edge)])
 
     @property
     def edges(self) -> IntArray:
