@@ -170,6 +170,12 @@ class Store:
             "source_row": np.repeat(np.arange(k), [len(one) for one in source_sets]),
         }
         zarr, path = zarr_module(), self.path / name
+
+        def made(label: str, shape: Any, chunks: Any, dtype: str, fill: float, axes: tuple[str, ...]) -> Any:
+            # By the path: through the group, zarr would look at the metadata of all groups above it.
+            how = {"shape": shape, "chunks": chunks, "dtype": dtype, "fill_value": fill, "dimension_names": axes}
+            return zarr.create_array(path / label, **how, **checked_layout())
+
         with _writing(self.path):
             if path.is_dir():
                 foreign = {entry.name for entry in path.iterdir()} - {"zarr.json", *_ARRAYS}
@@ -179,26 +185,9 @@ class Store:
                 (path / "zarr.json").unlink(missing_ok=True)
                 shutil.rmtree(path)
             for label, entries in sources.items():
-                # By the path: through the group, zarr would look at the metadata of all groups above it.
-                array = zarr.create_array(
-                    path / label,
-                    shape=entries.shape,
-                    chunks=entries.shape,
-                    dtype="int64",
-                    fill_value=-1,
-                    dimension_names=("source_entry",),
-                    **checked_layout(),
-                )
-                array[:] = entries
-            distance = zarr.create_array(
-                path / "distance",
-                shape=(k, n),
-                chunks=(min(rows_per_block(n), k), min(n, _COLUMNS)),
-                dtype=dtype,
-                fill_value=np.nan,
-                dimension_names=("source", "vertex"),
-                **checked_layout(),
-            )
+                made(label, entries.shape, entries.shape, "int64", -1, ("source_entry",))[:] = entries
+            chunks = min(rows_per_block(n), k), min(n, _COLUMNS)
+            distance = made("distance", (k, n), chunks, dtype, np.nan, ("source", "vertex"))
             now = {**attributes, "status": "running"}
             # Last, since without it the mesh counts as not begun.
             group = zarr.create_group(path, zarr_format=3, attributes={**now, "seal": self._seal(name, now)})
