@@ -502,6 +502,7 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
     apex.y = s.double_area[h // 3] / apex.length
     apex.cos_left, apex.sin_left = apex.x / apex.left_length, apex.y / apex.left_length
     apex.cos_right, apex.sin_right = apex.right_x / apex.right_length, apex.y / apex.right_length
+    apex.excess = 2.0 * ROUNDING * max(apex.left_length, apex.right_length)
     apex.best, apex.best_at, apex.nearest = -1, 0.0, INFINITY
     return apex
 
@@ -549,10 +550,9 @@ def _may_reach(
     The line passes the end at a distance of `off` over the length of (x, m). The path is longer by half the square of
     that over the length of its last part, or by more.
     """
-    last: cython.double = apex.left_length if apex.left_length > apex.right_length else apex.right_length
     if w.is_plane:
-        return off * off <= 2.0 * ROUNDING * last * fabs(_straight(w, apex.x, apex.y))
-    return off * off <= 2.0 * ROUNDING * last * (w.offset + fabs(x) + m) * (x * x + m * m)
+        return off * off <= apex.excess * fabs(_straight(w, apex.x, apex.y))
+    return off * off <= apex.excess * (w.offset + fabs(x) + m) * (x * x + m * m)
 
 
 @cython.cfunc

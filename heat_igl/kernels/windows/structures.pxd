@@ -41,6 +41,7 @@ cdef struct Apex:
     double x, y
     double right_x       # how far before the head of the half-edge
     double length, left_length, right_length
+    double excess        # the largest length of the last part of a path to it, times twice its rounding
     double cos_left, sin_left, cos_right, sin_right
     int best             # the window through which the apex is nearest, -1 if none sees it
     double best_at       # where the path crosses the half-edge
