@@ -48,21 +48,11 @@ ROOT = Path(__file__).resolve().parent.parent
 def parsed(
     doc: str | None, argv: Sequence[str] | None, meshes: str = "", tables: Iterable[str] = (), **defaults: Any
 ) -> argparse.Namespace:
-    """The options of a script.
+    """The options of a script, whose docstring `doc` describes them; `argv` stands in for the command line.
 
-    Parameters
-    ----------
-    doc : str
-        Its docstring, which describes the options.
-    argv : sequence of str, optional
-        In place of the command line.
-    meshes : {"", "*", "+"}
-        How many files it takes.
-    tables : iterable of str
-        What it can measure, one of which is named first on the command line.
-    **defaults
-        Options by name: a default that says the type; a list for several; a type, for None by default; False for a
-        switch.
+    `meshes` says how many files it takes ("", "*" or "+"). One of the `tables` is named first on the command line.
+    Other options come by name with a default that says the type: a list for several values, a type for None, False for
+    a switch.
     """
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     if tables:
@@ -87,16 +77,10 @@ def parsed(
 
 @dataclass(frozen=True)
 class Table:
-    """Rows, columns, and what stands above them.
+    """Rows, columns, and a sentence above them.
 
-    Attributes
-    ----------
-    rows : list of dict
-    columns : mapping
-        Head of a column -> format of a row, as ``"{mean:.2f} and {largest:.2f}"``, or the name of a value that is shown
-        as it is. A cell of which a value is missing or None is "-".
-    text : str
-        A sentence above the table.
+    A column has a head and the format of a row, as ``"{mean:.2f} and {largest:.2f}"``, or the name of a value that is
+    shown as it is. A cell of which a value is missing or None is "-".
     """
 
     rows: Sequence[Row]
@@ -164,14 +148,7 @@ def fill_in(text: str, parts: Mapping[str, str]) -> str:
 def publish(options: argparse.Namespace, tables: Mapping[str, Table | str], **facts: Any) -> dict[str, Any]:
     """Print the environment and the tables, and write them wherever the options say; returns all as plain data.
 
-    Parameters
-    ----------
-    options : Namespace
-        As `parsed` returns them.
-    tables : mapping
-        Tables or paragraphs, by the name of the part of a page.
-    **facts
-        More for JSON.
+    Tables, or paragraphs, have the name of the part of a page. The `facts` are more for JSON.
     """
     around, name = environment(), Path(sys.argv[0]).stem
     parts = {part: each if isinstance(each, str) else each.markdown() for part, each in tables.items()}
@@ -302,16 +279,8 @@ def vtp(mesh: Mesh, source: int) -> tuple[float, FloatArray]:
 class Method:
     """A method, what it needs, and where it is left out.
 
-    Attributes
-    ----------
-    prepare : callable
-        A mesh -> a query.
-    most : int
-        Number of vertices above which it takes minutes or gigabytes.
-    needs : str
-        A module; or the variable of an environment.
-    prepares : bool
-        Whether a query leaves something to the next.
+    Above `most` vertices it takes minutes or gigabytes. It `needs` a module, or a variable of the environment, and
+    `prepares` something that queries share.
     """
 
     prepare: Callable[[Any], Query]
