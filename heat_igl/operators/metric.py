@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import igl
 import numpy as np
@@ -17,7 +18,7 @@ from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
 from heat_igl.operators.metric_simplices import MetricSimplices
 from heat_igl.operators.simplices import check_measures, longest_sides
 from heat_igl.operators.triangles import edge_length_operators, intrinsic_operators
-from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
 # for its length.
@@ -269,7 +270,7 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Lapl
     # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T: edges times C have the lengths of the metric.
     p = mesh.F.shape[1] - 1
     if p == 3:
-        return _TetrahedronOperators(mesh, g, MetricSimplices.in_metric(mesh, g, least))
+        return _TetrahedronOperators(mesh, MetricSimplices.in_metric(mesh, g, least), g)
     factor = np.linalg.cholesky(g)
     corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
     # Relative to the first corner: digits would be lost far from the origin.
@@ -293,7 +294,7 @@ def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Laplac
     simplices = MetricSimplices.in_metric(mesh, g, least, at_vertices=True)
     mean = g[mesh.F].mean(axis=1)
     if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, mean, simplices)
+        return _TetrahedronOperators(mesh, simplices, mean)
     axes = plane_axes(mesh)
     inside = axes @ mean @ np.swapaxes(axes, 1, 2)
     sides = simplices.measured[2][:, ::-1]  # opposite each corner
@@ -348,18 +349,10 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
 
 
 class _TetrahedronOperators(Operators):
-    """The operators of tetrahedra with a metric g (m, 3, 3) on each, made on first use: `simplices` need none of them.
+    """The operators of tetrahedra with a metric g (m, 3, 3) on each, made on first use: `simplices` need none."""
 
-    Parameters
-    ----------
-    mesh, g
-        The tetrahedra, and the metric for heat.
-    simplices : MetricSimplices
-        For distance.
-    """
-
-    def __init__(self, mesh: Mesh, g: FloatArray, simplices: MetricSimplices) -> None:
-        vars(self).update(_mesh=mesh, _g=g, simplices=simplices, is_surface=False)
+    def __init__(self, mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> None:
+        vars(self).update(_mesh=mesh, simplices=simplices, _g=g, is_surface=False)
 
     _mesh: Mesh
     _g: FloatArray
@@ -370,86 +363,58 @@ class _TetrahedronOperators(Operators):
         """Number of vertices."""
         return self._mesh.n_vertices
 
-    @cached_property
-    def referenced(self) -> BoolArray:
-        """Vertices that a face uses."""
-        return self._mesh.referenced
-
-    @cached_property
-    def boundary(self) -> BoolArray:
-        """Vertices on the boundary."""
-        return self._mesh.boundary
-
-    @cached_property
-    def components(self) -> IntArray:
-        """Component label of each vertex."""
-        return self._mesh.components
-
-    @cached_property
-    def _own(self) -> tuple[FloatArray, FloatArray, IntArray, float]:
-        """Edges (e,) of the tetrahedra, corners (4 m, 3) in a space of its own for each, their numbers, and the unit.
-
-        Edges times C have the lengths of the metric C C^T. The unit is about the mean length: libigl multiplies six.
-        """
-        lengths = self.simplices.edges[1]
-        unit = float(2.0 ** round(np.log2(float(lengths.mean()))))
-        corners = self._mesh.V[self._mesh.F]
-        corners = (corners - corners[:, :1]) @ np.linalg.cholesky(self._g)
-        return lengths, corners.reshape(-1, 3) / unit, np.arange(4 * len(corners)).reshape(-1, 4), unit
-
-    @cached_property
-    def weights(self) -> FloatArray:
-        """Volumes (m,)."""
-        _, corners, apart, unit = self._own
-        return np.asarray(np.abs(igl.volume(corners, apart)) * unit**3)
-
-    @cached_property
-    def face_sizes(self) -> FloatArray:
-        """Longest edge (m,) of each."""
-        return longest_sides(self._own[0].reshape(self._mesh.n_faces, -1))
-
-    @cached_property
-    def gradient(self) -> sp.csc_matrix:
-        """G (3 m, n)."""
-        _, corners, apart, unit = self._own
-        n, m = self.n, self._mesh.n_faces
-        own = sp.csc_matrix((np.ones(4 * m), self._mesh.F.ravel(), np.arange(4 * m + 1)), shape=(n, 4 * m)).T
-        return (igl.grad(corners, apart) @ own).tocsc() / unit
-
-    @cached_property
-    def L(self) -> sp.csc_matrix:
-        """Laplacian (n, n)."""
-        return laplacian_of_gradient(self.G, self.weights)
-
-    @cached_property
-    def M(self) -> sp.csc_matrix:
-        """A quarter of the volume for each corner, as igl.massmatrix has it."""
-        mass = np.bincount(self._mesh.F.ravel(), np.repeat(self.weights / 4, 4), minlength=self.n)
-        return sp.diags(mass, format="csc")
-
-    @cached_property
-    def _graph(self) -> sp.csr_array:
-        return connectivity.shortest_edge_graph(*self.simplices.edges, self.n)
-
-    @cached_property
-    def mean_edge_length(self) -> float:
-        """Over the distinct edges."""
-        return float(self._graph.data.mean())
-
-    @cached_property
-    def longest_distances(self) -> FloatArray:
+    @property
+    def longest_distances(self) -> FloatArray | None:
         """Of each component."""
-        return connectivity.longest_paths(self._graph, self.components)
+        return self._made.longest_distances
 
-    @cached_property
-    def longest_distance(self) -> float:
-        """Length of a longest shortest path along edges."""
-        return float(self.longest_distances.max())
-
-    @cached_property
+    @property
     def contrast(self) -> float:
         """Largest ratio of lengths."""
-        return _contrast(self._g)
+        return self._made.contrast
+
+    @cached_property
+    def _made(self) -> Operators:
+        return _of_tetrahedra(self._mesh, self.simplices, self._g)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # an instance that is not filled yet, as in `pickle`
+            raise AttributeError(name)
+        return getattr(self._made, name)
+
+
+def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Operators:
+    """The operators of tetrahedra with a metric g (m, 3, 3) on each, for heat, and `simplices` for distance."""
+    m, n = mesh.n_faces, mesh.n_vertices
+    # Each in a space of its own: edges times C have the lengths of the metric C C^T.
+    corners = mesh.V[mesh.F]
+    corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)
+    apart = np.arange(4 * m).reshape(-1, 4)
+    # In units of the mean length: libigl multiplies up to six of them.
+    pairs, lengths = simplices.edges
+    unit = float(2.0 ** round(np.log2(float(lengths.mean()))))
+    flat = corners.reshape(-1, 3) / unit
+    own = sp.csc_matrix((np.ones(4 * m), mesh.F.ravel(), np.arange(4 * m + 1)), shape=(n, 4 * m)).T
+    G = (igl.grad(flat, apart) @ own).tocsc() / unit
+    weights = np.abs(igl.volume(flat, apart)) * unit**3
+    # A quarter of the volume for each corner, as igl.massmatrix has it.
+    mass = np.bincount(mesh.F.ravel(), np.repeat(weights / 4, 4), minlength=n)
+    domain = Operators(
+        L=laplacian_of_gradient(G, weights),
+        M=sp.diags(mass, format="csc"),
+        gradient=G,
+        weights=weights,
+        face_sizes=longest_sides(lengths.reshape(m, -1)),
+        mean_edge_length=np.nan,
+        components=mesh.components,
+        boundary=mesh.boundary,
+        referenced=mesh.referenced,
+        longest_distance=np.nan,
+        is_surface=False,
+        simplices=simplices,
+        contrast=_contrast(g),
+    )
+    return _with_shortest_edges(domain, mesh, pairs, lengths)
 
 
 def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths: FloatArray) -> Operators:

@@ -15,6 +15,8 @@ from heat_igl.typing import FloatArray, IntArray
 
 # Differences between tensors that are taken for rounding.
 _ROUNDING = 1e-9
+# Rows and columns of the entries of a symmetric matrix on and above the diagonal.
+_ABOVE = np.triu_indices(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,7 @@ class MetricSimplices:
             # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
             mapped = cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(g[0]), mesh.F))
             return replace(mapped, is_given=False)
-        tensors, W = None, None
+        tensors, velocity = None, None
         if p == 2:
             tensors = g[mesh.F] if at_vertices else g[:, None]
             if at_vertices:
@@ -81,14 +83,14 @@ class MetricSimplices:
                 inside = inverse_root(axes[:, None] @ tensors @ np.swapaxes(axes, 1, 2)[:, None])
                 W = np.swapaxes(axes, 1, 2)[:, None] @ inside @ axes[:, None]
                 W += (normal[:, :, None] * normal[:, None])[:, None]
+                velocity = np.ascontiguousarray(W[..., *_ABOVE])
         elif at_vertices:
-            W = inverse_root(g)[mesh.F]
+            velocity = inverse_root(g)[:, *_ABOVE][mesh.F]
         else:
-            W, fitted = _at_corners(mesh, inverse_root(g))
+            velocity, fitted = _at_corners(mesh, inverse_root(g)[:, *_ABOVE])
             least = min(least, fitted)
-            tensors = g[:, None] if W is None else None
-        velocity = None if W is None else np.ascontiguousarray(W[..., *np.triu_indices(3)])
-        is_given = at_vertices or (p == 3 and W is None)
+            tensors = g[:, None] if velocity is None else None
+        is_given = at_vertices or (p == 3 and velocity is None)
         return cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors, velocity, is_given)
 
     @classmethod
@@ -104,19 +106,20 @@ class MetricSimplices:
     @cached_property
     def measured(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """What `lengths_in_velocity` returns; in one metric for each simplex all squares agree, and the slack is 1."""
-        corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
         if self.velocity is not None:
+            corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
             found: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
             found = hopf_lax.lengths_in_velocity(corners, V, self.velocity)
             return found
-        if len(self.lengths):
-            squares = np.ascontiguousarray(self.lengths[:, None] ** 2)
-        elif self.tensors is not None:
-            squares = np.asarray(hopf_lax.squared_lengths(corners, V, np.ascontiguousarray(self.tensors)))
-        else:
-            raise ValueError("these simplices have neither lengths nor a metric")
-        mean = np.ascontiguousarray(squares[:, 0])
-        return squares, mean, np.sqrt(mean), np.ones(len(mean))
+        lengths = self.lengths
+        if not len(lengths):
+            if self.tensors is None or self.place is None:
+                raise ValueError("these simplices have neither lengths nor a metric")
+            one, other = np.tril_indices(self.corners.shape[1], -1)
+            e = self.place[self.corners[:, one]] - self.place[self.corners[:, other]]
+            lengths = np.sqrt(((e @ self.tensors[:, 0]) * e).sum(axis=2))
+        mean = np.ascontiguousarray(lengths**2)
+        return mean[:, None], mean, lengths, np.ones(len(mean))
 
     def metric(self, chosen: IntArray) -> FloatArray:
         """The tensors (k, q, 3, 3) of chosen simplices."""
@@ -125,8 +128,7 @@ class MetricSimplices:
         if self.velocity is None:
             raise ValueError("these simplices have lengths, and no tensors")
         full = np.empty((len(chosen), self.velocity.shape[1], 3, 3))
-        i, j = np.triu_indices(3)
-        full[..., i, j] = full[..., j, i] = self.velocity[chosen]
+        full[..., *_ABOVE] = full[..., *_ABOVE[::-1]] = self.velocity[chosen]
         return np.asarray(np.linalg.inv(full @ full))
 
     @property
@@ -176,7 +178,7 @@ def inverse_root(g: FloatArray) -> FloatArray:
 
 
 def _at_corners(mesh: Mesh, W: FloatArray) -> tuple[FloatArray | None, float]:
-    """The velocities W (m, 3, 3) of tetrahedra as samples of a smooth field: (m, 4, 3, 3) at their corners.
+    """The velocities W (m, 6) of tetrahedra as samples of a smooth field: (m, 4, 6) at their corners.
 
     Around each vertex, a linear function is fitted. The velocity at the vertex is taken from it if it explains all of
     the variance and is positive definite there, and is that of each tetrahedron if it leaves a quarter or more, as it
@@ -184,11 +186,9 @@ def _at_corners(mesh: Mesh, W: FloatArray) -> tuple[FloatArray | None, float]:
     length of a unit vector at vertices.
     """
     m, n = mesh.n_faces, mesh.n_vertices
-    i, j = np.triu_indices(3)
-    off = np.where(i == j, 1, np.sqrt(2))
-    values = W[:, i, j] * off
-    level = values.mean(axis=0)
-    values -= level
+    off = np.where(_ABOVE[0] == _ABOVE[1], 1, np.sqrt(2))  # for the norm of symmetric matrices
+    level = (W * off).mean(axis=0)
+    values = W * off - level
     X = mesh.V - mesh.V.mean(axis=0)
     centre = X[mesh.F].mean(axis=1)
     products = [centre[:, :, None] * part[:, None] for part in (centre, values)]
@@ -216,9 +216,10 @@ def _at_corners(mesh: Mesh, W: FloatArray) -> tuple[FloatArray | None, float]:
     for _ in range(10):
         # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
         found += at @ ((values - of_corners @ found / 4) * least) / count
-    at_vertex = np.empty((n, 3, 3))
-    at_vertex[:, i, j] = at_vertex[:, j, i] = (found + level) / off
-    sizes = np.linalg.eigvalsh(at_vertex)
+    at_vertex = (found + level) / off
+    full = np.empty((n, 3, 3))
+    full[:, *_ABOVE] = full[:, *_ABOVE[::-1]] = at_vertex
+    sizes = np.linalg.eigvalsh(full)
     share[sizes[:, 0] <= 0] = 0
-    part = share[mesh.F][..., None, None]
+    part = share[mesh.F][..., None]
     return np.asarray((1 - part) * W[:, None] + part * at_vertex[mesh.F]), float(1 / sizes.max())

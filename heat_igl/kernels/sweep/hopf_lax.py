@@ -37,30 +37,6 @@ def _pair(i: cython.int, j: cython.int) -> cython.int:
     return i * (i - 1) // 2 + j if i > j else j * (j - 1) // 2 + i
 
 
-def squared_lengths(
-    corners: cython.const[cython.int][:, ::1],
-    V: cython.const[cython.double][:, ::1],
-    tensors: cython.const[cython.double][:, :, :, ::1],
-):
-    """Squared distances (m, q, pairs) between the corners of simplices (m, p + 1), in the q tensors of each."""
-    size: cython.int = corners.shape[1]
-    found = np.zeros((corners.shape[0], tensors.shape[1], size * (size - 1) // 2))
-    squares: cython.double[:, :, ::1] = found
-    e: cython.double[3]
-    with cython.nogil:
-        for s in range(corners.shape[0]):
-            for i in range(size):
-                for j in range(i):
-                    for x in range(3):
-                        e[x] = V[corners[s, j], x] - V[corners[s, i], x]
-                    for k in range(tensors.shape[1]):
-                        g = cython.address(tensors[s, k, 0, 0])
-                        square: cython.double = g[0] * e[0] * e[0] + g[4] * e[1] * e[1] + g[8] * e[2] * e[2]
-                        square += 2.0 * (g[1] * e[0] * e[1] + g[2] * e[0] * e[2] + g[5] * e[1] * e[2])
-                        squares[s, k, _pair(i, j)] = square
-    return found
-
-
 def lengths_in_velocity(
     corners: cython.const[cython.int][:, ::1],
     V: cython.const[cython.double][:, ::1],
