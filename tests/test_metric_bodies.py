@@ -90,14 +90,11 @@ def growing_speed(n: int, most: float) -> tuple[Mesh, FloatArray, FloatArray]:
 
 
 def test_no_vertex_stays_below_those_it_has_its_distance_from():
-    """First order may be shorter than second: such vertices kept it, and those behind them were 2.9 % too short.
-
-    Between the vertices, the speed whose logarithm is linear is less than the linear one.
-    """
+    """First order may be shorter than second: such vertices kept it, and those behind them were 2.9 % too short."""
     mesh, g, exact = growing_speed(16, 6.0)
     found = solver(mesh, g).distance(0)
     assert (found >= 0.999 * exact).all()
-    assert np.abs(found - exact).mean() < 0.005 * exact.mean()
+    assert np.abs(found - exact).mean() < 0.001 * exact.mean()
 
 
 def test_a_speed_that_the_mesh_does_not_resolve_gives_a_warning():
@@ -133,7 +130,7 @@ def test_a_metric_at_the_vertices_of_triangles(k, has_windows):
         exact = straight(image, 7)
         errors.append(np.abs(GeodesicSolver(domain).distance(7) - exact).mean() / exact.mean())
     assert errors[1] < 0.5 * errors[0]
-    assert errors[1] < (0.0005 if has_windows else 0.04)
+    assert errors[1] < (0.0005 if has_windows else 0.003)
 
 
 @pytest.mark.filterwarnings("ignore:the metric turns farther")
