@@ -378,19 +378,20 @@ class HopfLax(Facet):
             along = 0.5 * (base + to - sq[_pair(c, self.side[j])])
             far = sqrt(max(to * base - along * along, 0.0) / rest)
             along -= far * rise
+        value: cython.double
         if not along > 0.0:
-            along, far = 0.0, sqrt(to)
+            along, value = 0.0, self.level[i] + sqrt(to)
         elif along < base and rest > 0.0:
             along /= base
-            far += rise * along
-        else:
-            along, far = 1.0, rise + sqrt(sq[_pair(c, self.side[j])])
-        if not self.level[i] + far < least:
+            value = self.level[i] + rise * along + far
+        else:  # also if the distance of corner i is not known, and their difference is infinite
+            along, value = 1.0, self.level[j] + sqrt(sq[_pair(c, self.side[j])])
+        if not value < least:
             return least
         for k in range(3):
             self.share[k] = 0.0
         self.share[i], self.share[j] = 1.0 - along, along
-        return self.level[i] + far
+        return value
 
     def across(self, s: cython.int, c: cython.int, room: cython.double) -> cython.double:
         """The least value if it lies inside the triangle of `side`, else inf; sets `share`.
