@@ -58,9 +58,9 @@ def test_workflows_may_do_no_more_than_they_need(path):
         assert set(extras.split(",")) <= PROJECT["optional-dependencies"].keys()
 
 
-def test_pages_name_tests_and_scripts_that_exist():
+def test_pages_and_ci_name_tests_and_scripts_that_exist():
     sources = "".join(path.read_text(encoding="utf8") for path in (ROOT / "tests").glob("*.py"))
-    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *ROOT.glob(".ci/run")):
         text = "" if page.name == "compat.md" else page.read_text(encoding="utf8")  # it names tests of other packages
         for name in re.findall(r"`(test_\w+)`", text):
             assert f"def {name}(" in sources, f"{page.name}: {name}"
