@@ -356,6 +356,15 @@ def test_borders_of_cells_are_where_distances_are_equal():
     assert wrong[1] > 0.01
     with pytest.raises(ValueError, match=r"distance must have shape \(169,\), one per vertex"):
         plot_labels(mesh, away.argmin(axis=1), distance=[1.0])
+    # Where no site leads there is no label, and distance is infinite: borders beside stay where they are.
+    labels = np.where(mesh.V[:, 0] < 0.9, away.argmin(axis=1), -1)
+    masks = []
+    for given in (away.argmin(axis=1), labels):
+        image = surface_image(plot_labels(mesh, given, distance=np.where(given < 0, np.inf, away.min(axis=1))))
+        left = image[:, : image.shape[1] // 2, :3]
+        masks.append(np.linalg.norm(left - left[-25, 25], axis=2) < 0.05)
+    assert 0 < masks[0].mean() < 1
+    assert np.array_equal(*masks)
 
 
 def test_vertices_without_a_label_are_grey():

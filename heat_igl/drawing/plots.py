@@ -208,7 +208,8 @@ def plot_labels(
         if measured.shape != given.shape:
             raise ValueError(f"distance must have shape {given.shape}, one per vertex, but it has {measured.shape}")
         if not isinstance(mesh, PointCloud):  # whose discs have one label each
-            seen = replace(seen, borders=_borders(seen, given, measured / seen.unit))
+            # Without a label there is no site to be far from.
+            seen = replace(seen, borders=_borders(seen, given, np.where(given < 0, 0.0, measured / seen.unit)))
     return lay_out(seen, [seen.line(curve, mesh) for curve in curves], "plain", table, "", "no label")
 
 

@@ -37,7 +37,7 @@ def surface_image(
     if seen.is_categorical:
         corner = np.argmax(pixels.weights, axis=1)
         if seen.borders is not None:
-            between = np.flatnonzero((np.ptp(values[F], axis=1) > 0)[pixels.face])
+            between = np.flatnonzero((np.ptp(finite[F], axis=1) > 0)[pixels.face])
             cost = np.einsum("pj,pkj->pk", pixels.weights[between], seen.borders[pixels.face[between]])
             corner[between] = np.argmin(cost, axis=1)
         here = finite[F[pixels.face, corner]]
