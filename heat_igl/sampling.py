@@ -100,7 +100,7 @@ def voronoi_cells(solver: Solver | MeshLike, sites: ArrayLike) -> VoronoiCells:
     Parameters
     ----------
     solver : GeodesicSolver, HeatMethodSolver or mesh
-        Of any domain, or whatever `as_mesh` takes, for a near-exact solver.
+        Of any domain, or whatever `as_mesh` takes, for its `GeodesicSolver`.
     sites : (k,) array_like of int
         Distinct vertices.
 
@@ -147,7 +147,7 @@ def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) 
     Parameters
     ----------
     solver : GeodesicSolver, HeatMethodSolver or mesh
-        Of any domain, or whatever `as_mesh` takes, for a near-exact solver; asked k times.
+        Of any domain, or whatever `as_mesh` takes, for its `GeodesicSolver`; asked k times.
     k : int
         Number of vertices.
     start : int, sequence of int, or (n,) mask of bool
@@ -227,7 +227,7 @@ def diameter(solver: Solver | MeshLike, *, start: int = 0, rounds: int = 10) -> 
     Parameters
     ----------
     solver : GeodesicSolver, HeatMethodSolver or mesh
-        Of any domain, or whatever `as_mesh` takes, for a near-exact solver.
+        Of any domain, or whatever `as_mesh` takes, for its `GeodesicSolver`.
     start : int
         Vertex whose component is measured.
     rounds : int
@@ -278,7 +278,7 @@ def distance_matrix(solver: Solver | MeshLike, indices: ArrayLike | None = None)
     Parameters
     ----------
     solver : GeodesicSolver, HeatMethodSolver or mesh
-        Of any domain, or whatever `as_mesh` takes, for a near-exact solver with n vertices; asked k times.
+        Of any domain, or whatever `as_mesh` takes, for its `GeodesicSolver` with n vertices; asked k times.
     indices : (k,) array_like of int, or (n,) mask of bool, optional
         Distinct vertices; all n if not given, which takes 8 n^2 bytes.
 

@@ -178,7 +178,7 @@ class MeshVectorHeatSolver(_OnVertices):
         v_ind : int
             The vertex.
         strategy : {"VectorHeat", "AffineLocal", "AffineAdaptive"}
-            "VectorHeat" is `VectorHeatSolver.log_map`. The two others follow shortest paths: near-exact, as
+            "VectorHeat" is `VectorHeatSolver.log_map`. The two others follow shortest paths and are exact, as
             `heat_igl.log_map`.
         """
         if strategy not in get_args(_LogMapStrategy):

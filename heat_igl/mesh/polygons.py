@@ -54,7 +54,7 @@ class PolygonMesh:
     Notes
     -----
     Polygons need be neither planar nor convex, and may have corners on a straight side, as beside smaller neighbours.
-    On polygons that are not planar, paths and near-exact distances are measured on `triangles`, and heat on the
+    On polygons that are not planar, paths and exact distances are measured on `triangles`, and heat on the
     triangles around a virtual vertex in each polygon, see `PolygonFans`.
 
     Examples
