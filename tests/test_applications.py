@@ -1,85 +1,11 @@
-"""The applications: searches that must agree with Dijkstra's, particles that must agree with scikit-image's."""
+"""Particles, which must agree with scikit-image's, and offsets of a curve."""
 
 import numpy as np
 import pytest
-from surfaces import twice
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.applications import EdgeSearch, particle_length, reconstruct, skeleton, zones_of_influence
-from heat_igl.reference import edge_paths
-
-# A* along edges.
-
-
-@pytest.fixture(scope="module")
-def pairs(bunny):
-    return [(int(a), int(b)) for a, b in np.random.default_rng(0).integers(bunny.n_vertices, size=(40, 2))]
-
-
-@pytest.fixture(scope="module")
-def by_dijkstra(bunny, pairs):
-    search = EdgeSearch(bunny)
-    return [search.path(a, b) for a, b in pairs]
-
-
-@pytest.fixture(scope="module")
-def landmarks(bunny):
-    solver = heat_igl.HeatMethodSolver(bunny)
-    return solver, heat_igl.farthest_points(solver, 8, start=int(np.argmax(solver.distance(0)))).tolist()
-
-
-@pytest.mark.parametrize("landmark_distance", ["along edges", "geodesic", "heat"])
-def test_search_expands_few_and_finds_the_same_lengths(bunny, pairs, by_dijkstra, landmarks, landmark_distance):
-    """The target: at most 0.3 of the vertices that Dijkstra's algorithm expands, with 8 landmarks."""
-    solver, vertices = landmarks
-    if landmark_distance == "along edges":
-        rows = np.stack([edge_paths(bunny, v) for v in vertices])
-    elif landmark_distance == "geodesic":
-        rows = heat_igl.GeodesicSolver(bunny, method="exact").distances(vertices)
-    else:
-        rows = solver.distances(vertices)
-    search = EdgeSearch(bunny, rows)
-    led = [search.path(a, b) for a, b in pairs]
-    for found, expected in zip(led, by_dijkstra, strict=True):
-        assert found.length == pytest.approx(expected.length, rel=1e-12)
-    assert sum(found.n_expanded for found in led) <= 0.3 * sum(found.n_expanded for found in by_dijkstra)
-
-
-def test_dijkstra_against_scipy(bunny, pairs, by_dijkstra):
-    for (a, b), found in list(zip(pairs, by_dijkstra, strict=True))[:3]:
-        assert found.length == pytest.approx(edge_paths(bunny, a)[b], rel=1e-12)
-        assert found.vertices[[0, -1]].tolist() == [a, b]
-        steps = np.sort(np.stack([found.vertices[:-1], found.vertices[1:]], axis=1), axis=1)
-        assert {tuple(step) for step in steps.tolist()} <= {tuple(edge) for edge in bunny.edges.tolist()}
-        along = np.linalg.norm(np.diff(bunny.V[found.vertices], axis=0), axis=1).sum()
-        assert found.length == pytest.approx(along, rel=1e-12)
-
-
-def test_any_landmark_rows_give_shortest_paths():
-    """Rows that are far from a distance still make a true bound, once they are divided by their steepness."""
-    mesh = shapes.torus(12, 40)
-    rng = np.random.default_rng(1)
-    rows = np.stack([edge_paths(mesh, 0) * 3, rng.uniform(0, 5, mesh.n_vertices)])
-    led, plain = EdgeSearch(mesh, rows), EdgeSearch(mesh)
-    assert led.steepness[0] == pytest.approx(3, rel=1e-6)
-    assert led.steepness[1] > 3
-    for a, b in rng.integers(mesh.n_vertices, size=(60, 2)).tolist():
-        assert led.path(a, b).length == pytest.approx(plain.path(a, b).length, rel=1e-12)
-
-
-def test_search_between_components():
-    sphere = shapes.icosphere(1)
-    mesh = twice(sphere)
-    rows = np.stack([edge_paths(mesh, 0), edge_paths(mesh, 50)])
-    for search in (EdgeSearch(mesh, rows), EdgeSearch(mesh)):
-        nowhere = search.path(3, 60)
-        assert nowhere.length == np.inf
-        assert len(nowhere.vertices) == 0
-        assert search.path(44, 60).length == pytest.approx(edge_paths(mesh, 44)[60])
-        here = search.path(7, 7)
-        assert (here.length, here.vertices.tolist(), here.n_expanded) == (0.0, [7], 0)
-
+from heat_igl.applications import particle_length, reconstruct, skeleton, zones_of_influence
 
 # Particles.
 

@@ -320,7 +320,6 @@ CALLS: dict[str, Call] = {
     "plots.plot_field": lambda mesh: plots.plot_field(mesh, PHI, label="phi"),
     "plots.plot_labels": lambda mesh: plots.plot_labels(mesh, LABELS),
     "plots.write_line_drawing": lambda mesh: written(lambda path: plots.write_line_drawing(path, mesh, LOOPS), "a.svg"),
-    "applications.EdgeSearch": lambda mesh: applications.EdgeSearch(mesh).path(0, 40).vertices,
     "reference.edge_paths": lambda mesh: reference.edge_paths(mesh, 0),
     "reference.exact": lambda mesh: reference.exact(mesh, 0),
     "reference.straight_lines": lambda mesh: reference.straight_lines(mesh, 0),

@@ -1,6 +1,4 @@
 from heat_igl.applications.activation import activation_times as activation_times
-from heat_igl.applications.edge_search import EdgePath as EdgePath
-from heat_igl.applications.edge_search import EdgeSearch as EdgeSearch
 from heat_igl.applications.matches import geodesic_errors as geodesic_errors
 from heat_igl.applications.particles import particle_length as particle_length
 from heat_igl.applications.particles import reconstruct as reconstruct
