@@ -45,7 +45,7 @@ MODULES = {
     "heat_igl.steps": "the three steps of the heat method, each alone",
     "heat_igl.operators": "the operators of every kind of domain",
     "heat_igl.linear": "factor once, solve many times",
-    "heat_igl.applications": "activation times, maps on a surface, particles in images",
+    "heat_igl.applications": "activation times, maps on a surface, errors of matches",
 }
 
 

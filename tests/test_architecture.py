@@ -37,7 +37,6 @@ pytest
 rich
 selenium
 skfmm
-skimage
 torch
 typer
 zarr

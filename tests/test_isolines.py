@@ -183,6 +183,25 @@ def test_an_offset_curve_on_a_part():
     assert offset_curves(mesh, solver, 100, 1e6) == []
 
 
+def test_offset_of_a_curve_drawn_on_the_plane():
+    """Around a segment: two sides and two half circles, by a distance that is off by less than an edge on average."""
+    mesh = shapes.grid(60)
+    solver = HeatMethodSolver(mesh)
+    first, last = 20 * 61 + 20, 30 * 61 + 40
+    drawn = heat_igl.shortest_paths(mesh, last, first)[0]
+    length = np.linalg.norm(mesh.V[first] - mesh.V[last])
+    assert drawn.lengths(mesh).sum() == pytest.approx(length, rel=1e-9)
+    (curve,) = offset_curves(mesh, solver, drawn, 0.2)
+    assert curve.is_closed
+    assert curve.lengths(mesh).sum() == pytest.approx(2 * length + 2 * np.pi * 0.2, abs=2 * np.pi / 60)
+    points = curve.positions(mesh)
+    along = np.clip((points - mesh.V[first]) @ (mesh.V[last] - mesh.V[first]) / length**2, 0, 1)[:, None]
+    nearest = mesh.V[first] + along * (mesh.V[last] - mesh.V[first])
+    off = np.abs(np.linalg.norm(points - nearest, axis=1) - 0.2)
+    assert off.mean() < 1 / 60
+    assert off.max() < 2 / 60
+
+
 @pytest.mark.parametrize(
     ("values", "levels", "message"),
     [

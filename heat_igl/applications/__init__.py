@@ -1,4 +1,4 @@
-"""Applications: activation times, maps on a cortex, errors of matches, particles in images.
+"""Applications: activation times, maps on a cortex, errors of matches.
 
 notebooks/10_applications.ipynb shows them. `heat_igl.applications.torch` and `heat_igl.applications.jax`, distance as a
 function that PyTorch and JAX differentiate, are imported by these names alone.

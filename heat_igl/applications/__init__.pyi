@@ -1,9 +1,5 @@
 from heat_igl.applications.activation import activation_times as activation_times
 from heat_igl.applications.matches import geodesic_errors as geodesic_errors
-from heat_igl.applications.particles import particle_length as particle_length
-from heat_igl.applications.particles import reconstruct as reconstruct
-from heat_igl.applications.particles import skeleton as skeleton
-from heat_igl.applications.particles import zones_of_influence as zones_of_influence
 from heat_igl.applications.surface_maps import Statistic as Statistic
 from heat_igl.applications.surface_maps import parcel_distances as parcel_distances
 from heat_igl.applications.surface_maps import smooth as smooth
