@@ -31,7 +31,7 @@ GROUPS = {
         metric_operators fibre_metric activation_times""",
     "Surface maps": "smooth parcel_distances geodesic_errors",
     "Validation": """validate ValidationReport validation.ValidationRow reference
-        validation.closed_forms validation.metrics shapes reference.baselines""",
+        validation.closed_forms validation.metrics shapes""",
     "Pictures": "plots",
     "Many meshes": "cluster",
     "Errors and warnings": """MeshError SourceError AccuracyWarning errors.FactorizationError errors.MissingExtraError

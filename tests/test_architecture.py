@@ -70,7 +70,7 @@ def loaded(statement: str, names: list[str]) -> list[str]:
 
 
 def test_import_loads_what_a_distance_needs_and_little_else():
-    others = [f"heat_igl.{name}" for name in ("cluster", "reference.baselines", "validation", "validation.metrics")]
+    others = [f"heat_igl.{name}" for name in ("cluster", "reference.solvers", "validation", "validation.metrics")]
     assert loaded("import heat_igl, heat_igl.applications", [*EXTRAS, *others, "ssl"]) == []
     assert loaded("from heat_igl import *", [*EXTRAS, "ssl"]) == []
 

@@ -13,7 +13,7 @@ import psutil
 import pytest
 from conftest import relative_error, wheel_path, zoo
 from scipy.spatial import Delaunay
-from surfaces import folded_torus, graph_distance
+from surfaces import folded_torus, graph_distance, twice
 
 from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
@@ -236,6 +236,21 @@ def test_convex_solid_is_the_straight_line():
     np.testing.assert_allclose(closed_forms.convex_solid(mesh, [4, 9]), truth)
     with pytest.raises(ReferenceSolverError, match=r"fills .*% of its convex hull"):
         closed_forms.convex_solid(Mesh(points, mesh.F[:-5]), 0)
+
+
+def test_paths_along_edges_on_a_square():
+    """Diagonals run from (0, 1) to (1, 0): with them k steps do for k by k cells, against them 2 k."""
+    n = 9
+    mesh = shapes.grid(n)
+    column, row = np.rint(mesh.V[:, 0] * n), np.rint(mesh.V[:, 1] * n)
+    from_origin = reference.edge_paths(mesh, 0)
+    np.testing.assert_allclose(from_origin, (row + column) / n, rtol=1e-12, atol=1e-15)
+    assert (reference.edge_paths(mesh, 0, count_edges=True) == row + column).all()
+    back = n - column
+    octile = (np.maximum(back, row) + (np.sqrt(2) - 1) * np.minimum(back, row)) / n
+    np.testing.assert_allclose(reference.edge_paths(mesh, n), octile, rtol=1e-12, atol=1e-15)
+    assert (reference.edge_paths(mesh, n, count_edges=True) == np.maximum(back, row)).all()
+    assert (reference.edge_paths(twice(mesh), n)[mesh.n_vertices :] == np.inf).all()
 
 
 # --- MeshLab and the other heat methods ------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
-"""Distances to compare with: exact ones, those of other people's solvers, bounds, and the paper's other methods.
+"""Distances to compare with: exact ones, those of other people's solvers, and bounds.
 
 Every native solver runs in a child process. `docs/references.md` says how far each one can be trusted. Closed forms are
-in `heat_igl.validation.closed_forms`; the other methods that the paper discusses are in `heat_igl.reference.baselines`.
+in `heat_igl.validation.closed_forms`.
 
 Examples
 --------

@@ -1,4 +1,3 @@
-from heat_igl.reference import baselines as baselines
 from heat_igl.reference.guarded import MEMORY as MEMORY
 from heat_igl.reference.guarded import TIMEOUT as TIMEOUT
 from heat_igl.reference.solvers import EXACT_SOLVERS as EXACT_SOLVERS
