@@ -270,15 +270,6 @@ def transported() -> Picture:
     return plot(mesh, heat_igl.geodesic_distance(mesh, 0), sources=0, style="plain", curves=short)
 
 
-def loops() -> Picture:
-    """Closed geodesics around the handle of a torus."""
-    mesh = shapes.torus(120, 60)
-    dent = 1 + 0.12 * np.sin(3 * np.arctan2(mesh.V[:, 1], mesh.V[:, 0]))
-    mesh = heat_igl.Mesh(mesh.V * dent[:, None], mesh.F)
-    phi = heat_igl.geodesic_distance(mesh, 0)
-    return plot(mesh, phi, style="plain", colormap="Greys", curves=heat_igl.curves.handle_loops(mesh), view=(30, 50))
-
-
 def bezier() -> Picture:
     """A cubic Bezier curve by geodesics, the polygon of its control points, and distance from the mean of these."""
     ball = shapes.icosphere(5)
@@ -350,7 +341,7 @@ ENTRIES = (
     torus, bunny, near, paths, cells, samples, dual, curve, region, offsets, scribble, grown, noisy, tool_path, pieces,
     heat, error, swept, cut_locus, book, tetrahedra, voxels, polygons, cloud, scan, maze,
     travel_time, fibres, directions, checkerboard,
-    straightest, transported, extended, loops, bezier, asked,
+    straightest, transported, extended, bezier, asked,
 )  # fmt: skip
 
 

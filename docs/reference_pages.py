@@ -19,7 +19,7 @@ GROUPS = {
         write_point_cloud write_curves""",
     "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on curve_through edge_curve",
     "Curves": """isolines curves.offset_curves curves.enclosed_areas curves.sublevel_areas shortest_path shortest_paths
-        geodesic_path straighten curves.GeodesicPathSolver curves.handle_loops curves.geodesic_bezier trace_geodesic cut
+        geodesic_path straighten curves.GeodesicPathSolver curves.geodesic_bezier trace_geodesic cut
         curves.CutMesh""",
     "Directions and tangent vectors": """tangent_frames intrinsic.TangentFrames log_map exp_map log_maps_within
         VectorHeatSolver heat.Directions operators.connection_laplacian""",

@@ -112,8 +112,8 @@ def test_names_loaded_on_first_use_are_those_of_their_modules():
     assert heat_igl.validate is validation.validate
     assert heat_igl.validation.metrics.__name__ == "heat_igl.validation.metrics"
     assert set(heat_igl.__all__) <= set(dir(heat_igl))
-    with pytest.raises(AttributeError, match=r"no attribute 'handle_loops': it is in heat_igl\.curves$"):
-        heat_igl.handle_loops  # noqa: B018
+    with pytest.raises(AttributeError, match=r"no attribute 'offset_curves': it is in heat_igl\.curves$"):
+        heat_igl.offset_curves  # noqa: B018
     with pytest.raises(AttributeError, match="module 'heat_igl' has no attribute 'valdate'; did you mean validate"):
         _ = heat_igl.valdate
     with pytest.raises(AttributeError, match=r"did you mean geodesic_distance, or compat\.igl\.exact_geodesic\?$"):

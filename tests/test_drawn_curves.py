@@ -50,7 +50,6 @@ def test_all_makers_of_curves_say_on_which_mesh():
         heat_igl.curve_on(mesh, mesh.V[mesh.edges[5]]),
         heat_igl.isolines(mesh, phi, 1)[0][0],
         heat_igl.geodesic_path(mesh, [0, 50]),
-        heat_igl.curves.handle_loops(mesh)[0],
         heat_igl.mesh.region_boundary(mesh, vertices=phi > 0)[0],
         heat_igl.curves.geodesic_bezier(mesh, [0, 40, 80], 4),
         heat_igl.trace_geodesic(mesh, 0, [1.0, 0.0], 0.5),

@@ -1,4 +1,4 @@
-"""Geodesics by class: curves straightened, paths and loops through waypoints, loops around handles."""
+"""Geodesics by class: curves straightened, paths and loops through waypoints."""
 
 import pickle
 from concurrent.futures import ThreadPoolExecutor
@@ -21,7 +21,7 @@ from heat_igl import (
     shapes,
     straighten,
 )
-from heat_igl.curves import GeodesicPathSolver, handle_loops
+from heat_igl.curves import GeodesicPathSolver
 
 
 def length(mesh: Mesh, curve: SurfaceCurve) -> float:
@@ -198,7 +198,7 @@ def test_straightened_curves_are_locally_shortest_and_not_longer(n_stops, cow):
 def test_straight_curves_stay():
     mesh = perturbed(shapes.torus(12, 24))
     solver = GeodesicPathSolver(mesh)
-    for curve in (solver.path([3, 200]), *handle_loops(mesh)):
+    for curve in (solver.path([3, 200]), solver.path([0, 8, 16], closed=True)):
         again = solver.straighten(curve)
         assert length(mesh, again) == pytest.approx(length(mesh, curve), rel=1e-12)
 
@@ -221,14 +221,8 @@ def test_curves_in_faces_keep_their_ends(cow):
 
 
 @pytest.mark.parametrize("holes", [1, 2, 3])
-def test_handle_loops_generate_and_straightening_keeps_classes(holes):
+def test_straightening_keeps_the_class_of_a_loop(holes):
     mesh = handlebody(holes)
-    loops = handle_loops(mesh)
-    assert len(loops) == 2 * holes
-    crossed = np.array([classes(mesh, loop, holes) for loop in loops])
-    assert abs(round(float(np.linalg.det(crossed)))) == 1
-    for loop in loops:
-        assert_locally_shortest(mesh, loop)
     rng = np.random.default_rng(holes)
     kept = 0
     for _ in range(12):
@@ -240,17 +234,6 @@ def test_handle_loops_generate_and_straightening_keeps_classes(holes):
             np.testing.assert_array_equal(classes(mesh, straight, holes), before)
             assert_locally_shortest(mesh, straight)
     assert kept > 2
-
-
-def test_handle_loops_without_handles_and_with_boundary():
-    assert handle_loops(shapes.icosphere(2)) == []
-    assert handle_loops(shapes.grid(4)) == []
-    assert handle_loops(shapes.cylinder(12, 6)) == []
-    torus = shapes.torus(12, 24)
-    one_hole = Mesh(torus.V, torus.F[(torus.F != 40).all(axis=1)])
-    assert len(handle_loops(one_hole)) == 2
-    both = twice(torus)
-    assert len(handle_loops(both)) == 4
 
 
 def test_loops_of_known_length():
@@ -400,9 +383,7 @@ def test_meshes_without_paths_are_told_apart():
     with pytest.raises(MeshError, match="tetrahedral"):
         geodesic_path(box, [0, 1])
     with pytest.raises(MeshError, match="tetrahedral"):
-        handle_loops(box)
-    with pytest.raises(MeshError, match="not one fan"):
-        handle_loops(shapes.book(3, 2))
+        straighten(box, edge_curve(shapes.grid(2), [0, 1]))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

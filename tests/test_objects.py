@@ -286,7 +286,6 @@ CALLS: dict[str, Call] = {
     "geodesic_distance": lambda mesh: heat_igl.geodesic_distance(mesh, 0),
     "geodesic_errors": lambda mesh: heat_igl.geodesic_errors(mesh, [0, 5], [3, 5]),
     "geodesic_path": lambda mesh: heat_igl.geodesic_path(mesh, [0, 40]).positions(MESH),
-    "handle_loops": lambda mesh: [len(loop) for loop in heat_igl.curves.handle_loops(mesh)],
     "isolines": lambda mesh: heat_igl.isolines(mesh, PHI, 0.3)[0][0].positions(MESH),
     "karcher_mean": lambda mesh: heat_igl.karcher_mean(mesh, [0, 3, 21]).barycentric,
     "log_map": lambda mesh: heat_igl.log_map(mesh, 0),
