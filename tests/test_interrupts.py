@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from heat_igl import GeodesicSolver, distances_within, shapes, write_distances_within
-from heat_igl.runtime.threads import pool
+from heat_igl.runtime.threads import Pool
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer signals on this system")
 
@@ -65,7 +65,7 @@ def test_loops_of_an_abandoned_pool_end():
     """A search on another thread, which no signal reaches, does not find what it would have found."""
     mesh = shapes.icosphere(6)
     solver = GeodesicSolver(mesh, method="exact")
-    workers = pool(1)
+    workers = Pool(1)
     begun = threading.Event()
 
     def search():

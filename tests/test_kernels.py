@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from heat_igl import kernels, shapes
 from heat_igl.kernels.ordering import ascending
 from heat_igl.linear import factorize, multifrontal
-from heat_igl.linear.dissection import dissect
+from heat_igl.linear.multifrontal import dissect
 from heat_igl.operators import operators
 
 

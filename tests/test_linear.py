@@ -14,8 +14,7 @@ from heat_igl import HeatMethodSolver, Mesh, shapes
 from heat_igl.errors import FactorizationError
 from heat_igl.linear import analyse, backends, factorize
 from heat_igl.linear.backends import factor_bytes
-from heat_igl.linear.dissection import dissect
-from heat_igl.linear.multifrontal import MultifrontalAnalysis
+from heat_igl.linear.multifrontal import MultifrontalAnalysis, dissect
 from heat_igl.operators import operators
 from heat_igl.runtime import PeakMemory, threads
 from heat_igl.validation.zoo import SHAPES
@@ -200,10 +199,10 @@ def test_threads_divide_the_processors(monkeypatch):
     monkeypatch.delenv("HEAT_IGL_NUM_THREADS", raising=False)
 
     def inside():
-        with threads.pool(3) as workers:
+        with threads.Pool(3) as workers:
             return threads.n_threads(), workers.submit(threads.n_threads).result()
 
-    with threads.pool(2) as workers:
+    with threads.Pool(2) as workers:
         assert workers.submit(inside).result() == (4, 1)
     assert threads.n_threads() == 8
 

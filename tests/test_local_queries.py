@@ -26,7 +26,6 @@ from heat_igl.typing import FloatArray
 from heat_igl.windows import (
     blocks_within,
     local,
-    local_searches,
     read_distances_within,
     within_store,
     write_distances_within,
@@ -149,9 +148,9 @@ def test_threads_and_room_change_nothing(monkeypatch):
     mesh = bumpy()
     monkeypatch.setenv("HEAT_IGL_NUM_THREADS", "1")
     alone = distances_within(mesh, 0.7), *nearest_vertices(mesh, 20)
-    monkeypatch.setattr(local_searches, "n_threads", lambda: 4)
-    monkeypatch.setattr(local_searches, "CHUNK", 5)
-    monkeypatch.setattr(local_searches, "_ROOM", 3)  # less than one source needs
+    monkeypatch.setattr("heat_igl.runtime.threads.n_threads", lambda: 4)
+    monkeypatch.setattr(local, "CHUNK", 5)
+    monkeypatch.setattr(local, "_ROOM", 3)  # less than one source needs
     together = distances_within(mesh, 0.7), *nearest_vertices(mesh, 20)
     np.testing.assert_array_equal(alone[0].toarray(), together[0].toarray())
     for one, other in zip(alone[1:], together[1:], strict=True):
@@ -177,14 +176,14 @@ def test_what_is_not_reached_is_padded():
 def test_a_search_clears_what_it_wrote(monkeypatch):
     """Otherwise the next search on the same arrays would go wrong, or cost more than what it touches."""
     mesh, kept = bumpy(), []
-    original = local_searches.Workspace
+    original = local.Workspace
 
     class Kept(original):
         def __init__(self, *arguments):
             super().__init__(*arguments)
             kept.append(self)
 
-    monkeypatch.setattr(local_searches, "Workspace", Kept)
+    monkeypatch.setattr(local, "Workspace", Kept)
     distances_within(mesh, 0.5)
     nearest_vertices(mesh, 7)
     pair_distances(mesh, [[0, 300], [5, 9]])
@@ -262,18 +261,18 @@ def test_radii_counts_and_pairs_that_make_no_sense_are_refused():
 
 def test_an_interrupt_ends_all_threads(monkeypatch):
     """What waits is not begun any more, neither by the thread that was interrupted nor by others."""
-    mesh, within, begun = shapes.icosphere(2), local_searches.within, []
+    mesh, within, begun = shapes.icosphere(2), local.Workspace.within, []
 
-    def interrupted_once(work, part, radius):
-        begun.append(part.start)
+    def interrupted_once(work, sources, radius):
+        begun.append(sources)
         if len(begun) == 1:
             raise KeyboardInterrupt
         time.sleep(0.01)
-        return within(work, part, radius)
+        return within(work, sources, radius)
 
-    monkeypatch.setattr(local_searches, "within", interrupted_once)
-    monkeypatch.setattr(local_searches, "CHUNK", 1)
-    monkeypatch.setattr(local_searches, "n_threads", lambda: 2)
+    monkeypatch.setattr(local.Workspace, "within", interrupted_once)
+    monkeypatch.setattr(local, "CHUNK", 1)
+    monkeypatch.setattr("heat_igl.runtime.threads.n_threads", lambda: 2)
     with pytest.raises(KeyboardInterrupt):
         distances_within(mesh, 0.5)
     assert len(begun) < 10

@@ -17,7 +17,7 @@ from heat_igl.operators import (
     operators,
     point_cloud_operators,
 )
-from heat_igl.operators.simplices import cotangent_laplacian
+from heat_igl.operators.triangles import cotangent_laplacian
 
 
 def bad_sphere() -> Mesh:

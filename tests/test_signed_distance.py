@@ -24,7 +24,7 @@ from heat_igl import (
     isolines,
     shapes,
 )
-from heat_igl.heat import normal_integration
+from heat_igl.heat import signed_heat
 from heat_igl.mesh import region_boundary
 from heat_igl.sources import oriented_set
 
@@ -313,7 +313,7 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     solver = SignedHeatSolver(mesh)
     domain, integration = solver.operators, solver._integration
     pieces = integration._pieces(oriented_set(curves, mesh))
-    on_curves = normal_integration._OnCurves(domain, mesh.F, pieces)
+    on_curves = signed_heat._OnCurves(domain, mesh.F, pieces)
     values = np.sin(5 * pieces.barycentric[:, 0] + pieces.faces)
     h = domain.mean_edge_lengths[on_curves.component]
     rows = np.repeat(np.arange(len(values)), 3)
@@ -322,7 +322,7 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     truth = spsolve(sp.csc_array(-domain.L + weighted @ B), weighted @ values)
     off = []
     for steps in (3, 200):
-        monkeypatch.setattr(normal_integration, "_SMOOTH_STEPS", steps)
+        monkeypatch.setattr(signed_heat, "_SMOOTH_STEPS", steps)
         found = integration._levels._smooth(values, on_curves)
         off.append(np.abs(found - truth).max() / np.abs(truth).max())
     assert off[1] < 1e-9

@@ -13,7 +13,7 @@ from heat_igl.mesh import connectivity
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import source_set
 from heat_igl.sweep import SweepEngine
-from heat_igl.sweep.spokes import numbered_spokes
+from heat_igl.sweep.sweep import numbered_spokes
 from heat_igl.validation import zoo
 from heat_igl.windows import MeshTriangles
 from heat_igl.windows.bounds import Bounds

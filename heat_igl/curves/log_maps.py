@@ -16,7 +16,8 @@ from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simpl
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.windows import PathDirections, WindowWays, contradicted, in_circle, local_searches, vectors_from
+from heat_igl.windows import PathDirections, WindowWays, contradicted, in_circle, vectors_from
+from heat_igl.windows.local import search_each
 from heat_igl.windows.tables import MARGIN, Tables, from_triangulation
 
 LogMapMethod = Literal["exact", "vector-heat"]
@@ -207,13 +208,9 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
 
 def _paths(tables: Tables, V: FloatArray, chosen: IntArray, radius: float) -> tuple[IntArray, WindowWays, FloatArray]:
     """Of paths from vertices (k,), source after source: the ends (k + 1,), how they run, and their lengths."""
-    number = tables.number[chosen]
-    order = np.argsort(number, kind="stable")
     limit = float(tables.scaled(radius))
-    parts = local_searches.in_chunks(
-        tables, number[order], lambda work, part: local_searches.within(work, part, limit), V, directed=True
-    )
-    counts, vertex, distance, way, line, is_wrong = (np.concatenate(column) for column in zip(*parts, strict=True))
+    order, near = search_each(tables, chosen, V, lambda work, numbers, _: work.within(numbers, limit), directed=True)
+    counts, vertex, distance, way, line, is_wrong = near
     if is_wrong.any():
         raise contradicted(f"from vertex {chosen[order[np.argmax(is_wrong)]]}")
     # In the order of the sources, and of each in the order of the vertices.
@@ -232,4 +229,4 @@ def _paths(tables: Tables, V: FloatArray, chosen: IntArray, radius: float) -> tu
         tables.unscaled(line[:, 2]),
     )
     indptr = np.append(0, np.cumsum(np.bincount(source, minlength=len(chosen))))
-    return indptr, ways, tables.unscaled(distance[sort])
+    return indptr, ways, distance[sort]

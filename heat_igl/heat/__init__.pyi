@@ -2,14 +2,14 @@ from heat_igl.heat.batches import LabelledDistance as LabelledDistance
 from heat_igl.heat.checking import AnswerCheck as AnswerCheck
 from heat_igl.heat.checking import Comparison as Comparison
 from heat_igl.heat.directions import Directions as Directions
-from heat_igl.heat.normal_integration import Level as Level
+from heat_igl.heat.parts import Diagnostics as Diagnostics
+from heat_igl.heat.parts import HeatSolution as HeatSolution
 from heat_igl.heat.parts import Magnitude as Magnitude
 from heat_igl.heat.parts import SolverOptions as SolverOptions
+from heat_igl.heat.signed_heat import Level as Level
 from heat_igl.heat.signed_heat import SignedHeatSolver as SignedHeatSolver
 from heat_igl.heat.signed_volumes import VoxelBox as VoxelBox
 from heat_igl.heat.signed_volumes import volume_signed_distance as volume_signed_distance
-from heat_igl.heat.solution import Diagnostics as Diagnostics
-from heat_igl.heat.solution import HeatSolution as HeatSolution
 from heat_igl.heat.solver import HeatMethodSolver as HeatMethodSolver
 from heat_igl.heat.vector_heat import VectorHeatSolver as VectorHeatSolver
 from heat_igl.heat.vector_heat import VectorMethod as VectorMethod

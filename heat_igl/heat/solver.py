@@ -11,8 +11,7 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning, checked_cutoff, names_guessed
 from heat_igl.heat.batches import BatchedSolver, LabelledDistance
 from heat_igl.heat.checking import AnswerCheck
-from heat_igl.heat.parts import Magnitude, SolverOptions, SolverParts, prepare, prepare_mesh
-from heat_igl.heat.solution import Diagnostics, HeatSolution
+from heat_igl.heat.parts import Diagnostics, HeatSolution, Magnitude, SolverOptions, SolverParts, prepare, prepare_mesh
 from heat_igl.heat.source_terms import Seeds, SourceTerm, drop_overtaken, right_hand_side, warmest_sources
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh

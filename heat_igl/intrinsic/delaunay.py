@@ -6,8 +6,7 @@ import numpy as np
 
 from heat_igl.intrinsic.gluing import oriented
 from heat_igl.intrinsic.half_edges import HalfEdges
-from heat_igl.intrinsic.history import Flipped, Refined
-from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
+from heat_igl.intrinsic.triangulation import Flipped, IntrinsicTriangulation, Refined
 from heat_igl.kernels.mesh import carrying, refinement
 from heat_igl.kernels.mesh.flipping import rounds
 from heat_igl.mesh import DELAUNAY_TOLERANCE

@@ -16,8 +16,15 @@ import numpy as np
 
 from heat_igl.errors import MeshError, real_numbers
 from heat_igl.intrinsic.half_edges import mollify
-from heat_igl.intrinsic.history import BACK_CORNERS, Covered, Merged, Turned
-from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
+from heat_igl.intrinsic.triangulation import (
+    BACK_CORNERS,
+    Covered,
+    IntrinsicTriangulation,
+    Merged,
+    Turned,
+    next_half_edge,
+    previous_half_edge,
+)
 from heat_igl.mesh import Mesh, connectivity
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 

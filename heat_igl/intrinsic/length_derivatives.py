@@ -15,9 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.intrinsic.history import Flipped, Merged, Turned
-from heat_igl.intrinsic.layout import apex
-from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, sides_from
+from heat_igl.intrinsic.triangulation import Flipped, IntrinsicTriangulation, Merged, Turned, apex, sides_from
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 

@@ -12,9 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic.history import Flipped
-from heat_igl.intrinsic.layout import apex, corner_angles
-from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, sides_from
+from heat_igl.intrinsic.triangulation import (
+    Flipped,
+    IntrinsicTriangulation,
+    apex,
+    corner_angles,
+    next_half_edge,
+    sides_from,
+)
 from heat_igl.kernels.mesh.polar_angles import polar_angles as kernel
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 

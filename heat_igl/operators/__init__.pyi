@@ -17,13 +17,13 @@ from heat_igl.operators.metric import speed_operators as speed_operators
 from heat_igl.operators.metric_derivatives import MetricSides as MetricSides
 from heat_igl.operators.metric_derivatives import SideLengths as SideLengths
 from heat_igl.operators.metric_simplices import MetricSimplices as MetricSimplices
-from heat_igl.operators.point_clouds import point_cloud_operators as point_cloud_operators
-from heat_igl.operators.simplices import cotan_operators as cotan_operators
 from heat_igl.operators.suitability import is_rough_or_narrow as is_rough_or_narrow
 from heat_igl.operators.suitability import share_on_large_triangles as share_on_large_triangles
+from heat_igl.operators.triangles import cotan_operators as cotan_operators
 from heat_igl.operators.triangles import edge_length_operators as edge_length_operators
 from heat_igl.operators.triangles import fan_operators as fan_operators
 from heat_igl.operators.triangles import intrinsic_operators as intrinsic_operators
 from heat_igl.operators.triangles import operators as operators
+from heat_igl.operators.triangles import point_cloud_operators as point_cloud_operators
 from heat_igl.operators.triangles import tufted_operators as tufted_operators
 from heat_igl.operators.triangles import unfolding_surface as unfolding_surface

@@ -16,8 +16,7 @@ from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
 from heat_igl.operators.metric_simplices import MetricSimplices
-from heat_igl.operators.simplices import check_measures, longest_sides
-from heat_igl.operators.triangles import edge_length_operators, intrinsic_operators
+from heat_igl.operators.triangles import check_measures, edge_length_operators, intrinsic_operators, longest_sides
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken

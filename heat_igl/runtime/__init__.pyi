@@ -11,6 +11,7 @@ from heat_igl.runtime.notices import progress_bar as progress_bar
 from heat_igl.runtime.notices import rich_progress as rich_progress
 from heat_igl.runtime.notices import warn_caller as warn_caller
 from heat_igl.runtime.threads import WORKING_MEMORY as WORKING_MEMORY
+from heat_igl.runtime.threads import Pool as Pool
 from heat_igl.runtime.threads import block_size as block_size
 from heat_igl.runtime.threads import both as both
 from heat_igl.runtime.threads import float_type as float_type
@@ -18,6 +19,5 @@ from heat_igl.runtime.threads import in_blocks as in_blocks
 from heat_igl.runtime.threads import in_order as in_order
 from heat_igl.runtime.threads import n_threads as n_threads
 from heat_igl.runtime.threads import over_rows as over_rows
-from heat_igl.runtime.threads import pool as pool
 from heat_igl.runtime.threads import row_writer as row_writer
 from heat_igl.runtime.threads import side_by_side as side_by_side

@@ -53,7 +53,7 @@ def n_threads() -> int:
     return max(1, available // _among())
 
 
-class _Pool(ThreadPoolExecutor):
+class Pool(ThreadPoolExecutor):
     """A pool of k threads, among which the processors of the calling thread are divided (see `n_threads`).
 
     A ``with`` block waits for them at its end; it abandons them after an exception, such as that of Ctrl-C.
@@ -81,11 +81,6 @@ class _Pool(ThreadPoolExecutor):
         self.shutdown(wait=False, cancel_futures=True)
 
 
-def pool(k: int) -> _Pool:
-    """A pool of k threads, among which the processors of the calling thread are divided (see `n_threads`)."""
-    return _Pool(k)
-
-
 def _among() -> int:
     return int(getattr(_divided, "among", 1))
 
@@ -98,7 +93,7 @@ def side_by_side(work: Callable[[Item], Any], items: Sequence[Item]) -> None:
     if len(items) == 1:
         work(items[0])
         return
-    with pool(len(items)) as workers:
+    with Pool(len(items)) as workers:
         others = [workers.submit(work, item) for item in items[1:]]
         work(items[0])
         for other in others:
@@ -114,18 +109,18 @@ def over_rows(work: Callable[[slice], Result], n: int, most: int) -> list[Result
     results: dict[int, Result] = {}
 
     def work_off(_: int) -> None:
-        while True:
+        while waiting:
             try:
                 at = waiting.popleft()
-            except IndexError:
+            except IndexError:  # another thread took the last one
                 return
-            results[at] = work(slices[at])
+            try:
+                results[at] = work(slices[at])
+            except BaseException:
+                waiting.clear()  # for a Ctrl-C, other threads end with the rows at hand
+                raise
 
-    try:
-        side_by_side(work_off, range(max(min(threads, len(slices)), 1)))
-    except BaseException:
-        waiting.clear()
-        raise
+    side_by_side(work_off, range(max(min(threads, len(slices)), 1)))
     return [results[at] for at in range(len(slices))]
 
 
@@ -133,7 +128,7 @@ def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[Firs
     """The results of two calls, the second of them on another thread if there is one."""
     if n_threads() == 1:
         return first(), second()
-    with pool(2) as workers:
+    with Pool(2) as workers:
         other = workers.submit(second)
         return first(), other.result()
 
@@ -182,7 +177,7 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: i
     failure: Exception | None = None
     pending: deque[Future[Result]] = deque()
     iterator = iter(items)
-    workers = pool(n_threads)
+    workers = Pool(n_threads)
     try:
         while True:
             while failure is None and len(pending) < n_threads:

@@ -9,8 +9,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import PolarAngles, carried_angles, lay_out, polar_angles
-from heat_igl.intrinsic.history import Flipped
-from heat_igl.intrinsic.triangulation import next_half_edge, previous_half_edge
+from heat_igl.intrinsic.triangulation import Flipped, next_half_edge, previous_half_edge
 from heat_igl.mesh import ON_SIDE, SurfacePoints
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Surface

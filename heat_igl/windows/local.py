@@ -1,25 +1,40 @@
-"""Exact distances between vertices that are near each other, each query at the cost of what it touches."""
+"""Exact distances between vertices that are near each other, each query at the cost of what it touches.
+
+Searches by windows from one vertex after the other run on all processors. Each ends when the question is answered.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, SourceError, names_guessed, positive, shown
+from heat_igl.kernels.mesh import checking
+from heat_igl.kernels.signals import raise_caught
+from heat_igl.kernels.windows import windows
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
-from heat_igl.runtime import TimeLeft, available_memory, n_threads
+from heat_igl.runtime import TimeLeft, available_memory, n_threads, over_rows
 from heat_igl.sources import Sources, named_vertices
-from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.windows import local_searches
-from heat_igl.windows.engine import distances_instead
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.windows.engine import ROUNDING, distances_instead
+from heat_igl.windows.exact import TOLERANCE, Found, Leaving
 from heat_igl.windows.tables import Tables, from_mesh
 
 # Bytes that each distance of a sparse array takes while the array is put together.
 _BYTES = 48
 # Where more are asked for than the mesh has vertices, the most entries of the result.
 _MOST_PADDED = 2**28
+#: The most sources that a thread takes at a time.
+CHUNK = 64
+# Initial number of results that a thread has room for.
+_ROOM = 2**16
+_NO_VERTICES = np.empty(0, np.int32)
+_NONE_WRONG = np.empty(0, bool)
+_NO_WAYS, _NO_LINES = np.empty((0, 3), np.int32), np.empty((0, 3))
 
 
 @names_guessed
@@ -93,7 +108,7 @@ def blocks_within(
     triangles, part = _triangles(mesh)
     chosen = _chosen(sources, triangles, part)
     tables = from_mesh(triangles, int(chosen[0]))
-    least = local_searches.CHUNK * n_threads()
+    least = CHUNK * n_threads()
     start, rows = 0, least
     while start < len(chosen):
         block = _rows_within(triangles, tables, chosen[start : start + rows], limit)
@@ -103,21 +118,11 @@ def blocks_within(
 
 
 def _rows_within(triangles: Mesh, tables: Tables, chosen: IntArray, limit: float) -> sp.csr_array:
-    number = tables.number[chosen]
-    order = np.argsort(number, kind="stable")
-    count = _Count(len(chosen), available_memory() / _BYTES)
-    parts = local_searches.in_chunks(
-        tables,
-        number[order],
-        lambda work, part: count(local_searches.within(work, part, float(tables.scaled(limit)))),
-        triangles.V,
-    )
-    counts = np.concatenate([part.counts for part in parts])
-    ends = np.concatenate([[0], np.cumsum(counts)])
-    columns = np.concatenate([part.vertex for part in parts])
-    values = tables.unscaled(np.concatenate([part.distance for part in parts]))
-    found = sp.csr_array((values, columns, ends), shape=(len(chosen), tables.n))
-    wrong = _wrong(parts)
+    count, radius = _Count(len(chosen), available_memory() / _BYTES), float(tables.scaled(limit))
+    order, near = search_each(tables, chosen, triangles.V, lambda work, numbers, _: count(work.within(numbers, radius)))
+    ends = np.concatenate([[0], np.cumsum(near.counts)])
+    found = sp.csr_array((near.distance, near.vertex, ends), shape=(len(chosen), tables.n))
+    wrong = np.flatnonzero(near.is_wrong)
     if len(wrong):
         rows = distances_instead(triangles, chosen[order[wrong]])
         i, j = np.nonzero(rows <= limit)
@@ -177,15 +182,10 @@ def nearest_vertices(
     # More than all vertices cannot be found.
     wanted = min(int(k), triangles.n_vertices)
     indices, distances = _unfilled(len(chosen), int(k), triangles.n_vertices)
-    number = tables.number[chosen]
-    order = np.argsort(number, kind="stable")
-    parts = local_searches.in_chunks(
-        tables, number[order], lambda work, part: local_searches.nearest(work, part, wanted), triangles.V
-    )
-    i, j = np.nonzero(np.arange(int(k)) < np.concatenate([part.counts for part in parts])[:, None])
-    indices[order[i], j] = np.concatenate([part.vertex for part in parts])
-    distances[order[i], j] = tables.unscaled(np.concatenate([part.distance for part in parts]))
-    wrong = order[_wrong(parts)]
+    order, near = search_each(tables, chosen, triangles.V, lambda work, numbers, _: work.nearest(numbers, wanted))
+    i, j = np.nonzero(np.arange(int(k)) < near.counts[:, None])
+    indices[order[i], j], distances[order[i], j] = near.vertex, near.distance
+    wrong = order[near.is_wrong]
     if len(wrong):
         rows = distances_instead(triangles, chosen[wrong])
         nearest = np.argsort(rows, axis=1, kind="stable")[:, :wanted]
@@ -258,22 +258,18 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None
     sources, begin = np.unique(tables.number[first[joined]], return_index=True)
     ends = np.append(begin, len(joined))
     goals = tables.number[second[joined]]
-    parts = local_searches.in_chunks(
-        tables,
-        sources,
-        lambda work, part: local_searches.to_goals(work, part, goals[ends[part.start] : ends[part.stop]], ends),
-        triangles.V,
-    )
-    distance[joined] = tables.unscaled(np.concatenate([part.distance for part in parts]))
-    wrong = tables.old_vertex[sources[_wrong(parts)]]
+
+    def to_goals(work: Workspace, numbers: AnyArray, rows: slice) -> Near:
+        first = ends[rows.start : rows.stop + 1]
+        return work.to_goals(numbers, goals[first[0] : first[-1]], first - first[0])
+
+    asked = tables.old_vertex[sources]
+    _, near = search_each(tables, asked, triangles.V, to_goals)
+    distance[joined] = near.distance
+    wrong = asked[near.is_wrong]
     for source, row in zip(wrong, distances_instead(triangles, wrong), strict=True):
         distance[first == source] = row[second[first == source]]
     return distance
-
-
-def _wrong(parts: list[local_searches.Near]) -> IntArray:
-    """The sources, in the order that they were asked in, whose answers contradict themselves."""
-    return np.flatnonzero(np.concatenate([part.is_wrong for part in parts]))
 
 
 class _Count:
@@ -284,7 +280,7 @@ class _Count:
         self._sources = self._found = 0
         self._left = TimeLeft("sources are done", k)
 
-    def __call__(self, near: local_searches.Near) -> local_searches.Near:
+    def __call__(self, near: Near) -> Near:
         self._sources += len(near.counts)
         self._found += len(near.vertex)
         expected = self._found / self._sources * self._k
@@ -341,3 +337,140 @@ def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:
             f"the mesh has {n} vertices, so indices run from 0 to {n - 1}"
         )
     return np.asarray(array, np.int64)
+
+
+class Near(NamedTuple):
+    """The number of vertices found from each source, and the vertices and their distances, source after source.
+
+    From a directed search, `way` and `line` (r, 3) say how the path to each runs, see `windows.search_each`.
+    What was found from a source `is_wrong` if it contradicts straight lines or the lengths of edges.
+    """
+
+    counts: IntArray
+    vertex: AnyArray
+    distance: FloatArray
+    way: AnyArray = _NO_WAYS
+    line: FloatArray = _NO_LINES
+    is_wrong: BoolArray = _NONE_WRONG
+
+    @classmethod
+    def joined(cls, parts: list[Near]) -> Near:
+        """The answers of several searches, one after the other."""
+        return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+class Workspace:
+    """The arrays that searches of one thread write. Every search leaves them in their initial state.
+
+    With `directed`, searches find in which directions paths leave; the faces must be oriented alike.
+    """
+
+    def __init__(self, tables: Tables, position: FloatArray, directed: bool = False) -> None:
+        self._tables, self._is_directed = tables, directed
+        self._found, self._position, self._scratch = Found.of(tables.n, tables.n), position, np.full(tables.n, np.inf)
+        leaving = Leaving.of(tables.n) if directed else None
+        self._front = windows.Front(tables, self._found, TOLERANCE, leaving, position.ravel())
+
+    def checked(self, sources: AnyArray, near: Near, limit: FloatArray | float) -> Near:
+        """The answers with those that are wrong marked; each holds all vertices up to its limit."""
+        tables, limits = self._tables, np.broadcast_to(limit, len(near.counts)).astype(np.float64)
+        found = tables.number[near.vertex]
+        answers = sources, near.counts, found, near.distance, limits
+        wrong = checking.wrong_rows(tables, self._position, *answers, self._scratch, ROUNDING)
+        return near._replace(is_wrong=wrong)
+
+    def search(
+        self,
+        sources: AnyArray,
+        found: AnyArray,
+        value: FloatArray,
+        *,
+        goals: AnyArray = _NO_VERTICES,
+        first_goal: AnyArray | None = None,
+        cutoff: float = np.inf,
+        n_nearest: int = 0,
+        way: AnyArray = _NO_WAYS,
+        line: FloatArray = _NO_LINES,
+    ) -> IntArray:
+        """Search from each of `sources`; returns the end of the results of each source whose results fitted."""
+        ends = np.zeros(len(sources), np.int64)
+        n_done = windows.search_each(
+            self._front,
+            sources,
+            goals,
+            np.zeros(len(sources) + 1, np.int64) if first_goal is None else first_goal,
+            cutoff,
+            n_nearest,
+            self._tables.old_vertex,
+            found,
+            value,
+            ends,
+            way,
+            line,
+        )
+        if n_done < 0:
+            raise_caught()
+            raise MemoryError("the windows of the exact distance do not fit into memory")
+        return ends[:n_done]
+
+    def within(self, sources: AnyArray, radius: float) -> Near:
+        """All vertices up to a radius; the arrays are doubled until the results of the next source fit."""
+        rows, done, room = [], 0, _ROOM
+        while done < len(sources):
+            found, value = np.empty(room, np.int32), np.empty(room)
+            way, line = np.empty((room, 3), np.int32), np.empty((room, 3))
+            if not self._is_directed:
+                way, line = _NO_WAYS, _NO_LINES
+            ends = self.search(sources[done:], found, value, cutoff=radius, way=way, line=line)
+            if not len(ends):
+                room *= 2
+                continue
+            done += len(ends)
+            n = ends[-1]
+            found, value, way, line = found[:n].copy(), value[:n].copy(), way[:n].copy(), line[:n].copy()
+            rows.append(Near(np.diff(ends, prepend=0), found, value, way, line))
+        return self.checked(sources, Near.joined(rows), radius)
+
+    def nearest(self, sources: AnyArray, k: int) -> Near:
+        """The k nearest vertices of each source."""
+        found, value = np.empty(k * len(sources), np.int32), np.empty(k * len(sources))
+        ends = self.search(sources, found, value, n_nearest=k)
+        near = Near(np.diff(ends, prepend=0), found[: ends[-1]], value[: ends[-1]])
+        return self.checked(sources, near, np.where(near.counts < k, np.inf, value[ends - 1]))
+
+    def to_goals(self, sources: AnyArray, goals: AnyArray, first: IntArray) -> Near:
+        """Distances of the goals (g,) of each source; those of source i are ``first[i]`` to ``first[i + 1]``."""
+        value = np.empty(len(goals))
+        self.search(sources, np.empty(1, np.int32), value, goals=goals, first_goal=first)
+        return self.checked(sources, Near(np.diff(first), self._tables.old_vertex[goals], value), 0.0)
+
+
+def search_each(
+    tables: Tables,
+    vertices: IntArray,
+    V: FloatArray,
+    search: Callable[[Workspace, AnyArray, slice], Near],
+    directed: bool = False,
+) -> tuple[IntArray, Near]:
+    """What is found from each of some vertices (k,): the order in which they were asked, and the answers in this order.
+
+    `search` is called on all processors, for some sources at a time, by their numbers in the tables, and their places
+    in the order. In ascending order, a search often finds its data in the processor's cache. V are the positions (n, 3)
+    of the vertices.
+    """
+    number = tables.number[vertices]
+    order = np.argsort(number, kind="stable")
+    asked, position = number[order], np.ascontiguousarray(tables.scaled(V[tables.old_vertex]))
+    spare: deque[Workspace] = deque()
+
+    def run(rows: slice) -> Near:
+        try:
+            work = spare.pop()
+        except IndexError:  # the first of a thread
+            work = Workspace(tables, position, directed)
+        found = search(work, asked[rows], rows)
+        spare.append(work)
+        return found
+
+    near = Near.joined(over_rows(run, len(asked), CHUNK))
+    return order, near._replace(distance=tables.unscaled(near.distance))

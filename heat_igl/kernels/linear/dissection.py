@@ -1,4 +1,4 @@
-"""Nested dissection of a graph by sweeps; the method is explained in `heat_igl.linear.dissection`.
+"""Nested dissection of a graph by sweeps; the method is explained in `heat_igl.linear.multifrontal`.
 
 A graph is given as scipy stores a symmetric matrix: the neighbours of v are ``neighbours[ends[v]:ends[v + 1]]``.
 """

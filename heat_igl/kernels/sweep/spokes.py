@@ -15,7 +15,7 @@ _CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("angle", "f8")])
 @cython.final
 @cython.cclass
 class SpokeTable:
-    """Views of the arrays of `heat_igl.sweep.spokes.Spokes`."""
+    """Views of the arrays of `heat_igl.sweep.sweep.Spokes`."""
 
     def __init__(self, spokes):
         self.first = spokes.first
