@@ -23,8 +23,7 @@ GROUPS = {
         curves.CutMesh""",
     "Directions and tangent vectors": """tangent_frames intrinsic.TangentFrames log_map exp_map log_maps_within
         VectorHeatSolver heat.Directions operators.connection_laplacian""",
-    "Which side": """signed_distance SignedHeatSolver OrientedPoints mesh.region_boundary volume_signed_distance
-        VoxelBox""",
+    "Which side": "signed_distance SignedHeatSolver OrientedPoints mesh.region_boundary",
     "Sampling": """farthest_points farthest_cells voronoi_cells sampling.VoronoiCells sampling.dual_triangulation
         karcher_mean centroidal_voronoi curves.CentroidalSites diameter""",
     "Operators of a domain": """Operators operators.point_cloud_operators speed_operators

@@ -31,8 +31,6 @@ from heat_igl.heat import HeatMethodSolver as HeatMethodSolver
 from heat_igl.heat import HeatSolution as HeatSolution
 from heat_igl.heat import SignedHeatSolver as SignedHeatSolver
 from heat_igl.heat import VectorHeatSolver as VectorHeatSolver
-from heat_igl.heat import VoxelBox as VoxelBox
-from heat_igl.heat import volume_signed_distance as volume_signed_distance
 from heat_igl.intrinsic import tangent_frames as tangent_frames
 from heat_igl.io import read_attributes as read_attributes
 from heat_igl.io import read_mesh as read_mesh

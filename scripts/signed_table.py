@@ -1,17 +1,14 @@
-"""Signed distance on surfaces and in space: errors from broken curves, circles and holed surfaces.
+"""Signed distance on surfaces: errors from circles and from broken curves.
 
     python scripts/signed_table.py circles [--finest 160]        # circles against closed forms
     python scripts/signed_table.py broken MESH ... [--cases 40]  # curves with gaps, beside potpourri3d
-    python scripts/signed_table.py volumes [--points 33] [--boxes 14] [--holed 3]   # in space, from surfaces with holes
 
 circles: on a perturbed square, a sphere and a cylinder, each mesh with edges half as long as the one before: the mean
 error in percent of the mean distance, and the order to which it falls.
 broken: a level of a random smooth function on one of the meshes, in turn, and 10, 30 or 50 % of the length of its
 curves removed in one to six pieces. Truth is exact distance from the whole curves with the sign of the function; errors
 are means over the vertices, as a share of the square root of the area inside, in percent.
-volumes: a sphere, a box and a torus in a unit cube: closed, with 20 % of the faces removed one by one, or 20 % of the
-area in patches. Truth is libigl's distance with the winding number. Mean error in cells within a cell of the surface,
-and in brackets at all points; the largest of several seeds. docs/signed_theory.md shows the tables.
+docs/signed_theory.md shows the tables.
 """
 
 from __future__ import annotations
@@ -22,19 +19,16 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-import igl
 import numpy as np
 
 from heat_igl import (
     Mesh,
     SignedHeatSolver,
     SurfaceCurve,
-    VoxelBox,
     curve_on,
     geodesic_distance,
     isolines,
     shapes,
-    volume_signed_distance,
 )
 from heat_igl.curves import sublevel_areas
 from heat_igl.typing import FloatArray
@@ -205,72 +199,13 @@ def summary(rows: Sequence[Row]) -> Iterator[Row]:
     yield {"removed": "in the geometric mean", "n": ""} | means
 
 
-# In space.
-
-
-def brick() -> Mesh:
-    """A box of 0.6 x 0.5 x 0.4, each side a grid of squares, counter-clockwise seen from outside."""
-    cells = shapes.box(8, (0.6, 0.5, 0.4))
-    F = igl.boundary_facets(cells.F)[0]
-    centre = cells.V.mean(axis=0)
-    inward = np.linalg.det(cells.V[F] - centre) < 0
-    used, compact = np.unique(np.where(inward[:, None], F[:, ::-1], F), return_inverse=True)
-    return Mesh(cells.V[used] - centre + 0.5, compact.reshape(-1, 3))
-
-
-def scaled(mesh: Mesh, factor: float) -> Mesh:
-    return Mesh(factor * mesh.V + 0.5, mesh.F)
-
-
-SOLIDS: dict[str, Callable[[], Mesh]] = {
-    "sphere": lambda: scaled(shapes.icosphere(3), 0.3),
-    "box": brick,
-    "torus": lambda: scaled(shapes.torus(48, 24), 0.25),
-}
-HOLES = ("closed", "20 % of the faces away", "20 % of the area away in patches")
-
-
-def holed(mesh: Mesh, holes: str, rng: np.random.Generator, radius: float = 0.07) -> Mesh:
-    """Without a fifth of the faces, or of the area in patches of a radius around random faces."""
-    kept, centre = np.ones(mesh.n_faces, bool), mesh.V[mesh.F].mean(axis=1)
-    if holes == HOLES[1]:
-        kept[rng.choice(mesh.n_faces, mesh.n_faces // 5, replace=False)] = False
-    while holes == HOLES[2] and mesh.measures[kept].sum() > 0.8 * mesh.measures.sum():
-        kept &= np.linalg.norm(centre - centre[rng.integers(mesh.n_faces)], axis=1) > radius
-    return Mesh(mesh.V, mesh.F[kept])
-
-
-def volumes(options: argparse.Namespace) -> Iterator[Row]:
-    """A row for each surface and domain."""
-    n, boxes = options.points, options.boxes
-    grid, tetrahedra = VoxelBox([0, 0, 0], 1 / (n - 1), [n] * 3), shapes.box(boxes)
-    kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
-    for domain, where, points, cell in (
-        (f"grid of {n}^3", grid, grid.positions().reshape(-1, 3), 1 / (n - 1)),
-        (f"tetrahedra of {boxes}^3 boxes", tetrahedra, tetrahedra.V, 1 / boxes),
-    ):
-        for name, make in SOLIDS.items():
-            whole, row = make(), {"domain": domain, "surface": name}
-            truth = np.asarray(igl.signed_distance(points, whole.V, whole.F, sign_type=kind)[0])
-            near = np.abs(truth) < cell
-            for holes in HOLES:
-                found = []
-                for seed in range(1 if holes == "closed" else options.holed):
-                    surface = holed(whole, holes, np.random.default_rng(seed))
-                    off = np.abs(volume_signed_distance(where, surface).ravel() - truth) / cell
-                    found.append((off[near].mean(), off.mean()))
-                row[holes] = "{:.2f} ({:.2f})".format(*np.max(found, axis=0))
-            yield row
-
-
 def main(argv: Sequence[str] | None = None) -> None:
-    names = ("circles", "broken", "volumes")
-    options = parsed(__doc__, argv, "*", names, finest=160, cases=40, points=33, boxes=14, holed=3)
+    names = ("circles", "broken")
+    options = parsed(__doc__, argv, "*", names, finest=160, cases=40)
     meshes = named(options.meshes)
     make: dict[str, Callable[[], Iterator[Row]]] = {
         "circles": lambda: circles(options),
         "broken": lambda: summary(collected(broken_rows(meshes, options))),
-        "volumes": lambda: volumes(options),
     }
     rows = collected(make[options.table]())
     publish(options, {options.table: as_they_are(rows)})

@@ -162,7 +162,6 @@ def number_cases() -> Iterator[Case]:
         "t": lambda mesh, value: heat_igl.HeatMethodSolver(mesh, t=value),
         "radius": lambda mesh, value: heat_igl.distances_within(mesh, value),
         "tolerance": lambda mesh, value: heat_igl.curve_on(mesh, mesh.V[mesh.F[0, :2]], tolerance=value),
-        "spacing": lambda _, value: heat_igl.VoxelBox((0, 0, 0), value, (2, 2, 2)),
     }
     for name, ask in ways.items():
         yield argument_case(f"{name}, neighbour", lambda mesh, ask=ask: ask(mesh, 1.0))

@@ -250,7 +250,6 @@ def test_a_path_gives_a_cloud_if_the_format_holds_points_only(tmp_path, suffix):
 
 MESH = shapes.torus(16, 10)
 OTHER = SimpleNamespace(vertices=MESH.V, faces=MESH.F)  # as trimesh has it
-BOX = Mesh(4 * shapes.box(6).V - 2, shapes.box(6).F)
 PHI = heat_igl.geodesic_distance(MESH, 0)
 SOLVER = heat_igl.HeatMethodSolver(MESH)
 LOOPS = heat_igl.isolines(MESH, MESH.V[:, 0], 0.1)[0]
@@ -307,7 +306,6 @@ CALLS: dict[str, Call] = {
     "tangent_frames": lambda mesh: heat_igl.tangent_frames(mesh).x,
     "trace_geodesic": lambda mesh: heat_igl.trace_geodesic(mesh, 0, [0, 0, 1], 0.3).positions(MESH),
     "validate": lambda mesh: heat_igl.validate(mesh, [0], methods=("heat",)).distances["heat"],
-    "volume_signed_distance": lambda mesh: heat_igl.volume_signed_distance(BOX, mesh),
     "voronoi_cells": lambda mesh: heat_igl.voronoi_cells(mesh, [0, 40]).labels,
     "write_curves": lambda mesh: written(lambda path: heat_igl.write_curves(path, mesh, LOOPS), "a.obj"),
     "write_distances_within": lambda mesh: written(

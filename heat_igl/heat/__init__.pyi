@@ -8,8 +8,6 @@ from heat_igl.heat.parts import Magnitude as Magnitude
 from heat_igl.heat.parts import SolverOptions as SolverOptions
 from heat_igl.heat.signed_heat import Level as Level
 from heat_igl.heat.signed_heat import SignedHeatSolver as SignedHeatSolver
-from heat_igl.heat.signed_volumes import VoxelBox as VoxelBox
-from heat_igl.heat.signed_volumes import volume_signed_distance as volume_signed_distance
 from heat_igl.heat.solver import HeatMethodSolver as HeatMethodSolver
 from heat_igl.heat.vector_heat import VectorHeatSolver as VectorHeatSolver
 from heat_igl.heat.vector_heat import VectorMethod as VectorMethod
