@@ -50,7 +50,7 @@ EXAMPLES = """
 info bunny.obj
 info lh.pial --json -
 validate bunny.obj
-validate bunny.obj --methods heat,windows --sources 10 --picture errors.png
+validate bunny.obj --methods heat,exact --sources 10 --picture errors.png
 distance bunny.obj --source 1234 --output distance.ply --picture distance.png
 distance bunny.obj --source 12 --source 40 --cutoff 0.1 --output distance.npy
 distance bunny.obj --at 0.3,0.1,0 --method exact --json -

@@ -40,7 +40,7 @@ from heat_igl.sources import vertex_sources
 from heat_igl.validation import METHODS, ValidationRow, draw_sources
 
 _NARROW = "mean %", "max %", "precompute s", "solve ms", "memory MB"
-_DEFAULT_METHODS = "heat,sweep,windows,meshlab,igl"
+_DEFAULT_METHODS = "heat,sweep,exact,meshlab,igl"
 
 
 def info(mesh: opt.MeshArgument, points: opt.PointsOption = False, json_file: opt.JsonOption = None) -> None:

@@ -148,38 +148,6 @@ class TangentFrames:
             outgoing + self.angles.scale[self.triangulation.F.ravel()[corner]] * angle, np.hypot(x, y)
         )
 
-    def to_faces(self, vertices: ArrayLike, vectors: ArrayLike) -> tuple[IntArray, IntArray, FloatArray]:
-        """The faces into which tangent vectors point: the inverse of `from_faces`.
-
-        Parameters
-        ----------
-        vertices : (k,) array_like of int
-            The vertices at which the vectors are.
-        vectors : (k, 2) array_like
-            Components in the frames of these.
-
-        Returns
-        -------
-        faces, corners : (k,) int64
-            A face at the vertex, and the corner 0 to 2 that is the vertex. On the boundary, vectors that point off the
-            surface get the face next to them.
-        vectors : (k, 3) float64
-            In the planes of the faces, also beyond the boundary.
-
-        Raises
-        ------
-        MeshError, ValueError
-            As for `from_world`.
-        """
-        at = self._vertices(vertices)
-        found = checked_vectors("vectors", vectors, len(at), 2)
-        corner, turn = self.corner_towards(at, self.to_angles(found))
-        face, c = np.divmod(corner, 3)
-        along = self.sides[face, c]
-        across = np.cross(self.face_normals[face], along)
-        length = np.hypot(*found.T)
-        return face, c, (length * np.cos(turn))[:, None] * along + (length * np.sin(turn))[:, None] * across
-
     @staticmethod
     def to_angles(vectors: ArrayLike) -> FloatArray:
         """Angles (k,) in [0, 2 pi) of tangent vectors (k, 2), counterclockwise from x.

@@ -36,7 +36,7 @@ Progress = Callable[[str, int, int], None]
 Run = tuple[FloatArray, dict[str, Any]]
 """Distances (k, n) of a method, and their cost: fields of `ValidationRow` by name."""
 # Methods that run in this process, as `geodesic_distance` names them; the others are native references.
-_OWN: tuple[DistanceMethod, ...] = ("heat", "sweep", "windows")
+_OWN: tuple[DistanceMethod, ...] = ("heat", "sweep")
 _NATIVE = {
     "meshlab": "meshlab",
     "meshlab_heat": "meshlab_heat",
@@ -153,7 +153,7 @@ def _run_native(
 def validate(
     mesh: MeshLike,
     sources: Sources | Sequence[Sources],
-    methods: Sequence[Method] = ("heat", "sweep", "windows", "meshlab", "igl"),
+    methods: Sequence[Method] = ("heat", "sweep", "exact", "meshlab", "igl"),
     *,
     reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None = "exact",
     name: str = "mesh",
@@ -173,9 +173,9 @@ def validate(
         One set of sources (an index, a sequence of indices, a mask), or a sequence of sets, with one distance for each:
         ``[3, 7]`` is one set of two vertices, ``[[3], [7]]`` are two sets of one vertex.
     methods : sequence of str or (str, callable)
-        Names from `METHODS`: "heat" is `HeatMethodSolver`, "sweep" and "windows" are `GeodesicSolver`; "igl" and
+        Names from `METHODS`: "heat" is `HeatMethodSolver`, "sweep" is `GeodesicSolver`; "igl" and
         "potpourri3d" are the heat methods of these libraries; "meshlab" and "meshlab_heat" are MeshLab's filters;
-        "exact" is the polyhedral distance. Any other method is a pair of a name and a function from the mesh to an
+        "exact" is `reference.exact`. Any other method is a pair of a name and a function from the mesh to an
         object with a method ``distance(sources)``.
     reference : str, array, callable or None
         "exact" or another name from `METHODS`; distances (k, n) or (n,); a function of mesh and sources, such as those
@@ -208,9 +208,9 @@ def validate(
     >>> import heat_igl
     >>> from heat_igl.validation import closed_forms
     >>> mesh = heat_igl.shapes.disk(20)
-    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "windows"], reference=closed_forms.plane)
+    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "exact"], reference=closed_forms.plane)
     >>> [(row.method, round(row.errors.mean, 2)) for row in report.rows]
-    [('heat', 0.0), ('windows', 0.0)]
+    [('heat', 0.0), ('exact', 0.0)]
     """
     given = as_mesh(mesh)
     mesh = as_simplices(given)

@@ -78,7 +78,7 @@ class ValidationRow:
     --------
     >>> import heat_igl
     >>> mesh = heat_igl.shapes.disk(20)
-    >>> report = heat_igl.validate(mesh, 0, methods=["windows"], reference=heat_igl.validation.closed_forms.plane)
+    >>> report = heat_igl.validate(mesh, 0, methods=["exact"], reference=heat_igl.validation.closed_forms.plane)
     >>> row = report.rows[0]
     >>> row.failure is None, row.errors.n_compared == mesh.n_vertices - 1, row.errors.maximum < 1e-9
     (True, True, True)
@@ -149,8 +149,8 @@ class ValidationReport:
     >>> import heat_igl
     >>> from heat_igl.validation import closed_forms
     >>> mesh = heat_igl.shapes.disk(20)
-    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "windows"], reference=closed_forms.plane)
-    >>> bool(abs(report.distances["windows"] - report.truths).max() < 1e-9)
+    >>> report = heat_igl.validate(mesh, 0, methods=["heat", "exact"], reference=closed_forms.plane)
+    >>> bool(abs(report.distances["exact"] - report.truths).max() < 1e-9)
     True
     >>> print(report.to_markdown().splitlines()[0])
     **mesh**: 1261 vertices, 2400 faces, 1 set of sources, errors against plane
