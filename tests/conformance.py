@@ -15,7 +15,7 @@ from conftest import flat_perturbed, perturbed, two_halves
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.transform import Rotation
-from surfaces import arcs, dual_of_sphere, moebius_strip
+from surfaces import arcs, dual_of_sphere, moebius_strip, on_pages
 
 from heat_igl import (
     Mesh,
@@ -70,7 +70,7 @@ class Domain:
         return SolverChoice(method).on(self.made())
 
     def renumbered(self, rng: np.random.Generator) -> tuple[Domain, np.ndarray]:
-        """The same with vertices and cells in another order, and the new number of each vertex.
+        """The same in another order, some cells turned over, and the new number of each vertex.
 
         The first corner of a polygon stays: the polygon is cut into triangles around it.
         """
@@ -81,6 +81,8 @@ class Domain:
         rows = rng.permutation(len(self.cells))
         turns = np.zeros(len(rows), int) if self.kind == "polygons" else rng.integers(3, size=len(rows))
         cells = [np.roll(label[self.cells[i]], turn) for i, turn in zip(rows, turns, strict=True)]
+        if self.kind == "simplices":
+            cells = [cell[::way] for cell, way in zip(cells, rng.choice([1, -1], len(rows)), strict=True)]
         field = None if self.field is None else self.field[rows]
         return replace(self, V=self.V[order], cells=cells, field=field), label
 
@@ -93,8 +95,9 @@ class Domain:
         return replace(self, V=scale * (self.V @ turn.T) + shift, field=field)
 
     def doubled(self) -> Domain:
-        """Two copies side by side, in two components."""
-        V = np.concatenate([self.V, self.V + np.array([0, 0, 3 * np.ptp(self.V)])])
+        """Two copies side by side, in two components, and where there are cells, a vertex of none."""
+        apart = np.array([0, 0, 3 * np.ptp(self.V)])
+        V = np.concatenate([self.V, self.V + apart, self.V[: 0 if self.cells is None else 1] - apart])
         field = None if self.field is None else np.concatenate([self.field, self.field])
         cells = None if self.cells is None else [*self.cells, *(np.asarray(cell) + self.n for cell in self.cells)]
         return replace(self, V=V, cells=cells, field=field)
@@ -155,15 +158,7 @@ def _convex(mesh: Mesh) -> Domain:
 def _pages() -> Domain:
     """Three flat pages at a spine; any two of them lie in one plane if they are unfolded."""
     mesh = shapes.book(3, 18)
-    on_page = np.hypot(mesh.V[:, 0], mesh.V[:, 1])
-    angle = np.round(np.arctan2(mesh.V[:, 1], mesh.V[:, 0]), 6)
-
-    def truth(source: int) -> np.ndarray:
-        is_same = (np.abs(angle - angle[source]) < 1e-5) | (on_page < 1e-9) | (on_page[source] < 1e-9)
-        across = np.where(is_same, on_page - on_page[source], on_page + on_page[source])
-        return np.hypot(across, mesh.V[:, 2] - mesh.V[source, 2])
-
-    return _of_mesh(mesh, truth=truth)
+    return _of_mesh(mesh, truth=partial(on_pages, mesh.V))
 
 
 def _tensor(dimensions: int) -> np.ndarray:
@@ -317,6 +312,11 @@ def domain(name: str) -> Domain:
 @cache
 def solver(name: str, method: str) -> Solver:
     return domain(name).solver(method)
+
+
+@cache
+def subdivided(name: str, method: str) -> Solver:
+    return domain(name).subdivided().solver(method)
 
 
 @cache

@@ -29,6 +29,13 @@ def arcs(V: np.ndarray, source: int) -> np.ndarray:
     return 2 * np.arcsin(np.clip(np.linalg.norm(V - V[source], axis=1) / 2, 0, 1))
 
 
+def on_pages(V: np.ndarray, source: int) -> np.ndarray:
+    """Distance (n,) on flat pages at the z axis, any two of which unfold to a convex domain."""
+    r, angle = np.hypot(V[:, 0], V[:, 1]), np.arctan2(V[:, 1], V[:, 0])
+    is_same = (np.abs(np.exp(1j * angle) - np.exp(1j * angle[source])) < 1e-5) | (r < 1e-9) | (r[source] < 1e-9)
+    return np.hypot(np.where(is_same, r - r[source], r + r[source]), V[:, 2] - V[source, 2])
+
+
 def bumpy() -> Mesh:
     """A sphere of 642 vertices with curvature of both signs, and no symmetry."""
     return perturbed(shapes.icosphere(3), 0.3, 1)

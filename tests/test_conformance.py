@@ -10,15 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conformance import DOMAINS, HARD, METHODS, TURN, distance, domain, solver
+from conformance import DOMAINS, HARD, METHODS, TURN, distance, domain, solver, subdivided
 from conftest import pygeodesic_distance, relative_error
 
 import heat_igl
-from heat_igl import MeshError, OffsetSources
+from heat_igl import MeshError, OffsetSources, SurfacePoints
 from heat_igl.operators import Operators
 
 BODIES = ("voxels", "tetrahedra", "metric on tetrahedra")
 POINTS = ("points", "points with normals")
+SURFACES = ("closed", "handle", "boundary", "one side", "non-manifold", "pixels")
 WITHOUT_WINDOWS = (*BODIES, "speeds on triangles")
 CELLS = [(d, m) for d in DOMAINS for m in METHODS if m in ("sweep", "heat") or d not in WITHOUT_WINDOWS]
 # Heat is moved inside bounds on surfaces in space.
@@ -80,13 +81,18 @@ def test_zero_at_sources_and_positive_elsewhere(name, method):
 
 
 @table()
-def test_infinity_in_other_components(name, method):
+def test_infinity_in_other_components_and_at_vertices_of_no_cell(name, method):
     one, both = domain(name), domain(name).doubled()
     solver, n = both.solver(method), one.n
     d = solver.distance(3)
     assert np.isinf(d[n:]).all()
     assert_close(d[:n], distance(name, method, 3), name, method)
-    assert_close(solver.distance([3, n + 3])[n:], distance(name, method, 3), name, method)
+    assert_close(solver.distance([3, n + 3])[n : 2 * n], distance(name, method, 3), name, method)
+    for vertex in range(2 * n, both.n):
+        np.testing.assert_array_equal(solver.distance(vertex), np.where(np.arange(both.n) == vertex, 0, np.inf))
+        late = solver.distance(OffsetSources([vertex, 3], [1, 2]))
+        assert_close(late[:n] - 2, distance(name, method, 3), name, method)
+        assert late[vertex] == 1
 
 
 @table()
@@ -153,12 +159,36 @@ def test_distance_has_the_unit_of_the_mesh(name, method, scale):
 @table([(name, method) for name, method in CELLS if name not in ("polygons", *POINTS)])
 def test_a_vertex_in_each_flat_simplex_changes_nothing(name, method):
     """Exact distance stays, the others are as near to it as before."""
-    fine, before = domain(name).subdivided(), distance(name, method, 3)
-    found = fine.solver(method).distance(3)[: domain(name).n]
+    before, found = distance(name, method, 3), subdivided(name, method).distance(3)[: domain(name).n]
     if is_exact(name, method):
         assert_close(found, before, name, method)
     else:
         assert np.abs(found - before).mean() < 2 * largest_mean_error(name, method) * before.mean()
+
+
+@table([(name, method) for name, method in CELLS if name in SURFACES])
+def test_points_in_faces_and_curves_are_sources(name, method):
+    """A point is what a vertex in its place is, one in a corner is that corner; batches hold what single sets do."""
+    at, prepared = domain(name), solver(name, method)
+    curve = heat_igl.edge_curve(at.made(), at.cells[7][:2])
+    for face in (7, len(at.cells) // 2):
+        point, corners = SurfacePoints([face], [[1 / 3] * 3]), at.cells[face]
+        found, expected = prepared.distance(point), subdivided(name, method).distance(at.n + face)[: at.n]
+        if is_exact(name, method):
+            assert_close(found, expected, name, method)
+            back = heat_igl.geodesic_distance(at.made(), 3, method=method, targets=point)
+            np.testing.assert_allclose(back, found[3], rtol=1e-11)
+        assert np.abs(found - expected).mean() < 2 * largest_mean_error(name, method) * expected.mean()
+        straight = np.linalg.norm(at.V[corners] - at.V[corners].mean(axis=0), axis=1)
+        np.testing.assert_allclose(found[corners], straight, rtol=1e-9)
+        np.testing.assert_array_equal(
+            prepared.distance(SurfacePoints([face], [[0, 1, 0]])), prepared.distance(corners[1])
+        )
+        sets = [point, [curve, 3], OffsetSources([point, curve], [0.1, 0.0]), 5]
+        for row, each in zip(prepared.distances(sets), sets, strict=True):
+            assert_close(row, prepared.distance(each), name, method)
+        np.testing.assert_array_equal(prepared.distance([[curve, [point]], 5]), prepared.distance([curve, point, 5]))
+        assert_close(prepared.distance(OffsetSources(point, 7.0)) - 7, found, name, method)
 
 
 @table()
@@ -200,6 +230,13 @@ def test_several_sources_are_the_nearest_of_each(name, method):
         assert difference.mean() < 2 * largest_mean_error(name, method) * nearest.mean()
         clear = np.diff(np.sort(each, axis=0)[:2], axis=0)[0] > (1e-9 if exact else 0.2) * alone.max()
         assert (found.labels == each.argmin(axis=0))[clear].mean() >= (1 if exact else 0.99)
+    overtaken = prepared.voronoi(OffsetSources(at[:2], [0, 2 * alone.max()]))
+    assert not overtaken.labels.any()
+    if method == "sweep":  # another order
+        assert np.abs(overtaken.distance - alone[0]).mean() < 0.005 * alone[0].mean()
+    else:
+        assert_close(overtaken.distance, alone[0], name, method)
+    assert_close(prepared.distance(OffsetSources(at, 7.0)) - 7, prepared.distance(at), name, method)
     mask = np.zeros(domain(name).n, bool)
     mask[at] = True
     np.testing.assert_array_equal(prepared.distance(mask), prepared.distance(sorted(at)))

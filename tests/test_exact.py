@@ -15,14 +15,12 @@ from surfaces import (
     bumpy,
     cube,
     graph_distance,
-    moebius_strip,
     nearest_vertex,
     random_disk,
     rough_field,
     rough_star,
     sheared,
     two_arms,
-    with_point,
 )
 
 from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, shapes
@@ -237,20 +235,6 @@ def test_source_points_and_targets_on_flat_domains(name, where):
             truth = np.linalg.norm(at[:, None] - points.positions(mesh), axis=2) + offsets
             np.testing.assert_allclose(d, truth.min(axis=1), rtol=1e-12, atol=1e-12)
             np.testing.assert_allclose(truth[np.arange(len(d)), label], d, rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["bumpy", "moebius", "book"])
-def test_a_point_is_what_a_vertex_in_its_place_is(name):
-    mesh = {"bumpy": bumpy, "moebius": lambda: moebius_strip(30, 4), "book": lambda: shapes.book(3, 5)}[name]()
-    for face in (3, 50):
-        barycentric = np.array([0.2, 0.5, 0.3])
-        truth = exact_distance(*with_point(mesh, face, barycentric).__reduce__()[1], mesh.n_vertices)[:-1]
-        point = SurfacePoints([face], [barycentric])
-        for surface in (as_given(mesh), delaunay(mesh)):
-            np.testing.assert_allclose(surface.solve(points=point).distance, truth, rtol=1e-11, atol=1e-14)
-            for source in (0, mesh.n_vertices // 2):
-                back = surface.solve(np.array([source]), targets=point).target_distance
-                np.testing.assert_allclose(back, truth[source], rtol=1e-11)
 
 
 def test_points_on_an_edge_of_many_faces():

@@ -1,6 +1,5 @@
 """Sources of every kind: what they are, exact distances around them, and distance from points, curves and offsets."""
 
-import pickle
 import re
 
 import igl
@@ -99,16 +98,6 @@ def test_only_triangles_hold_points():
         source_set([0, SurfacePoints([0], CENTRE)], 5, None)
     with pytest.raises(SourceError, match="here, not SurfacePoints"):
         vertex_sources(SurfacePoints([0], CENTRE), 5)
-
-
-def test_lists_of_curves_may_be_nested():
-    """`isolines` returns a list of curves for each level."""
-    mesh = shapes.icosphere(2)
-    lines = isolines(mesh, mesh.V[:, 2], [-0.3, 0.4])
-    flat = [curve for level in lines for curve in level]
-    solver = GeodesicSolver(mesh, method="sweep")
-    np.testing.assert_array_equal(solver.distance(lines), solver.distance(flat))
-    np.testing.assert_array_equal(solver.distance([lines, [3, 4]]), solver.distance([*flat, 3, 4]))
 
 
 @pytest.mark.parametrize("method", ["exact", "sweep", "heat"])
@@ -322,15 +311,6 @@ def test_offsets_move_the_border_of_two_cells(method):
         assert mean_error(found.distance, each.min(axis=1)) < (0.03 if method == "heat" else 2e-3)
 
 
-def test_a_source_that_is_overtaken_is_none(method):
-    mesh = plane(30)
-    first, late = nearest_vertex(mesh, [0.2, 0.5, 0]), nearest_vertex(mesh, [0.6, 0.5, 0])
-    solver = SolverChoice(method).on(mesh)
-    found = solver.voronoi(OffsetSources([first, late], [0, 1]))
-    np.testing.assert_allclose(found.distance, solver.distance(first), rtol=0, atol=1e-9)
-    assert (found.labels == 0).all()
-
-
 def test_a_vertex_beside_a_point(method):
     """Straight lines from the point end where the vertex is nearer."""
     mesh = plane(20)
@@ -356,15 +336,6 @@ def test_every_vertex_of_a_side_with_an_offset(method, slope):
     assert mean_error(distance, truth) < (0.1 if method == "sweep" else 0.03)
 
 
-@pytest.mark.parametrize("offset", [0.3, 1e6])
-def test_an_offset_for_all_is_added(method, offset):
-    mesh = plane(12)
-    solver = SolverChoice(method).on(mesh)
-    for sources in ([3, 90], closest_points(mesh, [[0.3, 0.4, 0], [0.8, 0.9, 0]]).points):
-        expected = solver.distance(sources) + offset
-        np.testing.assert_allclose(solver.distance(OffsetSources(sources, offset)), expected, rtol=1e-9)
-
-
 def test_labels_of_several_kinds(method):
     mesh = plane(30)
     line = curve_on(mesh, [[0.9, 0, 0], [0.9, 1, 0]])
@@ -382,20 +353,6 @@ def test_labels_of_several_kinds(method):
     ).all()
     assert (found.labels[each.min(axis=1) > 0.28] == -1).all()
     assert (np.isinf(found.distance) == (found.labels == -1)).all()
-
-
-def test_batches_of_all_kinds(method):
-    mesh = plane(16)
-    solver = SolverChoice(method).on(mesh)
-    line = curve_on(mesh, [[0.3, 0.1, 0], [0.8, 0.7, 0]])
-    point = SurfacePoints([77], [[0.2, 0.3, 0.5]])
-    sets = [5, point, [line, 3], OffsetSources([point, line], [0.1, 0.0]), [1, 2]]
-    for row, sources in zip(solver.distances(sets), sets, strict=True):
-        np.testing.assert_allclose(row, solver.distance(sources), rtol=0, atol=1e-12)
-    copy = pickle.loads(pickle.dumps(solver))
-    assert (copy.distance(sets[3]) == solver.distance(sets[3])).all()
-    with pytest.raises(SourceError, match=r"source_sets\[1\]: faces\[0\] = 999 is no face"):
-        solver.distances([5, SurfacePoints([999], [[0.2, 0.3, 0.5]])])
 
 
 def test_solution_of_a_point_holds_the_three_steps():

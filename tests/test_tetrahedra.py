@@ -279,15 +279,3 @@ def test_a_line_is_not_followed_across_a_gap():
     left, right = (nearest_vertex(mesh, [x, 1, 0.5]) for x in (0.25, 0.75))
     found = GeodesicSolver(mesh).distance([left, 0])
     assert found[right] == pytest.approx(2 * np.hypot(0.25, 0.5), rel=0.02)
-
-
-def test_vertices_of_no_tetrahedron():
-    """They are neither seen nor see anything, as sources too."""
-    box = shapes.box(3)
-    mesh = Mesh(np.concatenate([box.V, [[0.5, 0.5, 3.0]]]), box.F)
-    exact = np.linalg.norm(box.V - box.V[5], axis=1)
-    solver = GeodesicSolver(mesh)
-    for sources in (5, [5, box.n_vertices]):
-        np.testing.assert_allclose(solver.distance(sources)[:-1], exact, rtol=1e-9)
-    assert np.isinf(solver.distance(5)[-1])
-    assert np.isinf(solver.distance(box.n_vertices)[:-1]).all()

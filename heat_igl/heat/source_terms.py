@@ -335,11 +335,12 @@ def drop_overtaken(term: SourceTerm, heat_flow: HeatFlow, n: int) -> SourceTerm:
 def warmest_sources(term: SourceTerm, heat_flow: HeatFlow, n: int) -> IntArray:
     """The source (n,) from which each vertex gets most heat, -1 if it gets none; a solve for each source."""
     labels = np.full(n, -1)
-    most = np.zeros(n)
+    most = np.full(n, -np.inf)
     present = np.unique(term.label)
     for block in np.split(present, range(_BLOCK, len(present), _BLOCK)):
         shares: list[FloatArray] = [term.share * (term.label == label) for label in block]
         parts = heat_flow.solve(right_hand_side(n, [term] * len(block), shares))
+        parts[parts == 0] = -np.inf  # no heat; far away in obtuse cells all of it may be below 0
         warmest = parts.argmax(axis=1)
         heat = np.take_along_axis(parts, warmest[:, None], axis=1)[:, 0]
         labels = np.where(heat > most, block[warmest], labels)
