@@ -22,6 +22,7 @@ import pytest
 from conftest import run_python
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from surfaces import moebius_strip, twice
 
 import heat_igl
 from heat_igl import AccuracyWarning, MeshError
@@ -210,9 +211,14 @@ def argument_cases() -> Iterator[Case]:
     yield from array_type_cases()
     yield from choice_cases()
     for ask, pattern in REFUSED:
-        yield argument_case(pattern, ask, pattern, error="ValueError|SourceError|MeshError|TypeError")
+        yield argument_case(pattern, ask, pattern, error=ERRORS)
     for name, ask in ACCEPTED.items():
         yield argument_case(f"{name}, neighbour", ask)
+
+
+def segments(faces: list[int], closed: bool = False) -> heat_igl.SurfaceCurve:
+    """The first side of each of some faces."""
+    return heat_igl.SurfaceCurve(faces, [[1, 0, 0]] * len(faces), [[0, 1, 0]] * len(faces), closed)
 
 
 RAGGED = [[1.0, 2.0], [3.0]]
@@ -220,7 +226,16 @@ CURVE = heat_igl.SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0]
 CENTRE = [[1 / 3] * 3]
 GRID = heat_igl.shapes.grid(4)
 TRIANGLE, SQUARE = [[0, 1, 2]], V4[[0, 1, 3, 2]]
+BY_LENGTHS = heat_igl.GeodesicSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]])
+SPHERE, BOX, BOOK = heat_igl.shapes.icosphere(4), heat_igl.shapes.box(1), heat_igl.shapes.book(3, 2)
+TWISTED, TWO = moebius_strip(8, 1), twice(BALL)
+TURNED = heat_igl.Mesh(GRID.V, np.where(np.arange(32)[:, None] == 5, GRID.F[:, ::-1], GRID.F))
+LOOSE = heat_igl.Mesh([*GRID.V, [5, 5, 5]], GRID.F)
+VECTORS = heat_igl.VectorHeatSolver(BALL)
+WEST, SOLID = GRID.V[:, 0] < 0.6, np.ones((2, 2, 2), bool)
+AT, INSIDE = [[1, 0, 0]], heat_igl.SurfacePoints([7], [[0.2, 0.3, 0.5]])
 HIDDEN = np.ma.masked_array([1, 2], mask=[True, False])
+ERRORS = "ValueError|SourceError|MeshError|TypeError|ReferenceSolverError"
 # What is asked of a sphere of 42 vertices and 80 faces, and how it is refused.
 REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: heat_igl.closest_points(m, [[0, 0, 1], [0, 1e200, 0]]), r"positions\[1\] .* too far"),
@@ -233,7 +248,6 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: heat_igl.HeatMethodSolver(m).distances([0], out=3), r"out must be an array .*, not "),
     (lambda m: heat_igl.HeatMethodSolver(m).distances(3), "source_sets must be .*: try distance"),
     (lambda m: heat_igl.validate(m, 0, methods="heat"), "methods must be a sequence of methods"),
-    (lambda m: heat_igl.karcher_mean(m, [0, 1], p=65), "p must be a number from 1 to 64"),
     (lambda m: heat_igl.PolygonMesh(m.V, 3), "polygons must be .*, not "),
     (lambda _: heat_igl.PolygonMesh(SQUARE, []), "polygons is empty"),
     (
@@ -244,10 +258,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         lambda _: heat_igl.PolygonMesh(SQUARE, [[0, 1, 2, 4]]),
         r"polygons\[0\] = \[0, 1, 2, 4\] holds 4, which is no vertex",
     ),
-    (
-        lambda _: heat_igl.PolygonMesh(SQUARE * 1e150, [[0, 1, 2, 3]]),
-        "outside what areas in double precision allow",
-    ),
+    (lambda _: heat_igl.PolygonMesh(SQUARE * 1e150, [[0, 1, 2, 3]]), "outside what areas in double precision allow"),
     # Points and curves on faces.
     (lambda _: heat_igl.SurfacePoints([0], [[0.5, 0.5, 0.1]]), r"barycentric\[0\] .* must sum to 1, not 1.1"),
     (lambda _: heat_igl.SurfacePoints([0, 0], [[1, 0, 0], [0.5, 0.7, -0.2]]), r"barycentric\[1\] .* not negative"),
@@ -280,18 +291,12 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         r"line from positions\[1\]",
     ),
     (lambda m: heat_igl.edge_curve(m, RAGGED), "^vertices must be an array, but rows"),
-    (
-        lambda _: heat_igl.edge_curve(GRID, [0, 1, 3]),
-        r"vertices\[1\] = 1 and the next, 3, are not joined by an edge",
-    ),
+    (lambda _: heat_igl.edge_curve(GRID, [0, 1, 3]), r"vertices\[1\] = 1 and the next, 3, are not joined by an edge"),
     (lambda _: heat_igl.edge_curve(GRID, [0]), "vertices must be two vertex indices or more"),
     (lambda _: heat_igl.edge_curve(GRID, [0, 99]), r"vertices\[0\] = 0 and the next, 99, are not"),
     (lambda _: heat_igl.edge_curve(GRID, [0.0, 1.0]), "vertices must be two vertex indices or more, not float64"),
     # Sources in faces, and with offsets.
-    (
-        lambda _: heat_igl.OffsetSources([0, 1], [0.0, -1.0]),
-        r"offsets\[1\] = -1.0 must be finite and not negative",
-    ),
+    (lambda _: heat_igl.OffsetSources([0, 1], [0.0, -1.0]), r"offsets\[1\] = -1.0 must be finite and not negative"),
     (lambda _: heat_igl.OffsetSources([0, 1], [np.nan, 0.0]), r"offsets\[0\] = nan must be finite"),
     (lambda _: heat_igl.OffsetSources([0, 1], np.inf), "offsets = inf must be finite"),
     (lambda _: heat_igl.OffsetSources([0, 1], [[0.0, 1.0]]), r"one number or one for each .*, not of shape \(1, 2\)"),
@@ -343,6 +348,124 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         r"vectors\[1\] = \[nan, 0.0\] is not finite",
     ),
     (lambda m: heat_igl.tangent_frames(m).from_world(["a"], [0]), "vectors must be real numbers"),
+    (lambda _: heat_igl.tangent_frames(BOOK), "is one of more than two faces"),
+    (lambda _: heat_igl.tangent_frames(TWISTED), "has faces that are oriented differently"),
+    (lambda _: heat_igl.tangent_frames(BOX), "tetrahedral"),
+    (lambda _: VECTORS.transport([0, 1], np.ones((3, 2))), r"vectors must have shape \(2, 2\), but .* \(3, 2\)"),
+    (lambda _: VECTORS.extend([0, 1], [1.0, np.nan]), r"values\[1\] = \[nan\] is not finite"),
+    (lambda _: VECTORS.extend(0, [1.0, 2.0]), "values must be one number for each of the 1 sources"),
+    (lambda m: heat_igl.trace_geodesic(m, 3, [0, 0], 0.1), r"direction = \[0, 0\] is 0 in the tangent plane"),
+    (lambda m: heat_igl.trace_geodesic(m, 3, [1, 0], -1), "length must be a finite number of at least 0, not -1"),
+    (lambda m: heat_igl.trace_geodesic(m, 3, [1, 0], np.nan), "length must be .* not nan"),
+    # What a method or a domain does not give.
+    *(
+        (lambda m, e=e: heat_igl.GeodesicSolver(m, tolerance=e), "tolerance must be at least 0 and less than 1, not")
+        for e in (-1e-9, 1, np.nan, "1e-5", True)
+    ),
+    (lambda m: heat_igl.geodesic_distance(m, 0, tolerance=-1), "tolerance must be at least 0 and less than 1, not -1"),
+    (lambda m: heat_igl.HeatMethodSolver(m, t=1e300), r"t = 1e\+300 is too large: heat spreads over"),
+    (lambda m: heat_igl.HeatMethodSolver(m, t_coef=1e20), r"t_coef = 1e\+20 is too large: heat spreads over"),
+    (lambda _: heat_igl.geodesic_distance(SPHERE, 0, method="sweep", targets=INSIDE), "targets inside faces need"),
+    (lambda _: BY_LENGTHS.directions(0), "directions need the positions of a mesh"),
+    (lambda _: heat_igl.GeodesicSolver(SPHERE, method="sweep").directions(0), "paths, which a sweep does not find"),
+    (lambda _: heat_igl.GeodesicSolver(BOX).directions(0), "directions follow paths on triangles that fit together"),
+    (lambda _: heat_igl.distances_within(BOX, 1.0), "exact distances need triangles"),
+    (lambda _: heat_igl.log_maps_within(BOOK, 1), "more than two faces"),
+    (lambda _: heat_igl.shortest_paths(BOX, 1, 0), "paths need triangles"),
+    (lambda _: heat_igl.shortest_paths(LOOSE, 25, 0), r"targets\[0\] = 25 is a vertex that no face uses"),
+    (lambda _: heat_igl.shortest_paths(TWO, [1, 50], 0), r"from targets\[1\] no source can be reached \(1 of 2"),
+    (lambda _: heat_igl.karcher_mean(TWO, [0, 42], p=1), "points lie on different components"),
+    (lambda _: heat_igl.karcher_mean(TWO, [0, 42]), "points lie on different components"),
+    (lambda _: heat_igl.GeodesicSolver(GRID, region=WEST).distance([0, 4]), r"sources\[1\]: vertex 4 .* \(1 of 2 do\)"),
+    (lambda _: heat_igl.HeatMethodSolver(GRID, region=WEST).distance(4), r"sources\[0\]: vertex 4 lies outside"),
+    (lambda _: heat_igl.GeodesicSolver(GRID, region=WEST).distance(INSIDE), r"sources\[0\]: face 7 lies outside"),
+    (lambda _: heat_igl.SignedHeatSolver(TWISTED), "the surface cannot be oriented, as a Moebius strip cannot"),
+    (lambda _: heat_igl.SignedHeatSolver(TURNED), r"face \d+ and a neighbour are oriented differently.*bfs_orient"),
+    (lambda _: heat_igl.SignedHeatSolver(BOOK), r"more than two faces meet at .* \(\d+ edges.*cut\(mesh, curves\)"),
+    (lambda _: heat_igl.SignedHeatSolver(BOX), "the mesh is tetrahedral"),
+    # Curves and waypoints.
+    (lambda m: heat_igl.SignedHeatSolver(m).distance([]), "curves is empty"),
+    (lambda m: heat_igl.SignedHeatSolver(m).distance(7), "curves must be a SurfaceCurve, OrientedPoints, a mask"),
+    (lambda m: heat_igl.SignedHeatSolver(m).distance([CURVE, 7]), r"curves\[1\] must be a SurfaceCurve"),
+    (lambda m: heat_igl.SignedHeatSolver(m).distance(CURVE, level="all"), "level must be one of 'zero', 'constant'"),
+    (lambda _: heat_igl.OrientedPoints(INSIDE, np.ones((2, 3))), r"normals must have shape \(1, 3\), not \(2, 3\)"),
+    (lambda _: heat_igl.OrientedPoints(INSIDE, [[1, 0, 0, 0]]), r"shape \(k, 3\), .* or \(k, 2\) .*, not \(1, 4\)"),
+    (lambda m: heat_igl.straighten(m, segments([0, 40])), r"segment 0 ends in face 0 .* segment 1 starts in face 40"),
+    (lambda m: heat_igl.straighten(m, segments([0, 0])), r"segment 0 ends in face 0 .* segment 1 starts in face 0"),
+    (lambda m: heat_igl.straighten(m, segments([0], closed=True)), r"segment 0 ends .* and segment 0 starts"),
+    (lambda m: heat_igl.straighten(m, segments([80])), "indices run from 0"),
+    (lambda m: heat_igl.straighten(m, heat_igl.SurfaceCurve([0], AT, AT, is_closed=True)), "has no length"),
+    (lambda m: heat_igl.straighten(m, [0, 1, 2]), "must be a SurfaceCurve, not list"),
+    (lambda m: heat_igl.geodesic_path(m, [3]), "2 places or more for a path, not 1"),
+    (lambda m: heat_igl.geodesic_path(m, [3, 4], closed=True), "3 places or more for a loop, not 2"),
+    (lambda m: heat_igl.geodesic_path(m, [7, 7, 7], closed=True), "contracts to a point"),
+    (lambda m: heat_igl.geodesic_path(m, [3, 42]), r"waypoints\[1\] = 42 is no vertex"),
+    (lambda m: heat_igl.geodesic_path(m, [INSIDE, "x"]), r"waypoints\[1\] must be a vertex or SurfacePoints, not str"),
+    (lambda m: heat_igl.geodesic_path(m, [heat_igl.SurfacePoints([80], AT), 5]), r"waypoints\[0\]: faces\[0\] = 80"),
+    (lambda _: heat_igl.geodesic_path(TWO, [0, 5, 42]), r"waypoints\[1\] to waypoints\[2\]: .* different comp"),
+    (lambda m: heat_igl.curve_through(m, [[0, 0, 1], [0, 0, 3.0]]), r"points\[1\] is \S+ away from .* \(1 of 2"),
+    (lambda m: heat_igl.curve_through(m, [0, 1], closed=True), "points must be 3 places or more for a closed curve"),
+    (lambda m: heat_igl.curve_through(m, [0, 99]), r"points\[1\] = 99 is no vertex"),
+    # Values, labels and images.
+    *(
+        (lambda _, ask=ask, bad=bad: ask(GRID, bad, 0.5), said)
+        for ask in (heat_igl.isolines, heat_igl.curves.sublevel_areas, heat_igl.smooth)
+        for bad, said in (
+            (np.where(np.arange(25) == 3, np.nan, 1.0), r"values\[3\] is nan \(1 of 25"),
+            (np.where(np.arange(25) == 3, -np.inf, 1.0), r"values\[3\] is -inf"),
+            (np.zeros(24), r"values must have shape \(25,\)"),
+        )
+    ),
+    (lambda m: heat_igl.smooth(m, np.zeros(42), 0), "fwhm must be a positive number"),
+    (lambda m: heat_igl.parcel_distances(m, np.zeros(42)), r"labels must be integers of shape \(42,\), not float64"),
+    (lambda m: heat_igl.parcel_distances(m, -np.ones(42, int)), "labels name no parcel"),
+    (lambda _: heat_igl.parcel_distances(GRID, 1 - WEST, region=WEST), r"no vertex of parcel 1 lies in .* \(1 of 2"),
+    (lambda m: heat_igl.geodesic_errors(m, [0, 1], [0]), "there are 2 matches and 1 entries of truth"),
+    (lambda m: heat_igl.geodesic_errors(m, [0, 99], [0, 0]), r"matches\[1\] = 99 is no vertex"),
+    (lambda m: heat_igl.karcher_mean(m, [1, 2], [1, 2, 3]), r"weights must be 2 numbers, .* but the shape is \(3,\)"),
+    (lambda m: heat_igl.karcher_mean(m, [1, 2], [1, -1]), r"weights\[1\] = -1.0 must be finite and not negative"),
+    (lambda m: heat_igl.karcher_mean(m, [1, 2], [0, 0]), "weights are all 0"),
+    *(
+        (lambda m, p=p: heat_igl.karcher_mean(m, [1, 2], p=p), "p must be a number from 1 to 64")
+        for p in (0.5, 65, np.inf, np.nan, "2", True)
+    ),
+    *(
+        (lambda m, k=k: heat_igl.nearest_vertices(m, k), "k must be a positive integer, not")
+        for k in (0, -3, 2.0, True, "two")
+    ),
+    (lambda m: heat_igl.nearest_vertices(m, 2, [99]), r"sources\[0\] = 99 is no vertex"),
+    (lambda m: heat_igl.log_maps_within(m, 0), "radius must be a positive number, not 0"),
+    (lambda m: heat_igl.log_maps_within(m, 1, [99]), r"sources\[0\] = 99 is no vertex"),
+    (lambda m: heat_igl.pair_distances(m, [1, 2]), r"shape \(p, 2\), but it has shape \(2,\)"),
+    (lambda m: heat_igl.pair_distances(m, [[1, 2, 3]]), r"shape \(p, 2\), but it has shape \(1, 3\)"),
+    (lambda m: heat_igl.pair_distances(m, [[1], [2, 3]]), "not a ragged sequence"),
+    (lambda m: heat_igl.centroidal_voronoi(m, [3, 3]), "sites must be distinct, but vertex 3 is there twice"),
+    (lambda m: heat_igl.centroidal_voronoi(m, [3, 42]), r"sites\[1\] = 42 is no vertex"),
+    (lambda m: heat_igl.centroidal_voronoi(m, [3], rounds=-1), "rounds must be an integer of at least 0"),
+    (lambda _: heat_igl.speed_operators(GRID, np.ones(31)), r"speed must have shape \(32,\), one per face, not \(31"),
+    (lambda _: heat_igl.speed_operators(GRID, 1.0), r"speed must have shape \(32,\), one per face, not \(\)"),
+    (lambda _: heat_igl.speed_operators(GRID, [1.0] * 31 + [0]), r"speed\[31\] = 0.0 must be .* \(1 of 32 are not"),
+    *(
+        (lambda _, mask=mask: heat_igl.image_domain(mask), f"mask must be a boolean image{said}")
+        for mask, said in (([[0, 1], [1, 1]], ""), ([[True], [True, False]], ""), (SOLID[None], r" .* \(1, 2, 2, 2\)"))
+    ),
+    *((lambda _, mask=mask: heat_igl.image_domain(mask), "mask holds no pixel") for mask in ([[False]], ~SOLID)),
+    *(
+        (lambda _, bad=bad: heat_igl.image_domain([[True]], bad), "spacing must be one or two")
+        for bad in (0, (1, -1), (1, 2, 3), "x", np.inf)
+    ),
+    (lambda _: heat_igl.image_domain(SOLID, (1.0, 2.0)), "spacing must be one or three positive numbers"),
+    (lambda _: heat_igl.terrain([0.0, 0, 0]), r"heights must be real numbers \(rows, .* of shape \(3,"),
+    (lambda _: heat_igl.terrain(np.where(np.eye(3), 0, np.nan)), "no three neighbouring cells with ground"),
+    (lambda _: heat_igl.terrain([[0, 0, 0], [0, 0, np.inf], [0, 0, 0]]), r"heights\[1, 2\] is inf \(1 of 9"),
+    # References.
+    (lambda _: heat_igl.reference.exact(BOX, 0), r"closed_forms\.convex_solid"),
+    (lambda m: heat_igl.reference.exact(m, 0, solver="magic"), "'auto' or one of windows, pygeodesic, gdist, igl"),
+    (lambda m: heat_igl.reference.measured("magic", m, 0), "'magic' is unknown"),
+    (lambda _: heat_igl.validation.closed_forms.sphere(GRID, 0), "distance from the center varies"),
+    (lambda m: heat_igl.validation.closed_forms.cylinder(m, 0), "distance from the z axis varies"),
+    (lambda m: heat_igl.validation.closed_forms.cone(m, 0, apex=(0, 0, 9)), "angle to the axis varies"),
+    (lambda m: heat_igl.validation.closed_forms.convex_solid(m, 0), "holds no tetrahedra"),
     # Unknown arguments, and the argument that holds the offender.
     (lambda m: heat_igl.geodesic_distance(m, 0, cut_off=1.0), r"geodesic_distance\(\) .* Did you mean 'cutoff'\?"),
     (lambda m: heat_igl.geodesic_distance(m, source=0), r"'source'. Did you mean 'sources'\?"),

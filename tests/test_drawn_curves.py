@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl import Mesh, MeshError, SourceError, SurfaceCurve, SurfacePoints, curve_through, shapes
+from heat_igl import Mesh, MeshError, SurfaceCurve, SurfacePoints, curve_through, shapes
 
 
 def test_a_curve_passes_positions_vertices_and_points():
@@ -68,16 +68,6 @@ def test_a_number_of_isolines():
     assert one[0].points[0, 0] == pytest.approx(1 / 3)
     with pytest.raises(ValueError, match="levels must be a positive number of levels"):
         heat_igl.isolines(mesh, mesh.V[:, 0], 0)
-
-
-def test_curve_through_names_what_is_wrong():
-    mesh = shapes.grid(4)
-    with pytest.raises(SourceError, match=r"points\[1\] is 2 away from the surface \(1 of 2"):
-        curve_through(mesh, [[0, 0, 0], [1, 1, 2.0]])
-    with pytest.raises(SourceError, match="points must be 3 places or more for a closed curve"):
-        curve_through(mesh, [0, 1], closed=True)
-    with pytest.raises(SourceError, match=r"points\[1\] = 99 is no vertex"):
-        curve_through(mesh, [0, 99])
 
 
 def test_arrays_that_other_libraries_may_write():

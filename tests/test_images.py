@@ -131,24 +131,6 @@ def test_speeds_of_voxels():
     np.testing.assert_allclose(found[1, 1, [5, 11]], [5, 5.5 + 5.5 / 4], rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("mask", "spacing", "error", "message"),
-    [
-        ([[0, 1], [1, 1]], 1.0, MeshError, "mask must be a boolean image"),
-        ([[True], [True, False]], 1.0, MeshError, "mask must be a boolean image"),
-        ([[False]], 1.0, MeshError, "mask holds no pixel"),
-        *(([[True]], bad, ValueError, "spacing must be one or two") for bad in (0, (1, -1), (1, 2, 3), "x", np.inf)),
-        (np.ones((2, 2, 2, 2), bool), 1.0, MeshError, r"mask must be a boolean image .* of shape \(2, 2, 2, 2\)"),
-        (np.zeros((2, 2, 2), bool), 1.0, MeshError, "mask holds no pixel"),
-        (np.ones((2, 2, 2), bool), (1.0, 2.0), ValueError, "spacing must be one or three positive numbers"),
-    ],
-)
-def test_wrong_images_are_refused(mask, spacing, error, message):
-    with pytest.raises(error, match=message):
-        image_domain(mask, spacing)
-    assert image_domain(np.ones((2, 2, 2), bool), (1.0, 2.0, 3.0)).mesh.is_tetrahedral
-
-
 def test_planar_points_of_files(tmp_path):
     P = np.random.default_rng(0).random((30, 2))
     np.save(tmp_path / "a.npy", P)
@@ -250,14 +232,3 @@ def test_speed_per_cell():
     np.testing.assert_allclose(ground.per_face(speed), between)
     solver = heat_igl.HeatMethodSolver(heat_igl.speed_operators(ground.mesh, ground.per_face(speed)))
     assert solver.n_vertices == ground.mesh.n_vertices
-
-
-def test_names_what_is_wrong():
-    flat = np.zeros((3, 3))
-    with pytest.raises(MeshError, match=r"heights must be real numbers \(rows, columns\), not float64 of shape \(3,\)"):
-        terrain(flat[0])
-    with pytest.raises(MeshError, match="no three neighbouring cells with ground"):
-        terrain(np.where(np.eye(3, dtype=bool), flat, np.nan))
-    with pytest.raises(MeshError, match=r"heights\[1, 2\] is inf \(1 of 9"):
-        terrain(np.where(np.arange(9).reshape(3, 3) == 5, np.inf, flat))
-    assert repr(terrain(flat)) == "Terrain(9 of 9 cells)"

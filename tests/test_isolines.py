@@ -202,21 +202,6 @@ def test_offset_of_a_curve_drawn_on_the_plane():
     assert off.max() < 2 / 60
 
 
-@pytest.mark.parametrize(
-    ("values", "levels", "message"),
-    [
-        ([0, np.nan, 1, 2], 0.5, r"values\[1\] is nan \(1 of 4"),
-        ([0, 1, 1, -np.inf], 0.5, r"values\[3\] is -inf"),
-        ([0, 1, 2], 0.5, r"values must have shape \(4,\)"),
-    ],
-)
-def test_wrong_values_are_refused(values, levels, message):
-    with pytest.raises(ValueError, match=message):
-        isolines(SQUARE, values, levels)
-    with pytest.raises(ValueError, match=message):
-        sublevel_areas(SQUARE, values, levels)
-
-
 def circle_and_arc():
     mesh = shapes.grid(20)
     near, far = isolines(mesh, np.linalg.norm(mesh.V - [0.4, 0.5, 0], axis=1), [0.2, 0.45])

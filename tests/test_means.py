@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from conftest import flat_perturbed
-from surfaces import folded_torus, twice
+from surfaces import folded_torus
 
 from heat_igl import (
     Mesh,
-    SourceError,
     SurfacePoints,
     centroidal_voronoi,
     geodesic_distance,
@@ -128,23 +127,6 @@ def test_bezier_curves_in_the_plane_are_polynomials():
     np.testing.assert_allclose(curve.lengths(mesh).sum(), np.linalg.norm(np.diff(expected, axis=0), axis=1).sum())
 
 
-def test_bad_arguments_of_means_are_told_apart(sphere):
-    with pytest.raises(ValueError, match=r"weights must be 2 numbers, one for each point, but the shape is \(3,\)"):
-        karcher_mean(sphere, [1, 2], [1, 2, 3])
-    with pytest.raises(ValueError, match=r"weights\[1\] = -1.0 must be finite and not negative"):
-        karcher_mean(sphere, [1, 2], [1, -1])
-    with pytest.raises(ValueError, match="weights are all 0"):
-        karcher_mean(sphere, [1, 2], [0, 0])
-    for p in (0.5, np.inf, np.nan, "2", True):
-        with pytest.raises(ValueError, match="p must be a number from 1 to 64"):
-            karcher_mean(sphere, [1, 2], p=p)
-    two = twice(sphere, 9)
-    for p in (1, 2):
-        with pytest.raises(SourceError, match="different components"):
-            karcher_mean(two, [0, sphere.n_vertices], p=p)
-    assert len(geodesic_bezier(sphere, [0, 1, 2], 2))
-
-
 def test_sites_become_centroidal():
     mesh = shapes.grid(21)
     found = centroidal_voronoi(mesh, [0, 1, 2, 23, 24, 46, 200, 300, 400])
@@ -181,15 +163,3 @@ def test_relaxation_stops_where_no_site_moves():
     np.testing.assert_array_equal(again.sites, found.sites)
     assert len(again.energies) == 1
     assert len(centroidal_voronoi(mesh, [0, 1, 2], rounds=0).energies) == 1
-
-
-def test_bad_sites_are_told_apart():
-    mesh = shapes.grid(4)
-    with pytest.raises(SourceError, match="sites must be distinct, but vertex 3 is there twice"):
-        centroidal_voronoi(mesh, [3, 3])
-    with pytest.raises(SourceError, match=r"sites\[1\] = 25 is no vertex"):
-        centroidal_voronoi(mesh, [3, 25])
-    with pytest.raises(ValueError, match="rounds must be an integer of at least 0"):
-        centroidal_voronoi(mesh, [3], rounds=-1)
-    Mesh(np.concatenate([mesh.V, [[9, 9, 9]]]), mesh.F)
-    assert len(centroidal_voronoi(mesh, [3]).sites) == 1

@@ -182,14 +182,3 @@ def test_the_command_takes_a_region(tmp_path, capsys):
     capsys.readouterr()
     assert cli.run(["distance", str(tmp_path / "grid.ply"), "--source", "0", "--region", "wall"]) != 0
     assert "--region wall: no NPY file, and no vertex attribute" in capsys.readouterr().err
-
-
-def test_names_what_is_wrong():
-    mesh = shapes.grid(4)
-    region = mesh.V[:, 0] < 0.6
-    with pytest.raises(SourceError, match=r"sources\[1\]: vertex 4 lies outside the region \(1 of 2 do\)"):
-        GeodesicSolver(mesh, region=region).distance([0, 4])
-    with pytest.raises(SourceError, match=r"sources\[0\]: vertex 4 lies outside"):
-        HeatMethodSolver(mesh, region=region).distance(4)
-    with pytest.raises(SourceError, match=r"sources\[0\]: face 7 lies outside"):
-        GeodesicSolver(mesh, region=region).distance(SurfacePoints([7], [[0.2, 0.3, 0.5]]))

@@ -6,12 +6,11 @@ import scipy.sparse as sp
 from conftest import flat_perturbed
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay
-from surfaces import moebius_strip, nearest_vertex
+from surfaces import nearest_vertex
 
 from heat_igl import (
     AccuracyWarning,
     Mesh,
-    MeshError,
     OrientedPoints,
     SignedHeatSolver,
     SourceError,
@@ -382,45 +381,6 @@ def test_components_without_a_curve_are_not_reached():
     moved = SurfaceCurve(circle.faces + one.n_faces, circle.start, circle.end, is_closed=True)
     found = SignedHeatSolver(small).distance([circle, moved])
     np.testing.assert_allclose(found[n:], 1e-3 * found[:n], atol=1e-9)
-
-
-def test_surfaces_without_sides():
-    strip = moebius_strip(30, 4)
-    with pytest.raises(MeshError, match="the surface cannot be oriented, as a Moebius strip cannot"):
-        SignedHeatSolver(strip)
-    grid = shapes.grid(4)
-    turned = grid.F.copy()
-    turned[5] = turned[5, ::-1]
-    with pytest.raises(MeshError, match=r"face \d+ and a neighbour are oriented differently.*bfs_orient"):
-        SignedHeatSolver((grid.V, turned))
-    with pytest.raises(
-        MeshError, match=r"more than two faces meet at the edge \d+ - \d+ \(\d+ edges.*cut\(mesh, curves\)"
-    ):
-        SignedHeatSolver(shapes.book(3, 4))
-    tetrahedron = Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
-    with pytest.raises(MeshError, match="the mesh is tetrahedral"):
-        SignedHeatSolver(tetrahedron)
-    SignedHeatSolver(grid)
-
-
-def test_bad_curves():
-    mesh, circle, _ = plane(12)
-    solver = SignedHeatSolver(mesh)
-    point = closest_points(mesh, [[0.5, 0.5, 0]]).points
-    for curves, match in (
-        ([], "curves is empty"),
-        (7, "curves must be a SurfaceCurve, OrientedPoints, a mask"),
-        ([circle, 7], r"curves\[1\] must be a SurfaceCurve"),
-    ):
-        with pytest.raises(SourceError, match=match):
-            solver.distance(curves)
-    with pytest.raises(ValueError, match="level must be one of 'zero', 'constant', 'none', not 'all'"):
-        solver.distance(circle, level="all")
-    with pytest.raises(SourceError, match=r"normals must have shape \(1, 3\), not \(2, 3\)"):
-        OrientedPoints(point, [[1, 0, 0], [1, 0, 0]])
-    with pytest.raises(SourceError, match=r"normals must have shape \(k, 3\), .* or \(k, 2\) .*, not \(1, 4\)"):
-        OrientedPoints(point, [[1, 0, 0, 0]])
-    assert np.isfinite(solver.distance(circle)).all()
 
 
 def test_curves_that_contradict_each_other():

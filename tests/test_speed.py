@@ -91,19 +91,6 @@ def test_refraction_at_a_straight_border(speeds):
     assert off.mean() * min(speeds) < 0.01 / 64
 
 
-@pytest.mark.parametrize(
-    ("speed", "message"),
-    [
-        (np.ones(17), r"speed must have shape \(18,\), one per face, not \(17,\)"),
-        (1.0, r"speed must have shape \(18,\), one per face, not \(\)"),
-        ([1.0] * 17 + [0.0], r"speed\[17\] = 0.0 must be positive and finite \(1 of 18 are not\): remove faces"),
-    ],
-)
-def test_wrong_speeds_are_refused(speed, message):
-    with pytest.raises(ValueError, match=message):
-        speed_operators(shapes.grid(3), speed)
-
-
 def test_faces_without_area_at_a_jump():
     """A vertex on the straight side of a triangle, in a square of two speeds."""
     square = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0.5, 0]]

@@ -127,13 +127,13 @@ class _Mean:
         if len(self._faces) == 1:
             return SurfacePoints(self._faces, self._barycentric)
         fields = self._fields()
+        energy = self._weight @ fields**self._power
+        if not np.isfinite(energy).any():
+            raise SourceError("points lie on different components of the mesh, so none is at a distance from all")
         if self._power == 1:
             at_point = self._median_at_a_point(fields)
             if at_point is not None:
                 return at_point
-        energy = self._weight @ fields**self._power
-        if not np.isfinite(energy).any():
-            raise SourceError("points lie on different components of the mesh, so none is at a distance from all")
         corners = self._mesh.F.ravel()
         best = np.argsort(energy)[: _STARTS if self._is_rough else 1]
         starts = [int(np.argmax(corners == vertex)) for vertex in best if energy[vertex] < np.inf]
