@@ -37,6 +37,7 @@ from heat_igl import (
 )
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
+from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import hull
 from heat_igl.windows.exact import ExactSurface
@@ -97,10 +98,11 @@ def measured(name: str, mesh: Mesh, n_sources: int, repeats: int) -> Row:
     """Windows, seconds, and the difference to VTP."""
     sources = drawn(mesh, n_sources)
     surface = ExactSurface(intrinsic_delaunay(intrinsic_triangulation(mesh)))
-    windows = [surface.solve(np.array([source])).n_windows / len(mesh.edges) for source in sources]
+    chosen = [source_set(source, mesh.n_vertices, mesh.F) for source in sources]
+    windows = [surface.solve(each).n_windows / len(mesh.edges) for each in chosen]
     row: Row = {"mesh": name, "n": mesh.n_vertices, "windows": np.mean(windows)}
     calls = {"from arrays": lambda: from_arrays(mesh, sources[0])}
-    calls["query"] = lambda: surface.solve(np.array([sources[0]]))
+    calls["query"] = lambda: surface.solve(chosen[0])
     row |= {key: np.median(times) for key, times in paired(calls, repeats).items()}
     if METHODS["VTP"].is_there:
         # It ends in an error at edges of more than two faces.

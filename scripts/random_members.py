@@ -67,6 +67,7 @@ from heat_igl.intrinsic import intrinsic_triangulation, mollify
 from heat_igl.mesh import region_boundary
 from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.operators import operators
+from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
 from heat_igl.validation.shapes import lattice_faces
 from heat_igl.validation.zoo import FAMILIES, hull
@@ -224,7 +225,8 @@ def exact(seed: int) -> Member:
     except MeshError:
         return f"{name}, refused", {}, 0.0
     sources = np.random.default_rng(seed).choice(np.unique(mesh.F), 3)
-    found, again = (np.array([surface.distance(np.array([s])) for s in sources]) for surface in surfaces)
+    chosen = [source_set(int(source), mesh.n_vertices, None) for source in sources]
+    found, again = (np.array([surface.distance(each) for each in chosen]) for surface in surfaces)
     if not np.isfinite([found, again]).all():
         return name, {"edges": np.inf}, 0.0
     a, b = mesh.edges.T
@@ -408,9 +410,9 @@ def log_maps(seed: int) -> Member:
     windows = ExactSurface(surface.unfolding)
     if place == "vertex":
         source = mesh.F[start.faces[0], start.barycentric[0].argmax()]
-        is_straight = windows.solve(np.array([source])).origin.root == source
+        is_straight = windows.solve(source_set(int(source), mesh.n_vertices, None)).origin.root == source
     else:
-        is_straight = windows.solve(points=start).origin.root == mesh.n_vertices
+        is_straight = windows.solve(source_set(start, mesh.n_vertices, mesh.F)).origin.root == mesh.n_vertices
     gap = np.linalg.norm(exp_map(mesh, start, log).positions(mesh) - mesh.V, axis=1)
     return f"{body}, {place}", {"gap": float(gap[is_straight].max() / np.hypot(*log.T).max())}, 0.0
 

@@ -11,6 +11,7 @@ import scipy.spatial
 from conftest import perturbed
 
 from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
+from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.typing import ArrayLike, FloatArray
 from heat_igl.validation.zoo import joined
 
@@ -18,6 +19,11 @@ from heat_igl.validation.zoo import joined
 def twice(mesh: Mesh, apart: float | np.ndarray = 5.0) -> Mesh:
     """A mesh and its copy so far away, as components of one."""
     return joined(mesh, Mesh(mesh.V + apart, mesh.F))
+
+
+def on(mesh: Mesh, sources: Sources) -> SourceSet:
+    """Sources, checked, on the triangles of a mesh."""
+    return source_set(sources, mesh.n_vertices, mesh.F)
 
 
 def nearest_vertex(mesh: Mesh, place: ArrayLike) -> int:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed
 from scipy.spatial import ConvexHull
-from surfaces import nearest_vertex, twice
+from surfaces import nearest_vertex, on, twice
 
 import heat_igl
 from heat_igl import (
@@ -36,9 +36,8 @@ def convex_hull(P: np.ndarray) -> Mesh:
 def straight(mesh: Mesh, source: int | SurfacePoints) -> np.ndarray:
     """Mask (n,) of the vertices whose shortest path does not bend."""
     surface = ExactSurface(heat_igl.operators.operators(mesh).surface.unfolding)
-    if isinstance(source, SurfacePoints):
-        return surface.solve(points=source).origin.root == mesh.n_vertices
-    return surface.solve(np.array([source])).origin.root == source
+    root = surface.solve(on(mesh, source)).origin.root
+    return root == (mesh.n_vertices if isinstance(source, SurfacePoints) else source)
 
 
 @pytest.mark.parametrize("source", [0, 7, 60])

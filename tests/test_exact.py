@@ -16,6 +16,7 @@ from surfaces import (
     cube,
     graph_distance,
     nearest_vertex,
+    on,
     random_disk,
     rough_field,
     rough_star,
@@ -23,7 +24,7 @@ from surfaces import (
     two_arms,
 )
 
-from heat_igl import GeodesicSolver, Mesh, SurfacePoints, geodesic_distance, shapes
+from heat_igl import GeodesicSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
 from heat_igl.intrinsic import HalfEdges, intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.windows.exact import ExactSurface, exact_distance
 from heat_igl.windows.tables import from_mesh
@@ -61,14 +62,14 @@ def test_windows_are_exact_whatever_the_tolerance():
 def test_flat_convex_domains(name, surface):
     mesh = FLAT[name]()
     for source in (0, mesh.n_vertices // 2):
-        d = SURFACES[surface](mesh).solve(np.array([source])).distance
+        d = SURFACES[surface](mesh).solve(on(mesh, source)).distance
         np.testing.assert_allclose(d, np.linalg.norm(mesh.V - mesh.V[source], axis=1), rtol=1e-12, atol=1e-14)
 
 
 def test_windows_that_passed_a_flat_vertex_are_joined():
     """A plane needs hardly more windows than edges, however many vertices it has."""
     mesh = flat_perturbed(shapes.grid(60))
-    assert delaunay(mesh).solve(np.array([0])).n_windows < 3 * len(mesh.edges)
+    assert delaunay(mesh).solve(on(mesh, 0)).n_windows < 3 * len(mesh.edges)
 
 
 def test_rolled_out_pyramid():
@@ -106,7 +107,7 @@ def test_paths_bend_at_the_boundary(surface):
     assert beyond.sum() > 20
     straight = np.linalg.norm(mesh.V - mesh.V[source], axis=1)
     truth = np.where(beyond, np.hypot(x[source], y[source]) + np.hypot(x, y), straight)
-    found = SURFACES[surface](mesh).solve(np.array([source]))
+    found = SURFACES[surface](mesh).solve(on(mesh, source))
     np.testing.assert_allclose(found.distance, np.where(is_used, truth, np.inf), rtol=1e-12, atol=1e-14)
     corner = int(np.argmin(np.hypot(x, y)))
     strictly = beyond & (over_the_corner > 1e-6) & (y < 0)
@@ -164,7 +165,7 @@ def test_windows_do_not_multiply_at_edges_of_many_faces(share, seed, source):
     rng = np.random.default_rng(seed)
     mesh = of_tetrahedra(800 if seed == 2 else int(rng.integers(100, 800)), share, rng)
     # Each half-edge holds what is shortest there; on a sphere as rough there are 3 to 5.
-    assert ExactSurface(from_mesh(mesh, 0)).solve(np.array([source])).n_windows < 10 * mesh.F.size
+    assert ExactSurface(from_mesh(mesh, 0)).solve(on(mesh, source)).n_windows < 10 * mesh.F.size
 
 
 @pytest.mark.parametrize(
@@ -188,7 +189,7 @@ def test_coarse_rough_meshes_against_pygeodesic(make, surface):
         mesh = make(seed)
         if mesh.report().smallest_angle < 0.1:
             continue  # pygeodesic loses digits at needles
-        d = SURFACES[surface](mesh).solve(np.array([3])).distance
+        d = SURFACES[surface](mesh).solve(on(mesh, 3)).distance
         assert relative_error(d, pygeodesic_distance(mesh, 3)).max() < 1e-10, seed
 
 
@@ -206,7 +207,7 @@ def test_each_goal_ends_the_search_with_its_own_bits():
     """On a rough surface the search must not end at the first path that arrives."""
     mesh = perturbed(shapes.icosphere(3), 0.5, 3)
     surface = delaunay(mesh)
-    source = np.array([5])
+    source = on(mesh, 5)
     some = SurfacePoints(np.arange(0, mesh.n_faces, 9), np.tile([0.2, 0.3, 0.5], (mesh.n_faces // 9 + 1, 1)))
     full = surface.solve(source, targets=some)
     for i in range(len(some)):
@@ -226,15 +227,16 @@ def test_source_points_and_targets_on_flat_domains(name, where):
     places = np.tile([COORDINATES[one] for one in COORDINATES], (mesh.n_faces // 3, 1))
     targets = SurfacePoints(rng.integers(mesh.n_faces, size=len(places)), places)
     offsets = np.array([0.0, 0.1, 0.0, 0.3])
+    sources = on(mesh, OffsetSources(points, offsets))
     for surface in (as_given(mesh), delaunay(mesh)):
-        found = surface.solve(points=points, point_offsets=offsets, targets=targets)
+        found = surface.solve(sources, targets=targets)
         for d, label, at in (
             (found.distance, found.origin.label, mesh.V),
             (found.target_distance, found.target_origin.label, targets.positions(mesh)),
         ):
             truth = np.linalg.norm(at[:, None] - points.positions(mesh), axis=2) + offsets
             np.testing.assert_allclose(d, truth.min(axis=1), rtol=1e-12, atol=1e-12)
-            np.testing.assert_allclose(truth[np.arange(len(d)), label], d, rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(truth[np.arange(len(d)), sources.labels[label]], d, rtol=1e-12, atol=1e-12)
 
 
 def test_points_on_an_edge_of_many_faces():
@@ -247,16 +249,16 @@ def test_points_on_an_edge_of_many_faces():
     point = SurfacePoints([f], [barycentric])
     truth = np.linalg.norm(mesh.V - point.positions(mesh), axis=1)
     surface = as_given(mesh)
-    np.testing.assert_allclose(surface.solve(points=point).distance, truth, rtol=1e-12)
+    np.testing.assert_allclose(surface.solve(on(mesh, point)).distance, truth, rtol=1e-12)
     for source in (0, 20, mesh.n_vertices - 1):
-        back = surface.solve(np.array([source]), targets=point).target_distance
+        back = surface.solve(on(mesh, source), targets=point).target_distance
         np.testing.assert_allclose(back, truth[source], rtol=1e-12)
 
 
 def test_cutoff_and_goals_end_early_with_the_same_bits():
     mesh = bumpy()
     surface = delaunay(mesh)
-    source = np.array([5])
+    source = on(mesh, 5)
     targets = SurfacePoints(np.arange(0, mesh.n_faces, 7), np.tile([0.2, 0.3, 0.5], (mesh.n_faces // 7 + 1, 1)))
     full = surface.solve(source, targets=targets)
     near = surface.solve(source, targets=targets, cutoff=0.5)
@@ -276,7 +278,7 @@ def test_origins_lead_back():
     mesh = bumpy()
     triangulation = intrinsic_triangulation(mesh)
     surface = ExactSurface(triangulation)
-    found = surface.solve(np.array([5]))
+    found = surface.solve(on(mesh, 5))
     here = np.flatnonzero(found.origin.entered >= 0)
     assert len(here) > mesh.n_vertices - 20
     face, corner = np.divmod(found.origin.entered[here], 3)
@@ -287,7 +289,7 @@ def test_origins_lead_back():
     barycentric[np.arange(len(here)), (corner + 2) % 3] = share
     crossings = SurfacePoints(face, np.clip(barycentric, 0, 1))
     left = np.linalg.norm(crossings.positions(mesh) - mesh.V[here], axis=1)
-    before = surface.solve(np.array([5]), targets=crossings).target_distance
+    before = surface.solve(on(mesh, 5), targets=crossings).target_distance
     np.testing.assert_allclose(before + left, found.distance[here], rtol=1e-11)
 
 
@@ -343,14 +345,14 @@ def test_triangulations_in_which_faces_are_there_twice():
     once, often = delaunay(mesh), delaunay(twice)
     faces, places = rng.integers(mesh.n_faces, size=9), rng.dirichlet(np.ones(3), 9)
     first, second = SurfacePoints(faces, places), SurfacePoints(faces + mesh.n_faces, places[:, [1, 2, 0]])
-    for given in ({"sources": np.array([7])}, {"points": first}):
-        expected = once.solve(**given, targets=first)
+    for given in (7, first):
+        expected = once.solve(on(mesh, given), targets=first)
         for targets in (first, second):
-            found = often.solve(**given, targets=targets)
+            found = often.solve(on(twice, given), targets=targets)
             np.testing.assert_allclose(found.distance, expected.distance, rtol=1e-13)
             np.testing.assert_allclose(found.target_distance, expected.target_distance, atol=1e-13)
             assert found.n_windows <= 2 * expected.n_windows
-    np.testing.assert_allclose(often.solve(points=second).distance, expected.distance, rtol=1e-13)
+    np.testing.assert_allclose(often.solve(on(twice, second)).distance, expected.distance, rtol=1e-13)
 
 
 def test_straight_past_a_flat_vertex_next_to_the_source():

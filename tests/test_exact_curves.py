@@ -87,11 +87,13 @@ def test_curves_are_nearer_than_points_on_them_by_no_more_than_the_gaps(name):
     for sources in (along, level, [OffsetSources(along, 0.1), level, 7]):
         chosen = source_set(sources, mesh.n_vertices, mesh.F)
         segments = chosen.segments
-        found = surface.solve(chosen.vertices, chosen.vertex_offset, segments=segments).distance[used]
+        found = surface.solve(chosen).distance[used]
         share = np.linspace(0, 1, 40)[:, None, None]
         points = (segments.start * (1 - share) + segments.end * share).reshape(-1, 3)
-        dense, offsets = SurfacePoints(np.tile(segments.faces, 40), points), np.tile(segments.offset, 40)
-        excess = surface.solve(chosen.vertices, chosen.vertex_offset, dense, offsets).distance[used] - found
+        dense = OffsetSources(SurfacePoints(np.tile(segments.faces, 40), points), np.tile(segments.offset, 40))
+        vertices = OffsetSources(chosen.vertices, chosen.vertex_offset)
+        every = [dense, vertices] if len(chosen.vertices) else dense
+        excess = surface.solve(source_set(every, mesh.n_vertices, mesh.F)).distance[used] - found
         gap = max(curve.lengths(mesh).max() for curve in (along, level)) / 39
         assert excess.min() > -1e-13
         assert excess.max() <= gap / 2
@@ -120,7 +122,7 @@ def test_labels_offsets_and_targets():
     np.testing.assert_array_equal(cells.labels, each.argmin(axis=0))
     targets = SurfacePoints(np.arange(mesh.n_faces), np.tile([0.2, 0.5, 0.3], (mesh.n_faces, 1)))
     surface = ExactSurface(intrinsic_triangulation(mesh))
-    found = surface.solve(segments=source_set(curve, mesh.n_vertices, mesh.F).segments, targets=targets)
+    found = surface.solve(source_set(curve, mesh.n_vertices, mesh.F), targets=targets)
     truth = np.abs(targets.positions(mesh)[:, 0] - 0.43)
     np.testing.assert_allclose(found.target_distance, truth, rtol=1e-12, atol=1e-14)
 
@@ -128,9 +130,9 @@ def test_labels_offsets_and_targets():
 def test_segments_need_the_faces_of_the_mesh():
     stretched = Mesh(shapes.grid(6).V * [4, 1, 1], shapes.grid(6).F)
     sheared = Mesh(stretched.V + np.outer(stretched.V[:, 0], [0, 0.9, 0]), stretched.F)
-    segments = source_set(isolines(sheared, sheared.V[:, 0], 0.43)[0][0], sheared.n_vertices, sheared.F).segments
+    curve = source_set(isolines(sheared, sheared.V[:, 0], 0.43)[0][0], sheared.n_vertices, sheared.F)
     with pytest.raises(ValueError, match="were not flipped"):
-        delaunay(sheared).solve(segments=segments)
+        delaunay(sheared).solve(curve)
 
 
 @pytest.mark.parametrize("method", ["sweep"])

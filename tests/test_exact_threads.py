@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from conftest import perturbed
-from surfaces import bent_pages, moebius_strip, two_arms
+from surfaces import bent_pages, moebius_strip, on, two_arms
 
-from heat_igl import Mesh, SurfacePoints, isolines, shapes
+from heat_igl import Mesh, OffsetSources, SurfacePoints, isolines, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.kernels.windows import windows
-from heat_igl.sources import source_set
+from heat_igl.sources import Sources
 from heat_igl.windows import exact
 from heat_igl.windows.exact import ExactSurface
 
@@ -44,31 +44,30 @@ def shared_from_the_start(monkeypatch):
     monkeypatch.setattr(exact, "_ROUND", 0.3)
 
 
-def both_ways(surface: ExactSurface, *sources: np.ndarray, **keywords: object) -> tuple[np.ndarray, np.ndarray]:
+def both_ways(mesh: Mesh, sources: Sources, cutoff: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
     """Distances by one thread and by two."""
-    return surface.solve(*sources, **keywords).distance, surface.solve(*sources, threads=2, **keywords).distance
+    surface, chosen = ExactSurface(intrinsic_triangulation(mesh)), on(mesh, sources)
+    return tuple(surface.solve(chosen, cutoff=cutoff, threads=threads).distance for threads in (1, 2))
 
 
 @pytest.mark.parametrize("name", ZOO)
 def test_two_threads_find_what_one_finds(name):
     mesh = ZOO[name]()
-    surface, rng = ExactSurface(intrinsic_triangulation(mesh)), np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     for source in rng.choice(np.unique(mesh.F), 5):
-        np.testing.assert_array_equal(*both_ways(surface, np.array([source])))
+        np.testing.assert_array_equal(*both_ways(mesh, source))
     several, offsets = rng.choice(np.unique(mesh.F), 7, replace=False), rng.random(7) * mesh.edge_lengths.mean()
-    np.testing.assert_array_equal(*both_ways(surface, several, offsets))
-    cutoff = float(np.median(surface.solve(several[:1]).distance))
-    np.testing.assert_array_equal(*both_ways(surface, several, cutoff=cutoff))
+    np.testing.assert_array_equal(*both_ways(mesh, OffsetSources(several, offsets)))
+    cutoff = float(np.median(both_ways(mesh, several[:1])[0]))
+    np.testing.assert_array_equal(*both_ways(mesh, several, cutoff))
     points = SurfacePoints(rng.integers(mesh.n_faces, size=3), rng.dirichlet(np.ones(3), 3))
-    np.testing.assert_array_equal(*both_ways(surface, points=points))
+    np.testing.assert_array_equal(*both_ways(mesh, points))
 
 
 def test_two_threads_find_what_one_finds_from_curves():
     for mesh in (shapes.grid(16), perturbed(shapes.icosphere(3), 0.3, 1)):
         curve = isolines(mesh, mesh.V[:, 0] + 0.3 * mesh.V[:, 1], 0.4)[0][0]
-        segments = source_set(curve, mesh.n_vertices, mesh.F).segments
-        surface = ExactSurface(intrinsic_triangulation(mesh))
-        np.testing.assert_array_equal(*both_ways(surface, segments=segments))
+        np.testing.assert_array_equal(*both_ways(mesh, curve))
 
 
 def test_the_second_thread_has_a_share(monkeypatch):
@@ -81,8 +80,8 @@ def test_the_second_thread_has_a_share(monkeypatch):
         return done
 
     monkeypatch.setattr(windows, "search", search)
-    surface = ExactSurface(intrinsic_triangulation(ZOO["rough sphere"]()))
-    found = surface.solve(np.array([0]), threads=2)
+    mesh = ZOO["rough sphere"]()
+    found = ExactSurface(intrinsic_triangulation(mesh)).solve(on(mesh, 0), threads=2)
     assert len(shares) == 2
     assert sum(shares) == found.n_windows
     assert min(shares) > 0.1 * found.n_windows

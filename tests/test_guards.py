@@ -19,7 +19,7 @@ from heat_igl.steps import PoissonProblem
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES, joined
-from heat_igl.windows import Engine, GuardedEngine, Invariants, WindowEngine, from_vertex
+from heat_igl.windows import Engine, GuardedEngine, Invariants, WindowEngine, directions
 
 SOURCE, FAR = 40, 399
 
@@ -248,14 +248,14 @@ def test_paths_that_are_wrong_are_found_again_or_an_error(monkeypatch, what, fac
 
 def test_the_log_map_of_a_vertex_that_is_wrong_is_found_again(monkeypatch):
     mesh = shapes.grid(19)
-    right, searched = heat_igl.log_map(mesh, SOURCE), from_vertex.search
+    right, searched = heat_igl.log_map(mesh, SOURCE), directions.search
 
     def wrong(*arguments, **options):
         found = searched(*arguments, **options)
         found.found.distance[7] *= 0.5
         return found
 
-    monkeypatch.setattr(from_vertex, "search", wrong)
+    monkeypatch.setattr(directions, "search", wrong)
     np.testing.assert_allclose(heat_igl.log_map(mesh, SOURCE), right, atol=1e-9)
 
 

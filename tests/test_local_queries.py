@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import perturbed
-from surfaces import bent_pages, bumpy, two_arms
+from surfaces import bent_pages, bumpy, on, two_arms
 
 import heat_igl
 from heat_igl import (
@@ -45,7 +45,7 @@ MESHES = {
 def full(mesh: Mesh) -> FloatArray:
     """All distances (n, n), one full search after the other on one surface."""
     surface = ExactSurface(from_mesh(mesh, 0))
-    return np.array([surface.solve(np.array([v])).distance for v in range(mesh.n_vertices)])
+    return np.array([surface.solve(on(mesh, v)).distance for v in range(mesh.n_vertices)])
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -198,7 +198,7 @@ def test_a_search_clears_what_it_wrote(monkeypatch):
 def test_a_cutoff_ends_the_search():
     mesh = bumpy()
     surface = ExactSurface(from_mesh(mesh, 0))
-    windows = [surface.solve(np.array([0]), cutoff=cutoff).n_windows for cutoff in (0.1, 0.2, 0.4, 0.8, np.inf)]
+    windows = [surface.solve(on(mesh, 0), cutoff=cutoff).n_windows for cutoff in (0.1, 0.2, 0.4, 0.8, np.inf)]
     assert all(less < more for less, more in pairwise(windows))
     # On a sphere of radius 1 a cap of radius 0.2 is a hundredth of the area.
     assert windows[1] < 0.03 * windows[-1]

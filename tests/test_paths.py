@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed, zoo
-from surfaces import assert_connected, moebius_strip, rough_field, rough_star, two_arms
+from surfaces import assert_connected, moebius_strip, on, rough_field, rough_star, two_arms
 
 import heat_igl
 from heat_igl import (
@@ -153,7 +153,7 @@ def test_paths_are_as_long_as_the_exact_distance(name):
     used = np.unique(mesh.F)
     targets = places(mesh, 40)
     for source in np.random.default_rng(0).choice(used, 2, replace=False):
-        found = surface.solve(np.array([source]), targets=targets)
+        found = surface.solve(on(mesh, source), targets=targets)
         assert_exact(mesh, used, int(source), found.distance[used])
         assert_exact(mesh, targets, int(source), found.target_distance)
 
@@ -168,9 +168,9 @@ def test_paths_to_many_sources_end_at_the_nearest(name):
     )
     begins, targets = np.array([0.0, 0.05, 0.1, 0.02]), places(mesh, 20)
     surface = ExactSurface(intrinsic_triangulation(mesh))
-    found = surface.solve(vertices, begins[:2], points, begins[2:], targets=targets)
     positions = np.concatenate([mesh.V[vertices], points.positions(mesh)])
     sources = [OffsetSources(vertices.tolist(), begins[:2]), OffsetSources(points, begins[2:])]
+    found = surface.solve(on(mesh, sources), targets=targets)
     for to, distance, label in (
         (used, found.distance[used], found.origin.label[used]),
         (targets, found.target_distance, found.target_origin.label),
@@ -184,7 +184,7 @@ def test_paths_to_many_sources_end_at_the_nearest(name):
 def test_edges_of_many_faces_flat_parts_and_pieces(name):
     mesh = zoo(name)
     source = int(mesh.F[0, 0])
-    distance = ExactSurface(intrinsic_triangulation(mesh)).solve(np.array([source])).distance
+    distance = ExactSurface(intrinsic_triangulation(mesh)).solve(on(mesh, source)).distance
     targets = np.flatnonzero(np.isfinite(distance))[::5]
     assert_exact(mesh, targets, source, distance[targets])
 

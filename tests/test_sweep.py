@@ -15,8 +15,8 @@ from heat_igl.sources import source_set
 from heat_igl.sweep import SweepEngine
 from heat_igl.sweep.sweep import numbered_spokes
 from heat_igl.windows import MeshTriangles
-from heat_igl.windows.bounds import Bounds
 from heat_igl.windows.exact import exact_distance
+from heat_igl.windows.guards import Bounds
 
 # --- Distance by sweeps over triangles, in an order of their own: exact on flat domains, near it on others
 

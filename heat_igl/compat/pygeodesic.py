@@ -13,7 +13,7 @@ import numpy as np
 from heat_igl.curves import shortest_path
 from heat_igl.errors import MeshError, positive
 from heat_igl.mesh import Mesh
-from heat_igl.sources import Sources, named_vertices
+from heat_igl.sources import Sources, named_vertices, source_set
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.windows import ExactSurface
 from heat_igl.windows.tables import from_mesh
@@ -111,9 +111,10 @@ class PyGeodesicAlgorithmExact:
             np.zeros(1, np.int64) if source_indices is None else named_vertices(source_indices, n, "source_indices")
         )
         targets = None if target_indices is None else named_vertices(target_indices, n, "target_indices")
-        found = self._surface.solve(sources, cutoff=limit, goals=targets)
+        chosen = source_set(sources, n, None)
+        found = self._surface.solve(chosen, cutoff=limit, goals=targets)
         which = slice(None) if targets is None else targets
-        return found.distance[which], np.maximum(found.origin.label[which], 0).astype(np.int32)
+        return found.distance[which], np.maximum(chosen.labels[found.origin.label[which]], 0).astype(np.int32)
 
 
 def read_mesh_from_file(filename: str | PathLike[str]) -> tuple[FloatArray, IntArray]:

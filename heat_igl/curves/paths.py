@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from heat_igl.curves.places import places
 from heat_igl.errors import MeshError, SourceError, names_guessed
+from heat_igl.intrinsic import intrinsic_triangulation
+from heat_igl.kernels.windows.paths import trace_back
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, SurfaceCurve, SurfacePoints, as_simplices
 from heat_igl.sources import Sources, SourceSet, named_vertices, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.windows import exact_paths
-from heat_igl.windows.tables import MARGIN
+from heat_igl.windows.exact import search
+from heat_igl.windows.tables import MARGIN, from_triangulation
 
 # A path that is lost among faces without area is looked for again on triangles that are mollified by this share of the
 # mean edge length. Of 36 000 paths on 300 meshes with coincident vertices and needles, 255 were lost at first and none
@@ -51,7 +55,7 @@ def shortest_paths(
     Notes
     -----
     Exact distance is found by windows (Mitchell, Mount and Papadimitriou 1987). The windows that reach a target lead
-    straight back, from bend to bend, to the source; see `exact_paths`.
+    straight back, from bend to bend, to the source.
 
     Examples
     --------
@@ -119,21 +123,48 @@ def shortest_path(mesh: MeshLike, a: Sources, b: Sources, *, region: ArrayLike |
 
 def _exact(mesh: Mesh, sources: SourceSet, face: IntArray, barycentric: FloatArray) -> list[SurfaceCurve]:
     """The path from each place, on triangles that are mollified more where paths are lost."""
-    paths: dict[int, SurfaceCurve] = {}
+    paths: list[SurfaceCurve | None] = [None] * len(face)
     left = np.arange(len(face))
     for margin in (MARGIN, _WIDER_MARGIN):
-        found = exact_paths(mesh, sources, face[left], barycentric[left], margin)
-        for i, begin, end in zip(left, found.first, found.first[1:], strict=False):
-            if begin < end:
-                points = found.points[begin:end]
-                paths[int(i)] = SurfaceCurve(found.faces[begin:end], points[:, 0], points[:, 1])
-        left = np.setdiff1d(left, list(paths))
-        if not len(left):
-            return [paths[i] for i in range(len(face))]
-    far = np.isinf(found.distance)
+        found, distance = _traced(mesh, sources, face[left], barycentric[left], margin)
+        for i, path in zip(left, found, strict=True):
+            paths[i] = path
+        lost = np.array([path is None for path in found])
+        left, far = left[lost], np.isinf(distance[lost])
+        known = [path for path in paths if path is not None]
+        if len(known) == len(paths):
+            return known
     if far.any():
         raise SourceError(
             f"from targets[{left[np.argmax(far)]}] no source can be reached ({far.sum()} of {len(face)} lie on other "
             "components): leave out targets at infinite distance"
         )
     raise MeshError(f"the path from targets[{left[0]}] is lost among faces without area: repair these faces")
+
+
+def _traced(
+    mesh: Mesh, sources: SourceSet, faces: IntArray, barycentric: FloatArray, margin: float
+) -> tuple[list[SurfaceCurve | None], FloatArray]:
+    """Paths from places (k,) in faces by windows on these faces, mollified by a margin, and distances (k,).
+
+    The search ends when the distance of all places is known. A path that passes a vertex closer than rounding goes
+    through it; it is None if no source is reached, or if it is lost among needles.
+    """
+    tables = from_triangulation(intrinsic_triangulation(mesh, margin))
+    is_corner = barycentric.max(axis=1) == 1
+    vertex = np.full(len(faces), -1)
+    vertex[is_corner] = mesh.F[faces[is_corner], barycentric[is_corner].argmax(axis=1)]
+    inside = SurfacePoints(faces[~is_corner], barycentric[~is_corner]) if not is_corner.all() else None
+    late = sources.with_offsets(sources.offsets - sources.offsets.min())
+    done = search(tables, late, targets=inside, goals=np.unique(vertex[is_corner]))
+    number = np.where(is_corner, tables.number[vertex], -1).astype(np.int32)
+    target, ends = np.full(len(faces), -1), np.zeros(len(faces), np.int64)
+    target[~is_corner] = done.nearest_copy(int((~is_corner).sum()))
+    where, places = trace_back(tables, done.found, done.starts, done.targets, number, target, ends)
+    distance = done.found.distance[number]
+    distance[~is_corner] = done.targets.found.distance[target[~is_corner]]
+    where, paths = tables.face[where].astype(np.int64), []
+    for begin, end in pairwise([0, *ends.tolist()]):
+        part = places[begin:end]
+        paths.append(SurfaceCurve(where[begin:end], part[:, 0], part[:, 1]) if begin < end else None)
+    return paths, distance

@@ -1,4 +1,4 @@
-"""`GeodesicSolver` and `geodesic_distance`: distance on every domain, by the engine that the plan names."""
+"""`GeodesicSolver` and `geodesic_distance`: distance and its derivatives, by the engine that the plan names."""
 
 from heat_igl.lazy import attached
 

@@ -1,9 +1,9 @@
 """Derivatives of exact distance by the positions of the vertices, by edge lengths, by the sources and by a metric.
 
 All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
-lengths lead paths (`heat_igl.windows.path_lengths`), from there to the edges of the mesh the flips
-(`heat_igl.intrinsic.length_derivatives`); the positions follow here.
-docs/derivatives_theory.md derives each step.
+lengths lead paths (`heat_igl.kernels.windows.derivatives`), from there to the edges of the mesh the flips
+(`heat_igl.intrinsic.length_derivatives`), and on to the positions the edges. docs/derivatives_theory.md derives each
+step.
 """
 
 from __future__ import annotations
@@ -13,14 +13,16 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import Merged
+from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back
+from heat_igl.kernels.windows import derivatives as kernels
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import MetricSides, SideLengths, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import gradient_rows, velocities
-from heat_igl.typing import ArrayLike, FloatArray, IntArray
-from heat_igl.windows import Change, PathLengths
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.windows import ExactSurface
+from heat_igl.windows.exact import search
 
 # A distance that differs from the length of the path by more than this fraction is not the length of that path.
 # Rounding is below 1e-14; in flat parts other paths are longer by 1e-13 to 1e-9, with derivatives that differ by 1e-3.
@@ -49,9 +51,10 @@ class DistanceDerivative:
         sources: SourceSet,
         surface: Surface,
         sides: SideLengths | None,
-        paths: PathLengths,
+        windows: ExactSurface,
     ) -> None:
-        self.distance, self._sources, self._sides, self._paths = distance, sources, sides, paths
+        self.distance, self._sources, self._sides = distance, sources, sides
+        self._paths = PathLengths(windows, surface.unfolding, sources)
         if surface.faces is None:
             raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
         self._faces = surface.faces
@@ -173,8 +176,7 @@ class DistanceDerivative:
                 velocity = velocities("points", points, by_place.shape, "source point")
                 by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
             given = PlaceSlopes(places.faces, places.barycentric, by_place)
-        change = carry_lengths(self._paths.triangulation, by_side, given)
-        result = self._paths.push_forward(Change(*change))
+        result = self._paths.push_forward(*carry_lengths(self._paths.triangulation, by_side, given))
         result[self.unreachable] = 0.0
         return result
 
@@ -206,9 +208,9 @@ class DistanceDerivative:
 
     def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """The derivative (m, 3) by the sides of the faces before any flip, and (p, 3) by the points in given faces."""
-        change, points = self._paths.pull_back(row), self._sources.points
-        places = None if change.by_place is None else PlaceSlopes(points.faces, points.barycentric, change.by_place)
-        return carry_lengths_back(self._paths.triangulation, change.by_side, places)
+        (by_side, by_place), points = self._paths.pull_back(row), self._sources.points
+        places = None if by_place is None else PlaceSlopes(points.faces, points.barycentric, by_place)
+        return carry_lengths_back(self._paths.triangulation, by_side, places)
 
     @cached_property
     def _merged(self) -> Merged | None:
@@ -256,3 +258,89 @@ def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Me
             "derivatives are there for vertices and points, and a curve is among the sources: place points on it"
         )
     return surface
+
+
+class PathLengths:
+    """Distances as lengths of paths: one answer of exact windows from vertices and points.
+
+    A path is known by the last vertex or source point before each vertex, from which a straight line leads to it; up to
+    there it is the path of that vertex.
+
+    Parameters
+    ----------
+    surface : ExactSurface
+        The triangles that the paths run on.
+    triangulation : IntrinsicTriangulation
+        What the surface was made from: m triangles on n vertices.
+    sources : SourceSet
+        Vertices, and points in the faces of the mesh.
+    """
+
+    def __init__(self, surface: ExactSurface, triangulation: IntrinsicTriangulation, sources: SourceSet) -> None:
+        self._points = sources.points
+        self.triangulation, self._tables = triangulation, surface.tables
+        done = search(surface.tables, sources)
+        found, starts = done.found, done.starts
+        order = np.argsort(found.distance, kind="stable")
+        self._places, self._arguments = starts.points, (surface.tables, found, starts, order)
+
+    def pull_back(self, g: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+        """The derivative of the sum of distances times g (n,), by sides and places.
+
+        It is (m, 3) by the length of the side opposite each corner of the triangulation; an edge of two faces changes
+        both of its sides. By the coordinates of each source point it is (p, 3), up to a constant in each row; None
+        without points.
+        """
+        tables, e = self._tables, len(self._places.faces)
+        weight, by_table, by_place = np.zeros(tables.n + e), np.zeros(len(tables.edges.length)), np.zeros((e, 3))
+        weight[tables.number] = g
+        kernels.pull_back(*self._arguments, weight, by_table, by_place)
+        by_side = np.zeros(self.triangulation.l.shape)
+        by_side[tables.face] = by_table.reshape(-1, 3)
+        return by_side, self._by_points(tables.unscaled(by_place)) if len(self._points.faces) else None
+
+    def _by_points(self, by_place: FloatArray) -> FloatArray:
+        """The derivative (p, 3) by the coordinates of each source point in its own triangle.
+
+        Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
+        """
+        result = np.zeros((len(self._points.faces), 3))
+        for c, (known, point, corner) in enumerate(self._own_corners()):
+            np.add.at(result, (point, corner), by_place[known, c])
+        return result
+
+    def _at_places(self, by_point: FloatArray) -> FloatArray:
+        """The changes of all places, from those (p, 3) of the coordinates of each source point in its own triangle."""
+        result = np.zeros((len(self._places.faces), 3))
+        for c, (known, point, corner) in enumerate(self._own_corners()):
+            result[known, c] = by_point[point, corner]
+        return result
+
+    def _own_corners(self) -> list[tuple[BoolArray, IntArray, IntArray]]:
+        """For each corner of the places' triangles: whether the point's own triangle has it, the point, the corner."""
+        places, points = self._places, self._points
+        F = self.triangulation.F[self._tables.face[places.faces]]
+        own_faces, _ = self.triangulation.locate(points.faces, points.barycentric)
+        own = self.triangulation.F[own_faces[places.point]]
+        same = [own == F[:, [c]] for c in range(3)]
+        known = [at.any(axis=1) for at in same]
+        return [(k, places.point[k], at.argmax(axis=1)[k]) for at, k in zip(same, known, strict=True)]
+
+    def push_forward(self, by_side: FloatArray, by_place: FloatArray | None) -> FloatArray:
+        """How the distances (n,) change with sides (m, 3) and places (p, 3) of points in the triangulation."""
+        moves = np.zeros((len(self._places.faces), 3)) if by_place is None else self._at_places(by_place)
+        return self._summed(by_side, moves, np.zeros(self._tables.n + len(moves)))
+
+    def lengths(self) -> FloatArray:
+        """Distances (n,) summed along the paths; 0 where there is none."""
+        # A line is homogeneous in the sides (Euler); to it comes the distance at which the source starts.
+        tables, found, starts, _ = self._arguments
+        begin = np.where(found.root == np.arange(tables.n), found.distance, 0.0)
+        moves = np.zeros((len(self._places.faces), 3))
+        return self._summed(self.triangulation.l, moves, np.concatenate([begin, starts.point_offset]))
+
+    def _summed(self, by_side: FloatArray, moves: FloatArray, change: FloatArray) -> FloatArray:
+        """Changes (n,) of distances when sides and places change, and offsets of sources, in the unit of the tables."""
+        tables = self._tables
+        kernels.push_forward(*self._arguments, tables.scaled(by_side[tables.face]).ravel(), moves, change)
+        return tables.unscaled(change[tables.number])

@@ -22,10 +22,10 @@ from heat_igl.windows import Engine, GuardedEngine, MeshTriangles, OperatorTrian
 
 if TYPE_CHECKING:
     from heat_igl.geodesic.derivatives import DistanceDerivative
-    from heat_igl.heat.directions import Directions
     from heat_igl.intrinsic import TangentFrames
     from heat_igl.sweep import SweepEngine
     from heat_igl.sweep.simplex_derivative import SimplexDerivative
+    from heat_igl.windows.directions import Directions
 
 
 @names_guessed
@@ -405,14 +405,14 @@ class GeodesicSolver(BatchedSolver):
         ValueError
             If the engine is not windows, or the solver was made from operators.
         """
-        from heat_igl.heat.directions import directions
+        from heat_igl.windows.directions import directions
 
         chosen = self._source_set(sources)
         engine, frames = self._directed
         found = directions(*engine.directed(chosen), frames)
         if isinstance(self._domain, PointCloud):
             if self._domain.cover is not None:
-                from heat_igl.heat.directions import directions_from_one_side
+                from heat_igl.windows.directions import directions_from_one_side
 
                 found = directions_from_one_side(found, frames, self.n_vertices, self._domain.n_faces)
             return found if self._originals is None else found.of(self._originals)
@@ -459,7 +459,7 @@ class GeodesicSolver(BatchedSolver):
         if isinstance(domain, Operators):
             sides = domain.metric
         distance = engine.distance(chosen, np.inf, n_threads())
-        return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.paths(chosen))
+        return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_delaunay)
 
     def _windows(self, what: str) -> GuardedEngine:
         """The engine, if it finds paths."""

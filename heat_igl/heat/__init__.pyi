@@ -1,7 +1,6 @@
 from heat_igl.heat.batches import LabelledDistance as LabelledDistance
 from heat_igl.heat.checking import AnswerCheck as AnswerCheck
 from heat_igl.heat.checking import Comparison as Comparison
-from heat_igl.heat.directions import Directions as Directions
 from heat_igl.heat.parts import Diagnostics as Diagnostics
 from heat_igl.heat.parts import HeatSolution as HeatSolution
 from heat_igl.heat.parts import Magnitude as Magnitude
@@ -11,3 +10,4 @@ from heat_igl.heat.signed_heat import SignedHeatSolver as SignedHeatSolver
 from heat_igl.heat.solver import HeatMethodSolver as HeatMethodSolver
 from heat_igl.heat.vector_heat import VectorHeatSolver as VectorHeatSolver
 from heat_igl.heat.vector_heat import VectorMethod as VectorMethod
+from heat_igl.windows.directions import Directions as Directions

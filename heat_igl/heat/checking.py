@@ -14,7 +14,7 @@ from heat_igl.sources import SourceSet
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.windows import Engine, OperatorTriangles, WindowEngine, contradicted
-from heat_igl.windows.bounds import Bounds, raise_to_lines, source_places
+from heat_igl.windows.guards import Bounds, raise_to_lines, source_places
 
 # Mean shortfall from which on all distances are raised to straight lines.
 _RAISED = 0.005

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.mesh import SurfacePoints
 from heat_igl.operators import Operators
 from heat_igl.plan import NEAR_RADIUS
 from heat_igl.runtime import SOURCE_HEAT
@@ -239,23 +238,18 @@ class SourceAssembler:
             is_covered = surface.uncovered is not None and not self._plain
             if not (is_covered and self._straight[0].meets_shared_edge(sources.vertices[rim])):
                 return _NONE, _NONE
-        vertices, points, segments = sources.vertices[rim], sources.points, sources.segments
         begin = sources.offsets.min()
         radius = self._radius * self._h_at(np.arange(self._faces.n))
         # The corners of the sources' own faces are known, too, however far they are.
-        places = points.joined(segments.ends())
+        places = sources.points.joined(sources.segments.ends())
         own, _ = self._faces.locate(places.faces, places.barycentric)
         reach = max(float(radius.max()), float(self._faces.l[own].max(initial=0.0)))
+        at_rim = {name: getattr(sources, name)[rim] for name in ("vertices", "vertex_label", "vertex_offset")}
+        started = replace(sources, **at_rim)
         found = self.windows.solve(
-            vertices,
-            sources.vertex_offset[rim] - begin,
-            SurfacePoints(points.faces, points.barycentric) if len(points.faces) else None,
-            points.offset - begin if len(points.faces) else None,
-            replace(segments, offset=segments.offset - begin) if len(segments.faces) else None,
-            cutoff=reach + float(sources.offsets.max() - begin),
+            started.with_offsets(started.offsets - begin), cutoff=reach + float(sources.offsets.max() - begin)
         )
-        offset = np.concatenate([sources.vertex_offset[rim], points.offset, segments.offset])[found.origin.label]
-        label = np.concatenate([sources.vertex_label[rim], points.label, segments.label])[found.origin.label]
+        offset, label = started.offsets[found.origin.label], started.labels[found.origin.label]
         value = found.distance + begin
         is_near = value - offset <= radius
         is_far = np.zeros(len(value), bool)

@@ -14,7 +14,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, real_numbers, require_choice
-from heat_igl.heat.directions import axis_of_second_side, carried
 from heat_igl.heat.parts import SolverOptions, prepare
 from heat_igl.heat.solver import HeatMethodSolver
 from heat_igl.intrinsic import (
@@ -35,6 +34,7 @@ from heat_igl.sources import Sources, named_vertices, source_set
 from heat_igl.steps import VectorHeatFlow
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows import MeshTriangles, PathAngles, WindowEngine
+from heat_igl.windows.directions import axis_of_second_side, carried
 
 VectorMethod = Literal["heat", "windows"]
 # Vectors shorter than this share of the longest at a neighbour are rounding: those that arrive cancel.

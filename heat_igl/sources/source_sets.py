@@ -90,6 +90,18 @@ class SourceSet:
             return self.vertex_offset
         return np.concatenate([self.vertex_offset, self.points.offset, self.segments.offset])
 
+    @property
+    def labels(self) -> IntArray:
+        """The label of every vertex, point and segment; then -1 for nothing, at which the index -1 looks."""
+        return np.concatenate([self.vertex_label, self.points.label, self.segments.label, [-1]])
+
+    def with_offsets(self, offsets: FloatArray) -> SourceSet:
+        """The same sources with other offsets, of every vertex, point and segment."""
+        k = len(self.vertices)
+        of_points, of_segments = np.split(offsets[k:], [len(self.points.offset)])
+        points, segments = replace(self.points, offset=of_points), replace(self.segments, offset=of_segments)
+        return replace(self, vertex_offset=offsets[:k], points=points, segments=segments)
+
     def within(self, part: MeshPart) -> SourceSet:
         """The same sources, by the faces of a part of the mesh; a `SourceError` names the first that is outside."""
         part.require_vertices(self.vertices, position=self.vertex_label)

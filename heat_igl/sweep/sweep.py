@@ -6,6 +6,7 @@ docs/engines_theory.md has the update and its error.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -20,10 +21,9 @@ from heat_igl.plan import NEAR_RADIUS, SurfaceMeasures
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourcePoints, SourceSet, samples
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
-from heat_igl.windows.bounds import Bounds
-from heat_igl.windows.engine import TriangleEngine, Triangles
+from heat_igl.windows.engine import Query, TriangleEngine, Triangles
 from heat_igl.windows.exact import ExactSolution
-from heat_igl.windows.queries import Query, labels_of
+from heat_igl.windows.guards import Bounds
 
 _SPOKE = np.dtype(
     [(name, "f8") for name in ("length", "along", "height", "base", "beyond_along", "beyond_depth")]
@@ -150,11 +150,11 @@ class SweepEngine(TriangleEngine):
         near = self._near(query)
         distance, origin = self._swept(query, points, near)
         distance = query.with_begin(distance)
-        labels = labels_of(sources, points)[origin]
+        labels = replace(sources, points=points).labels[origin]
         if near is not None:
             at = np.flatnonzero(np.isfinite(near.distance))
             distance[at] = query.with_begin(near.distance)[at]
-            labels[at] = labels_of(sources)[near.origin.label[at]]
+            labels[at] = sources.labels[near.origin.label[at]]
         swept = distance.copy()
         distance[np.isnan(distance)] = np.inf
         distance[sources.vertices] = np.minimum(distance[sources.vertices], sources.vertex_offset)
@@ -166,7 +166,7 @@ class SweepEngine(TriangleEngine):
     def _points(self, query: Query) -> SourcePoints:
         """The points of a query, and those that stand for its curves."""
         sources = query.sources
-        if not query.has_curves:
+        if not len(query.sources.segments.faces):
             return sources.points
         spacing = _SPACING * self._triangles.mean_edge_length
         along, _ = samples(self._triangles.faces, sources.segments, spacing)
@@ -179,7 +179,8 @@ class SweepEngine(TriangleEngine):
             return None
         edges = _KNOWN_RADIUS if sources.on_vertices_alone else NEAR_RADIUS
         cutoff = edges * self._triangles.mean_edge_length + float(sources.offsets.max())
-        return query.solve(self._on_faces if query.has_curves else self._on_delaunay, cutoff=cutoff)
+        surface = self._on_faces if len(sources.segments.faces) else self.on_delaunay
+        return surface.solve(sources, cutoff=cutoff)
 
     def _swept(self, query: Query, points: SourcePoints, near: ExactSolution | None) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the vertex or point (n,) that it is measured from, counted one after the other."""
@@ -195,7 +196,7 @@ class SweepEngine(TriangleEngine):
             return at
 
         begin(*self._corners_of(points, k))
-        if near is not None and not query.has_curves:  # which point of a curve is nearest is not known
+        if near is not None and not len(query.sources.segments.faces):  # which point of a curve is nearest is not known
             known = np.flatnonzero(np.isfinite(near.distance))
             known = known[~np.isin(known, sources.vertices)]
             is_stale[begin(known, near.distance[known], near.origin.label[known])] = False
@@ -228,7 +229,7 @@ class SweepEngine(TriangleEngine):
         """For each source, which curve it is a point of, or itself."""
         k = len(query.sources.vertices)
         groups = np.arange(k + len(points.label))
-        if query.has_curves:
+        if len(query.sources.segments.faces):
             of_curve = np.isin(points.label, query.sources.segments.label)
             groups[k:][of_curve] = len(groups) + points.label[of_curve]
         return groups

@@ -1,4 +1,4 @@
-"""Exact polyhedral distance by windows: engines, local queries, directions, paths and their derivatives."""
+"""Exact polyhedral distance by windows: engines, checks of answers, local queries and directions."""
 
 from heat_igl.lazy import attached
 

@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import PolarAngles, carried_angles, lay_out, polar_angles
+from heat_igl.intrinsic import (
+    PolarAngles,
+    TangentFrames,
+    carried_angles,
+    corner_angles,
+    intrinsic_triangulation,
+    lay_out,
+    polar_angles,
+)
 from heat_igl.intrinsic.triangulation import Flipped, next_half_edge, previous_half_edge
-from heat_igl.mesh import ON_SIDE, SurfacePoints
+from heat_igl.kernels.windows.surface import SEVERAL_FANS
+from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
+from heat_igl.mesh.cloud_orientation import on_one_side
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Surface
-from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.windows.exact import ExactSolution
+from heat_igl.sources import SourcePoints, SourceSet, source_set
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.windows.exact import ExactSolution, Leaving, Searched, search
+from heat_igl.windows.guards import Invariants
+from heat_igl.windows.tables import Tables, from_mesh
 
 _WHOLE = 2 * np.pi
+# By how much the lengths of an edge before and after mollification may differ, relatively, and two angles.
+_SAME_LENGTH, _SAME_ANGLE = 1e-7, 1e-5
+# So many edges have to tell how the angles around the source count.
+_FEWEST_EDGES = 2
 
 
 def in_circle(angles: FloatArray) -> FloatArray:
@@ -96,12 +113,15 @@ class PathDirections:
         self.angles: PolarAngles = (
             given if surface.faces is surface.unfolding else carried_angles(given, surface.unfolding)
         )
-        self._faces, self._triangulation = surface.faces, surface.unfolding
+        self._triangulation = surface.unfolding
+        # A corner of the faces at each vertex.
+        self._first = np.maximum(given.first, 0)
 
-    def of_windows(self, found: ExactSolution, points: SurfacePoints | None = None) -> PathAngles:
-        """The angles of exact paths, of which `found` knows how they leave, with p sources at `points` in faces.
+    def of_windows(self, found: ExactSolution, sources: SourceSet) -> tuple[PathAngles, SurfacePoints]:
+        """The angles of exact paths, of which `found` knows how they leave, and the places (n,) at which they start.
 
-        Without `points`, the departure of a path from a place inside a face counts in the triangle of that place.
+        A path from a place inside a face departs in that face, and from a corner around the vertex. Where no source is
+        reached, the place is a corner of face 0.
         """
         origin, leaving = found.origin, found.leaving
         if leaving is None:
@@ -116,10 +136,39 @@ class PathDirections:
             origin.crossing,
             leaving.turn,
         )
-        return self.of_ways(ways, points)
+        if leaving.place is not None:
+            return self._of_curves(self.of_ways(ways), origin.root, leaving.corner, leaving.place)
+        # After vertices and points comes nothing, at which the index -1 looks.
+        corner, points, nothing = self._first[sources.vertices], sources.points, np.zeros(1, np.int64)
+        faces = np.concatenate([corner // 3, points.faces, nothing])
+        barycentric = np.concatenate([np.eye(3)[corner % 3], points.barycentric, np.eye(3)[:1]])
+        starts = unchecked_points(faces[origin.label], barycentric[origin.label])
+        return self.of_ways(ways, points), starts
 
-    def of_ways(self, ways: WindowWays, points: SurfacePoints | None = None) -> PathAngles:
-        """The angles of paths that are named one after the other; `points` as for `of_windows`."""
+    def _of_curves(
+        self, angles: PathAngles, root: IntArray, corner: IntArray, place: FloatArray
+    ) -> tuple[PathAngles, SurfacePoints]:
+        """As `of_windows`, of paths from segments: with these roots (n,), corners (n,) and places (n, 3) there."""
+        n, first = len(root), first_parts(root)
+        start = root[first]
+        at_vertex = np.flatnonzero((start >= 0) & (start < n))
+        corner = np.where(root < 0, 0, corner[first])
+        corner[at_vertex] = self._first[start[at_vertex]]
+        barycentric, faces = place[first], corner // 3
+        others = np.append(at_vertex, np.flatnonzero(root < 0))
+        barycentric[others] = np.eye(3)[corner[others] % 3]
+        # A segment that ends at a vertex leads there too, with an angle in the face.
+        at_corner = np.flatnonzero((start >= n) & (barycentric.max(axis=1) > 1 - ON_SIDE))
+        corner = corner[at_corner] // 3 * 3 + barycentric[at_corner].argmax(axis=1)
+        angles.departure[at_corner] = self.around_corners(corner, angles.departure[at_corner])
+        barycentric[at_corner] = np.eye(3)[corner % 3]
+        return angles, unchecked_points(faces, barycentric)
+
+    def of_ways(self, ways: WindowWays, points: SourcePoints | None = None) -> PathAngles:
+        """The angles of paths that are named one after the other, with p sources at `points` in faces.
+
+        Without `points`, the departure of a path from a place inside a face counts in the triangle of that place.
+        """
         angles, n = self.angles, len(ways.vertex)
         row = np.flatnonzero((ways.corner >= 0) & (ways.root >= 0))
         corner, root, (x, y) = ways.corner[row], ways.root[row], ways.direction[row].T
@@ -170,10 +219,10 @@ class PathDirections:
         first, angle = half_edge - half_edge % 3, self.angles.corners.ravel()
         return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
 
-    def _turns(self, points: SurfacePoints) -> FloatArray:
+    def _turns(self, points: SourcePoints) -> FloatArray:
         """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces: flips turn them."""
         faces, barycentric = points.faces, points.barycentric
-        turn = np.zeros(len(points))
+        turn = np.zeros(len(faces))
         for flips in self._triangulation.history:
             if not isinstance(flips, Flipped):
                 continue  # with other changes there are no polar angles
@@ -181,43 +230,6 @@ class PathDirections:
             turn += flips.turn(faces, after)
             faces = after
         return turn
-
-
-class CurveDirections:
-    """Angles of exact paths on the given faces, in which curves run; argument and errors as for `PathDirections`."""
-
-    def __init__(self, surface: Surface) -> None:
-        faces = surface.unfolding if surface.faces is None else surface.faces
-        self._directions = PathDirections(replace(surface, triangulation=faces, uncovered=None))
-        corner_at = np.zeros(faces.n, np.int64)
-        corner_at[faces.F.ravel()[::-1]] = np.arange(faces.F.size)[::-1]
-        # The first corner of the faces at each vertex.
-        self._corner_at = corner_at
-
-    def of_windows(self, found: ExactSolution) -> tuple[PathAngles, SurfacePoints]:
-        """The angles of the paths to n vertices, and the places (n,) at which the paths start.
-
-        The departure of a path from a place inside a face counts in that face, and from a corner around the vertex.
-        Where no source is reached, the place is a corner of face 0.
-        """
-        root, leaving = found.origin.root, found.leaving
-        if leaving is None or leaving.place is None:
-            raise ValueError("of_windows needs a solution that was asked for with directed=True, from segments")
-        n, first = len(root), first_parts(root)
-        start = root[first]
-        at_vertex = np.flatnonzero((start >= 0) & (start < n))
-        corner = np.where(root < 0, 0, leaving.corner[first])
-        corner[at_vertex] = self._corner_at[start[at_vertex]]
-        barycentric, faces = leaving.place[first], corner // 3
-        others = np.append(at_vertex, np.flatnonzero(root < 0))
-        barycentric[others] = np.eye(3)[corner[others] % 3]
-        angles = self._directions.of_windows(found)
-        # A segment that ends at a vertex leads there too, with an angle in the face.
-        at_corner = np.flatnonzero((start >= n) & (barycentric.max(axis=1) > 1 - ON_SIDE))
-        corner = corner[at_corner] // 3 * 3 + barycentric[at_corner].argmax(axis=1)
-        angles.departure[at_corner] = self._directions.around_corners(corner, angles.departure[at_corner])
-        barycentric[at_corner] = np.eye(3)[corner % 3]
-        return angles, unchecked_points(faces, barycentric)
 
 
 def first_parts(root: IntArray) -> IntArray:
@@ -274,3 +286,235 @@ def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: Float
     found[0, row], found[1, row] = in_circle(departure[top[row]]), in_circle(back[row])
     found[2, row] = turning[row] - _WHOLE * np.rint(turning[row] / _WHOLE)
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Distance, and the directions of the shortest paths, in the frames of `tangent_frames`.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        Length of the path from the nearest source; ``inf`` where no source is reached.
+    labels : (n,) int64
+        The nearest source, counted as by `HeatMethodSolver.voronoi`; -1 where none is reached.
+    departure : (n,) float64
+        Polar angle in [0, 2 pi) at which the path leaves a source vertex, as `exp_map` takes it: scaled, see
+        `tangent_frames`. From a source inside a face, the angle from the side of corners 0 and 1 of that face, to the
+        side of corner 2.
+    arrival : (n,) float64
+        Angle in [0, 2 pi) in the frame of the vertex of the direction in which the path arrives there, away from the
+        source: ``frames.to_world(frames.from_angles(arrival))`` is `gradient`.
+    turning : (n,) float64
+        Angle in [-pi, pi] by which the path turns at the vertices where it bends, counterclockwise, summed up. A vector
+        of angle ``a`` at a source inside the boundary, transported along the path, has the angle ``a + arrival -
+        departure - turning``.
+    gradient : (n, 3) float64
+        Unit vectors in space, tangent at the vertices: the gradient of the distance.
+    start : SurfacePoints
+        The n places at which the paths start: the source, or the place on a curve, in the face in which `departure`
+        counts; at a corner of this face `departure` counts around the vertex. Any place where no source is reached.
+
+    Notes
+    -----
+    Departure, arrival, turning and gradient are 0 at sources and where no source is reached. A path that bends at
+    a vertex of negative curvature, or on the boundary, has the departure of the path to the bend.
+
+    Examples
+    --------
+    >>> import heat_igl
+    >>> solver = heat_igl.GeodesicSolver(heat_igl.shapes.strip(4, 3))
+    >>> found = solver.directions(0)
+    >>> found.gradient[19, :2].round(6).tolist(), round(float(found.distance[19]), 6)  # the corner at (4, 3)
+    ([0.8, 0.6], 5.0)
+    """
+
+    distance: FloatArray
+    labels: IntArray
+    departure: FloatArray
+    arrival: FloatArray
+    turning: FloatArray
+    gradient: FloatArray
+    start: SurfacePoints
+
+    def of(self, vertices: IntArray) -> Directions:
+        """The directions at some vertices (k,)."""
+        start = unchecked_points(self.start.faces[vertices], self.start.barycentric[vertices])
+        rest = {field.name: getattr(self, field.name)[vertices] for field in fields(self)[:-1]}
+        return replace(self, start=start, **rest)
+
+    def __repr__(self) -> str:
+        return f"Directions({len(self.distance)} vertices)"
+
+
+def directions(
+    distance: FloatArray, labels: IntArray, angles: PathAngles, start: SurfacePoints, frames: TangentFrames
+) -> Directions:
+    """The result for paths whose angles are known."""
+    has_path = ~np.isnan(angles.back)
+    departure, turning = (np.where(has_path, angle, 0.0) for angle in (angles.departure, angles.turning))
+    arrival = np.where(has_path, _arrival(angles.back, frames.angles), 0.0)
+    along, across = (np.where(has_path, part, 0.0)[:, None] for part in (np.cos(arrival), np.sin(arrival)))
+    gradient = along * frames.x + across * frames.y
+    return Directions(distance, labels, departure, arrival, turning, gradient, start)
+
+
+def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: PolarAngles) -> AnyArray:
+    """Unit numbers (n,) that components are multiplied by on the way from the source; 1 at sources, 0 without a path.
+
+    Paths start at vertices: `sources` (k,) has the one of each label.
+    """
+    start = sources[np.maximum(labels, 0)]
+    departure = polar.from_polar(start, angles.departure)
+    turn = _arrival(angles.back, polar) - departure - angles.turning
+    return np.where(labels < 0, 0.0, np.exp(1j * np.where(np.isnan(turn), 0.0, turn)))
+
+
+def _arrival(back: FloatArray, polar: PolarAngles) -> FloatArray:
+    """The angle (n,) in the frame opposite the polar angle `back` (n,)."""
+    return in_circle(polar.from_polar(np.arange(len(back)), back) + np.pi)
+
+
+def directions_from_one_side(found: Directions, frames: TangentFrames, n: int, m: int) -> Directions:
+    """The directions of paths from the first side of a cover, see `two_sided_cover`, on the n vertices and m faces.
+
+    Of the two copies of a vertex that which is nearer; arrivals on the second side are seen from the first.
+    """
+    is_other = found.distance[n : 2 * n] < found.distance[:n]
+    seen = found.of(np.arange(n) + n * is_other)
+    mirrored = in_circle(np.angle(axis_of_second_side(frames, n)) - seen.arrival)
+    start = unchecked_points(*on_one_side(seen.start.faces, seen.start.barycentric, m))
+    return replace(seen, arrival=np.where(is_other, mirrored, seen.arrival), start=start)
+
+
+def axis_of_second_side(frames: TangentFrames, n: int) -> AnyArray:
+    """The x axis (n,) of the second side, as complex numbers in the frame of the first."""
+    x = frames.x[n : 2 * n]
+    return np.asarray(np.einsum("nx,nx->n", x, frames.x[:n]) + 1j * np.einsum("nx,nx->n", x, frames.y[:n]))
+
+
+class _Spokes(NamedTuple):
+    """The edges from a vertex: other ends, lengths and angles (k,), and the corners between each and the next."""
+
+    end: IntArray
+    length: FloatArray
+    angle: FloatArray
+    corner: IntArray
+
+
+def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
+    """Vectors (n, 2) of the exact distance, in the direction in which the path to each vertex leaves the source.
+
+    For this, neither the polar angles of other vertices nor the history of the flips are needed.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles.
+    source : int
+        A vertex.
+
+    Returns
+    -------
+    (n, 2) float64 or None
+        In the frame of the source; 0 at the source and where it does not reach. None if the faces are no oriented
+        manifold, if fewer than two edges of the mesh at the source are left in the Delaunay triangulation, or if the
+        distance contradicts itself.
+    """
+    given = _given_spokes(mesh, source)
+    if given is None:
+        return None
+    spokes, scale, on_boundary = given
+    tables = from_mesh(mesh, source)
+    if (tables.edges.twin == -2).any() or not tables.edges.aligned.all():
+        return None
+    around = _around(tables, source)
+    first = _first_angle(spokes, around, scale)
+    if first is None:
+        return None
+    chosen = source_set(source, mesh.n_vertices, mesh.F)
+    done = search(tables, chosen, directed=True)
+    leaving = done.leaving
+    if leaving is None or (tables.kind == SEVERAL_FANS).any():
+        return None
+    begin = np.zeros(len(tables.edges.vertex))
+    begin[around.corner] = first + scale * around.angle
+    top, straight, seen = _first_parts(done, leaving, int(tables.number[source]))
+    angle = begin[leaving.corner[straight]] + scale * seen
+    if on_boundary:
+        angle = np.clip(angle, 0.0, np.pi)
+    unit = np.zeros((len(top), 2))
+    unit[straight, 0], unit[straight, 1] = np.cos(angle), np.sin(angle)
+    distance = tables.unscaled(done.found.distance)[tables.number]
+    if Invariants(mesh.F, mesh.components, mesh.V).contradiction(distance, chosen) is not None:
+        return None
+    return np.asarray(np.where(np.isfinite(distance), distance, 0.0)[:, None] * unit[top][tables.number])
+
+
+def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None:
+    """The edges of the mesh at a vertex with their polar angles, the scale of these, and whether it is on the boundary.
+
+    None if the faces there are not one oriented fan.
+    """
+    F = mesh.F[np.unique(np.flatnonzero(mesh.F.ravel() == source) // 3)]
+    if not len(F):
+        return None
+    used, numbers = np.unique(F, return_inverse=True)
+    star = intrinsic_triangulation(Mesh(mesh.V[used], numbers.reshape(-1, 3)))
+    centre = int(np.searchsorted(used, source))
+    try:
+        polar = polar_angles(star)
+    except MeshError:
+        return None
+    leaves = np.flatnonzero(star.tail(np.arange(F.size)) == centre)
+    spokes = _Spokes(used[star.head(leaves)], star.l.ravel()[leaves], polar.outgoing[leaves], next_half_edge(leaves))
+    return spokes, float(polar.scale[centre]), bool(polar.on_boundary[centre])
+
+
+def _around(tables: Tables, source: int) -> _Spokes:
+    """The edges at a vertex of the tables, counterclockwise, with the sums of the angles of the faces before them."""
+    t = tables.edges
+    start = int(tables.corner_of_vertex[tables.number[source]])
+    clockwise, is_closed = _fan(t.twin, start, 2)
+    found = np.array(_fan(t.twin, start if is_closed else clockwise[-1], 1)[0])
+    angles = corner_angles(t.length.reshape(-1, 3)[found // 3])[np.arange(len(found)), found % 3]
+    end = tables.old_vertex[t.vertex[next_half_edge(found)]]
+    return _Spokes(end, tables.unscaled(t.length[previous_half_edge(found)]), np.cumsum(angles) - angles, found)
+
+
+def _fan(twin: AnyArray, start: int, step: int) -> tuple[list[int], bool]:
+    """The corners of a vertex from one on, counterclockwise for step 1 and clockwise for 2; whether they close up."""
+    corners = [start]
+    while True:
+        corner = corners[-1]
+        side = int(twin[corner - corner % 3 + (corner + step) % 3])
+        corner = side - side % 3 + (side + step) % 3
+        if side < 0 or corner == start:
+            return corners, side >= 0
+        corners.append(corner)
+
+
+def _first_angle(given: _Spokes, around: _Spokes, scale: float) -> float | None:
+    """The polar angle of the first edge in the tables, from the edges of the mesh that are still there."""
+    i, j = np.nonzero(
+        (given.end[:, None] == around.end)
+        & (np.abs(given.length[:, None] - around.length) <= _SAME_LENGTH * around.length)
+    )
+    if len(i) < _FEWEST_EDGES:
+        return None
+    ahead = given.angle[i] - scale * around.angle[j]
+    off = ahead - ahead[0]
+    return None if np.abs(off - 2 * np.pi * np.rint(off / (2 * np.pi))).max() > _SAME_ANGLE else float(ahead[0])
+
+
+def _first_parts(done: Searched, leaving: Leaving, source: int) -> tuple[IntArray, IntArray, FloatArray]:
+    """Of each path, the vertex (n,) that the first straight part leads to; these vertices (k,), and angles (k,) there.
+
+    Angles count from the beginning of the corner out of which a path leaves the source.
+    """
+    root = done.found.root.astype(np.int64)
+    is_first = root == source
+    is_first[source] = False
+    straight = np.flatnonzero(is_first)
+    x, y = leaving.direction[straight].T
+    return first_parts(root), straight, np.arctan2(y, x)

@@ -15,7 +15,7 @@ from heat_igl.kernels.windows import windows
 from heat_igl.kernels.windows.surface import FLAT_VERTEX
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.runtime import n_threads, side_by_side
-from heat_igl.sources import Sources, SourceSegments, vertex_sources
+from heat_igl.sources import Sources, SourceSet, source_set, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows.tables import NO_POINTS, NO_SEGMENTS, Located, Tables, from_mesh, from_triangulation
 
@@ -65,40 +65,31 @@ NO_STARTS = Starts(
 )
 
 
-def starts_at(
-    tables: Tables,
-    sources: IntArray,
-    offsets: FloatArray | None,
-    points: SurfacePoints | None,
-    point_offsets: FloatArray | None,
-    segments: SourceSegments | None,
-) -> Starts:
-    """Sources for the kernel, as `ExactSurface.solve` takes them; points at corners become vertices."""
-    k, p = len(sources), 0 if points is None else len(points)
-    begin = np.zeros(k) if offsets is None else tables.scaled(np.asarray(offsets, np.float64))
-    if points is None and segments is None:
+def starts_at(tables: Tables, sources: SourceSet) -> Starts:
+    """Sources for the kernel; points at corners become vertices.
+
+    A ValueError if there are points or segments, and the tables do not know the faces that they refer to.
+    """
+    vertices, begin, segments = tables.number[sources.vertices], tables.scaled(sources.vertex_offset), sources.segments
+    k, p = len(vertices), len(sources.points.faces)
+    if sources.on_vertices_alone:
         label = np.append(np.arange(k), -1)
-        return NO_STARTS._replace(vertices=tables.number[sources], offset=begin, place=label[k:], label=label)
-    late = np.zeros(p) if point_offsets is None else tables.scaled(np.asarray(point_offsets, np.float64))
-    counted = np.arange(p)
-    if segments is not None:
-        ends, number = segments.ends(), p + np.arange(len(segments.faces))
-        all_faces = np.concatenate([np.empty(0, np.int64) if points is None else points.faces, ends.faces])
-        all_places = np.concatenate([np.empty((0, 3)) if points is None else points.barycentric, ends.barycentric])
-        points = SurfacePoints(all_faces, all_places)
-        late, counted = np.concatenate([late, tables.scaled(ends.offset)]), np.concatenate([counted, number, number])
+        return NO_STARTS._replace(vertices=vertices, offset=begin, place=label[k:], label=label)
+    number = p + np.arange(len(segments.faces))
+    points = sources.points.joined(segments.ends())
     place, lines = tables.located(points), tables.located_segments(segments)
-    late, counted = late[place.point], counted[place.point]
+    late = tables.scaled(points.offset)[place.point]
+    counted = np.concatenate([np.arange(p), number, number])[place.point]
     is_corner = (place.barycentric == 0).sum(axis=1) == 2
     corner = 3 * place.faces[is_corner] + place.barycentric[is_corner].argmax(axis=1)
     numbers = np.concatenate([counted[~is_corner], p + lines.point, [-1]])
     return Starts(
-        np.concatenate([tables.number[sources], tables.edges.vertex[corner]]),
+        np.concatenate([vertices, tables.edges.vertex[corner]]),
         np.concatenate([begin, late[is_corner]]),
         Located(*(column[~is_corner] for column in place)),
         late[~is_corner],
         lines,
-        np.zeros(0) if segments is None else tables.scaled(segments.offset)[lines.point],
+        tables.scaled(segments.offset)[lines.point],
         numbers,
         np.concatenate([np.arange(k), k + counted[is_corner], np.where(numbers < 0, -1, k + numbers)]),
     )
@@ -191,7 +182,7 @@ class Searched(NamedTuple):
         At the vertices.
     targets : Targets
         The target points with their results.
-    n_windows, n_crossings : int
+    n_windows : int
         As in `ExactSolution`.
     leaving : Leaving or None
         At the vertices, if asked for.
@@ -201,7 +192,6 @@ class Searched(NamedTuple):
     found: Found
     targets: Targets
     n_windows: int
-    n_crossings: int
     leaving: Leaving | None
 
     def nearest_copy(self, n_targets: int) -> IntArray:
@@ -251,8 +241,6 @@ class ExactSolution:
         Of the paths to the target points, (t,) each.
     n_windows : int
         Windows that were carried over an edge.
-    n_crossings : int
-        Lists of windows that crossed a face together.
     leaving : Leaving or None
         How the paths to the vertices leave the roots, if that was asked for: corners ``3 f + c`` of the triangulation.
     """
@@ -262,7 +250,6 @@ class ExactSolution:
     target_distance: FloatArray
     target_origin: Origin
     n_windows: int
-    n_crossings: int
     leaving: Leaving | None
 
 
@@ -293,11 +280,7 @@ class ExactSurface:
 
     def solve(
         self,
-        sources: IntArray = _NO_VERTICES,
-        offsets: FloatArray | None = None,
-        points: SurfacePoints | None = None,
-        point_offsets: FloatArray | None = None,
-        segments: SourceSegments | None = None,
+        sources: SourceSet,
         *,
         cutoff: float = np.inf,
         targets: SurfacePoints | None = None,
@@ -305,21 +288,13 @@ class ExactSurface:
         directed: bool = False,
         threads: int = 1,
     ) -> ExactSolution:
-        """Distances from vertices and points.
+        """Distances from vertices, points and curves.
 
         Parameters
         ----------
-        sources : (k,) int64
-            Vertices that distance starts from.
-        offsets : (k,) float64, optional
-            The distance at which each of them starts, not negative; 0 if not given.
-        points : SurfacePoints, optional
-            p sources in the faces that the triangulation was made from.
-        point_offsets : (p,) float64, optional
-            The distance at which each of them starts; 0 if not given.
-        segments : SourceSegments, optional
-            Segments with their offsets, every point of which is a source; their labels are not read. They need a
-            triangulation that was not flipped.
+        sources : SourceSet
+            What distance starts from, with points in the faces that the triangulation was made from. Segments need a
+            triangulation that was not flipped. Labels are not read.
         cutoff : float
             What is farther is ``inf``, and the search ends there.
         targets : SurfacePoints, optional
@@ -345,10 +320,9 @@ class ExactSurface:
         ValueError
             If there are segments or points, and the surface does not know the faces that they refer to.
         """
-        starts = starts_at(self.tables, sources, offsets, points, point_offsets, segments)
         done = search(
             self.tables,
-            starts,
+            sources,
             cutoff=cutoff,
             targets=targets,
             goals=goals,
@@ -360,49 +334,27 @@ class ExactSurface:
             *self._result(done.found, done, self.tables.number, cutoff),
             *self._result(done.targets.found, done, which, cutoff),
             done.n_windows,
-            done.n_crossings,
             self._leaving(done),
         )
 
     def distance(
         self,
-        sources: IntArray,
-        offsets: FloatArray | None = None,
+        sources: SourceSet,
         cutoff: float = np.inf,
         threads: int = 1,
         than: FloatArray | None = None,
     ) -> FloatArray:
-        """Distance (n,) from vertices alone, as `solve` finds it, without the origins of the paths.
+        """Distance (n,) as `solve` finds it, without the origins of the paths.
 
         With `than`, the distances (n,) from other sources, only what is nearer is searched, and the rest is ``inf``.
         """
         tables = self.tables
-        starts = starts_at(tables, sources, offsets, None, None, None)
         upper = None if than is None else tables.scaled(than[tables.old_vertex])
-        done = search(tables, starts, cutoff=cutoff, threads=threads, upper=upper)
+        done = search(tables, sources, cutoff=cutoff, threads=threads, upper=upper)
         distance = tables.unscaled(done.found.distance[tables.number])
         if cutoff < np.inf:
             distance[distance > cutoff] = np.inf
         return distance
-
-    def located(self, points: SurfacePoints) -> tuple[IntArray, FloatArray, IntArray]:
-        """Triangles that hold points of the mesh, coordinates in them, and which point each is.
-
-        A point on a side is there once for each triangle.
-        """
-        place = self.tables.located(points)
-        return self.tables.face[place.faces].astype(np.int64), place.barycentric, place.point
-
-    def located_segments(self, segments: SourceSegments) -> tuple[IntArray, FloatArray]:
-        """Triangles (q,) that hold segments, and coordinates (q, 2, 3) of both ends; one on a side is there twice.
-
-        Raises
-        ------
-        ValueError
-            If the triangles are not those that the segments were given in.
-        """
-        place = self.tables.located_segments(segments)
-        return self.tables.face[place.faces].astype(np.int64), place.barycentric
 
     def _leaving(self, done: Searched) -> Leaving | None:
         """How paths leave the roots, in the caller's numbers."""
@@ -462,8 +414,8 @@ def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, cutoff: floa
     mesh = Mesh(V, F)
     if mesh.is_tetrahedral:
         raise MeshError("exact distance needs triangles, but F has 4 columns")
-    chosen = vertex_sources(sources, mesh.n_vertices)
-    return ExactSurface(from_mesh(mesh, int(chosen[0]))).distance(chosen, cutoff=cutoff, threads=n_threads())
+    chosen = source_set(vertex_sources(sources, mesh.n_vertices), mesh.n_vertices, None)
+    return ExactSurface(from_mesh(mesh, int(chosen.vertices[0]))).distance(chosen, cutoff, n_threads())
 
 
 # A search of the kernel on a front, from some sources; it fills statistics, and returns whether memory sufficed.
@@ -472,7 +424,7 @@ _Run = Callable[[windows.Front, Starts, IntArray], bool]
 
 def search(
     tables: Tables,
-    starts: Starts,
+    sources: SourceSet,
     *,
     cutoff: float = np.inf,
     targets: SurfacePoints | None = None,
@@ -485,7 +437,7 @@ def search(
 
     Only distances smaller than `upper` (n,) are found, by the numbers of the tables.
     """
-    n, wanted = tables.n, _targets_at(tables, targets)
+    n, starts, wanted = tables.n, starts_at(tables, sources), _targets_at(tables, targets)
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
     found, leaving = Found.of(n, n_labels), Leaving.of(n) if directed else None
     goal, limit = tables.number[_NO_VERTICES if goals is None else goals], float(tables.scaled(cutoff))
@@ -507,7 +459,7 @@ def search(
         if upper is not None:
             windows.bound(front, upper)
         _require(run(front, starts, statistics))
-    return Searched(starts, found, wanted, int(statistics[1]), int(statistics[2]), leaving)
+    return Searched(starts, found, wanted, int(statistics[1]), leaving)
 
 
 def _require(is_done: bool) -> None:

@@ -20,8 +20,8 @@ from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
 from heat_igl.runtime import TimeLeft, available_memory, n_threads, over_rows
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
-from heat_igl.windows.engine import ROUNDING, distances_instead
 from heat_igl.windows.exact import TOLERANCE, Found, Leaving
+from heat_igl.windows.guards import ROUNDING, distances_instead
 from heat_igl.windows.tables import Tables, from_mesh
 
 # Bytes that each distance of a sparse array takes while the array is put together.

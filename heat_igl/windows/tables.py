@@ -22,7 +22,7 @@ from heat_igl.intrinsic.triangulation import next_half_edge
 from heat_igl.kernels.mesh import numbering
 from heat_igl.kernels.windows.surface import shapes
 from heat_igl.mesh import Mesh, SurfacePoints
-from heat_igl.sources import SourceSegments
+from heat_igl.sources import SourcePoints, SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 #: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
@@ -126,7 +126,7 @@ class Tables:
         old = 3 * self.face[half_edge // 3].astype(np.int64) + half_edge % 3
         return np.asarray(np.where(half_edge >= 0, old, -1))
 
-    def located(self, points: SurfacePoints | None) -> Located:
+    def located(self, points: SurfacePoints | SourcePoints | None) -> Located:
         """Points of the mesh in the triangles.
 
         Raises
@@ -134,7 +134,7 @@ class Tables:
         ValueError
             If the tables come from `from_mesh`, which keeps no history of its flips.
         """
-        if points is None:
+        if points is None or not len(points.faces):
             return NO_POINTS
         if self._triangulation is None:
             raise ValueError("this surface knows vertices only: make it from a triangulation")
@@ -142,7 +142,7 @@ class Tables:
         located = self._on_all_faces(faces, barycentric[:, None])
         return located._replace(barycentric=located.barycentric[:, 0])
 
-    def located_segments(self, segments: SourceSegments | None) -> Located:
+    def located_segments(self, segments: SourceSegments) -> Located:
         """Segments in the triangles: as `located`, with coordinates (q, 2, 3) of both ends.
 
         Raises
@@ -150,7 +150,7 @@ class Tables:
         ValueError
             If the triangles are not those that the segments were given in.
         """
-        if segments is None:
+        if not len(segments.faces):
             return NO_SEGMENTS
         if self._triangulation is None or self._triangulation.n_flips:
             raise ValueError("segments need triangles that were not flipped: make this surface from those of the mesh")

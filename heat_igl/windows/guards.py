@@ -1,0 +1,386 @@
+"""What every distance keeps: answers that do not are found again, or moved inside of these bounds.
+
+Distance is 0 at the sources, finite exactly on their components, no longer than paths along edges, and no shorter than
+straight lines through space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from heat_igl.errors import AccuracyWarning
+from heat_igl.intrinsic import IntrinsicTriangulation
+from heat_igl.kernels.mesh import bounds as kernels
+from heat_igl.kernels.mesh import checking
+from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.operators import Surface
+from heat_igl.runtime import warn_caller
+from heat_igl.sources import SourceSet, source_set
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.windows.engine import Engine, MeshTriangles, Triangles, WindowEngine
+
+if TYPE_CHECKING:
+    from heat_igl.windows.directions import PathAngles
+
+#: Violations by less than this share of the largest distance are rounding. Answers that are exact to rounding violate
+#: the bounds by up to 1e-9 of it, with coordinates far from the origin.
+ROUNDING = 1e-7
+# Lines to so many sources are measured at every vertex; with k times as many, at every k-th.
+_SOURCES_AT_ALL = 8
+_NO_LENGTHS = np.empty((0, 3))
+_REPORT = "please report this as a bug, with the mesh and the sources"
+# Less than this fraction is rounding.
+_ROUNDING = 1e-12
+# With more sources, a tree finds the nearest sooner than a loop over all.
+_FEW = 32
+_NO_LABELS = np.empty(0, np.int64)
+
+
+class Invariants:
+    """Bounds of a distance on triangles or tetrahedra that are known by the positions of their vertices.
+
+    An answer keeps four of them: it is 0 (or the offset) at the sources, finite exactly on their components, differs
+    along an edge by no more than the length of the edge, and is nowhere below the straight line to the nearest source.
+
+    Parameters
+    ----------
+    F : (m, 3) or (m, 4) int64
+        Triangles or tetrahedra, to which points and curves refer.
+    components : (n,) int64
+        Component label of each vertex.
+    V : (n, 3) float64, optional
+        Positions of the vertices.
+    lengths : (m, 3) float64, optional
+        Lengths of the sides of triangles, each opposite its corner, in place of positions; there are no straight lines
+        then.
+    """
+
+    def __init__(
+        self, F: IntArray, components: IntArray, V: FloatArray | None = None, lengths: FloatArray | None = None
+    ) -> None:
+        self._F = np.ascontiguousarray(F, np.int64)
+        self._components = components
+        self._V = None if V is None else np.ascontiguousarray(V, np.float64)
+        self._l = _NO_LENGTHS if lengths is None else np.ascontiguousarray(lengths, np.float64)
+
+    def contradiction(
+        self,
+        distance: FloatArray,
+        sources: SourceSet,
+        cutoff: float = np.inf,
+        than: FloatArray | None = None,
+    ) -> str | None:
+        """How an answer contradicts the bounds, and where; None if it does not.
+
+        Parameters
+        ----------
+        distance : (n,) float64
+            The answer.
+        sources : SourceSet
+            What it is measured from.
+        cutoff : float
+            Beyond it distances may be ``inf``.
+        than : (n,) float64, optional
+            Distances from other sources; where these are not farther the answer may be ``inf``.
+        """
+        distance = np.ascontiguousarray(distance, np.float64)
+        nearest = distance if than is None else np.minimum(distance, than)
+        slack = ROUNDING * checking.largest_finite(nearest)
+        return (
+            self._at_sources(distance, sources, cutoff, slack)
+            or self._elsewhere(distance, sources)
+            or self._along_edges(nearest, cutoff, slack)
+            or self._below_lines(distance, sources, slack)
+        )
+
+    def _at_sources(self, distance: FloatArray, sources: SourceSet, cutoff: float, slack: float) -> str | None:
+        """Above what a source itself, or a straight line in its face, gives the vertices there."""
+        vertices, bound = sources.vertices, sources.vertex_offset
+        if not sources.on_vertices_alone and self._V is not None:
+            points = sources.points.joined(sources.segments.ends())
+            corners = self._F[points.faces]
+            places = np.einsum("kc,kcx->kx", points.barycentric, self._V[corners])
+            line = np.linalg.norm(self._V[corners] - places[:, None], axis=2) + points.offset[:, None]
+            vertices = np.concatenate([vertices, corners.ravel()])
+            bound = np.concatenate([bound, line.ravel()])
+        above = ~(distance[vertices] <= bound + slack) & (bound <= cutoff)
+        if above.any():
+            at = int(np.argmax(above))
+            return f"{distance[vertices[at]]:.6g} at vertex {vertices[at]}, where a source gives {bound[at]:.6g}"
+        return None
+
+    def contradiction_at(
+        self, distance: FloatArray, sources: SourceSet, targets: SurfacePoints | IntArray
+    ) -> str | None:
+        """How distances (t,) of vertices or points contradict lines and components; None if they do not."""
+        vertices = self._F[targets.faces, 0] if isinstance(targets, SurfacePoints) else targets
+        if self._n_components == 1:
+            stray = ~np.isfinite(distance)
+        else:
+            stray = np.isfinite(distance) != self._has_source(sources)[self._components[vertices]]
+        if stray.any():
+            at = int(np.argmax(stray))
+            return f"{distance[at]:.6g} at target {at}, where sources and components say otherwise"
+        if self._V is None:
+            return None
+        places = self._V[vertices]
+        if isinstance(targets, SurfacePoints):
+            places = np.einsum("kc,kcx->kx", targets.barycentric, self._V[self._F[targets.faces]])
+        return self._below_lines(distance, sources, ROUNDING * checking.largest_finite(distance), places)
+
+    def _elsewhere(self, distance: FloatArray, sources: SourceSet) -> str | None:
+        """Finite where no source is."""
+        if self._n_components == 1:
+            return None
+        stray = np.isfinite(distance) & ~self._has_source(sources)[self._components]
+        if stray.any():
+            return f"finite at vertex {int(np.argmax(stray))}, whose component holds no source"
+        return None
+
+    def _has_source(self, sources: SourceSet) -> BoolArray:
+        """Mask of the components that hold a source."""
+        has_source = np.zeros(self._n_components, bool)
+        has_source[self._components[sources.vertices]] = True
+        for faces in (sources.points.faces, sources.segments.faces):
+            has_source[self._components[self._F[faces, 0]]] = True
+        return has_source
+
+    @cached_property
+    def _n_components(self) -> int:
+        return int(self._components.max(initial=0)) + 1
+
+    def _along_edges(self, distance: FloatArray, cutoff: float, slack: float) -> str | None:
+        V = _NO_LENGTHS if self._V is None else self._V
+        far, near = checking.steepest_edge(distance, self._F, V, self._l, cutoff, slack)
+        if far < 0:
+            return None
+        return f"{distance[far]:.6g} at vertex {far} and {distance[near]:.6g} at its neighbour {near}, which is nearer"
+
+    def _below_lines(
+        self, distance: FloatArray, sources: SourceSet, slack: float, at: FloatArray | None = None
+    ) -> str | None:
+        """Below the lines to vertices, or to positions `at` (t, 3)."""
+        places = source_places(self._V, self._F, sources, of_curves=True)
+        if places is None:
+            return None
+        step = -(-len(places[1]) // _SOURCES_AT_ALL)
+        found = checking.below_line(distance, self._V if at is None else at, step, *places, slack)
+        if found < 0:
+            return None
+        what = "vertex" if at is None else "target"
+        return f"{distance[found]:.6g} at {what} {found}, which is farther from every source along a straight line"
+
+
+def contradicted(problem: str) -> RuntimeError:
+    """The error for an answer that contradicts itself and that nothing replaces."""
+    return RuntimeError(f"the distance contradicts itself ({problem}): {_REPORT}")
+
+
+class GuardedEngine(Engine):
+    """Windows with a check of every answer. A contradiction never leaves it.
+
+    Parameters
+    ----------
+    windows : WindowEngine
+        Asked first.
+    invariants : Invariants
+        What its answers keep.
+    others : sequence of callables
+        Engines to ask instead, each made when it is needed.
+
+    Raises
+    ------
+    RuntimeError
+        On a query, if the answers of all engines contradict the invariants.
+
+    Warns
+    -----
+    AccuracyWarning
+        On a query that another engine answered.
+    """
+
+    def __init__(self, windows: WindowEngine, invariants: Invariants, others: tuple[Callable[[], Engine], ...]) -> None:
+        self.windows, self._invariants, self._others = windows, invariants, others
+
+    def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
+        """Distance (n,)."""
+        found = self.windows.distance(sources, cutoff, threads)
+        problem = self.problem(found, sources, cutoff)
+        return found if problem is None else self._replacement(problem, sources, cutoff, threads)[0]
+
+    def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
+        """As of all engines."""
+        found = self.windows.nearer(sources, than, threads)
+        if self._invariants.contradiction(found, sources, np.inf, than) is None:
+            return found
+        return super().nearer(sources, than, threads)
+
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
+        """Distance (n,), and the source (n,) that it is measured from."""
+        found = self.windows.labelled(sources, cutoff, threads)
+        problem = self.problem(found[0], sources, cutoff)
+        return found if problem is None else self._replacement(problem, sources, cutoff, threads)
+
+    def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
+        """Distance (t,) of points or vertices, see `WindowEngine.to_targets`."""
+        found = self.windows.to_targets(sources, targets)
+        problem = self._invariants.contradiction_at(found, sources, targets)
+        if problem is None:
+            return found
+        if isinstance(targets, SurfacePoints):
+            raise contradicted(problem)
+        return self._replacement(problem, sources, np.inf, 1)[0][targets]
+
+    def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
+        """Distance and directions, see `WindowEngine.directed`: no other engine finds these."""
+        found = self.windows.directed(sources)
+        problem = self.problem(found[0], sources)
+        if problem is not None:
+            raise contradicted(problem)
+        return found
+
+    def problem(self, distance: FloatArray, sources: SourceSet, cutoff: float = np.inf) -> str | None:
+        """How an answer (n,) contradicts the invariants; None if it does not."""
+        return self._invariants.contradiction(distance, sources, cutoff)
+
+    def _replacement(
+        self, problem: str, sources: SourceSet, cutoff: float, threads: int
+    ) -> tuple[FloatArray, IntArray]:
+        for make in self._others:
+            found = make().labelled(sources, cutoff, threads)
+            if self.problem(found[0], sources, cutoff) is None:
+                warn_caller(
+                    f"the distance contradicted itself ({problem}) and was replaced by that of another method, which "
+                    f"is less accurate: {_REPORT}",
+                    AccuracyWarning,
+                )
+                return found
+        raise contradicted(f"{problem}, whatever method finds it")
+
+
+def guarded_windows(
+    triangles: Triangles,
+    V: FloatArray | None,
+    originals: IntArray | None = None,
+    other: Callable[[Triangles, IntArray | None], Engine] | None = None,
+) -> GuardedEngine:
+    """Windows on triangles with positions V (n, 3), if known; an `other` engine answers where they contradict
+    themselves.
+
+    Triangles and originals as for `WindowEngine`, and for the other engine.
+    """
+    components = triangles.components if originals is None else triangles.components[originals]
+    if V is None:
+        invariants = Invariants(triangles.faces.F, components, lengths=triangles.faces.l)
+    else:
+        invariants = Invariants(triangles.given_faces, components, V)
+    windows = WindowEngine(triangles, originals)
+    return GuardedEngine(windows, invariants, () if other is None else (partial(other, triangles, originals),))
+
+
+def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:
+    """Distances (k, n) from each of some vertices, in place of local answers that contradict themselves."""
+    if not len(vertices):
+        return np.empty((0, mesh.n_vertices))
+    warn_caller(
+        f"distances from vertex {vertices[0]} contradicted themselves ({len(vertices)} sources) and were found again "
+        f"on the whole mesh: {_REPORT}",
+        AccuracyWarning,
+    )
+    engine = guarded_windows(MeshTriangles(mesh), mesh.V)
+    return np.stack([engine.distance(source_set(int(vertex), mesh.n_vertices, None)) for vertex in vertices])
+
+
+class Bounds:
+    """The two bounds on a surface that take no search.
+
+    Parameters
+    ----------
+    surface : Surface
+        The triangles: along the edges of all of them there are paths.
+    """
+
+    def __init__(self, surface: Surface) -> None:
+        self._surface = surface
+
+    @cached_property
+    def _edges(self) -> tuple[AnyArray, FloatArray]:
+        """Ends (e, 2) and lengths (e,) of the edges unfolded in, and of the given ones if some were flipped."""
+        unfolding, given = self._surface.unfolding, self._surface.faces
+        if given is None or not unfolding.n_flips:
+            return _sides(unfolding)
+        # Most edges are there twice then, which costs less than to find out which.
+        ends, length = zip(_sides(unfolding), _sides(given), strict=True)
+        return np.concatenate(ends), np.concatenate(length)
+
+    @cached_property
+    def _incident(self) -> tuple[IntArray, AnyArray]:
+        """Edges by vertex, see `kernels.incident_edges`: only distances that are too long ask for them."""
+        first, incident = kernels.incident_edges(self._edges[0], self._surface.unfolding.n)
+        return first, incident
+
+    def shorten(self, distance: FloatArray, labels: IntArray | None = None, share: float = 0.0) -> None:
+        """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them.
+
+        With a `share`, only from edges on which they are too long by more than that share of the length.
+        """
+        if kernels.is_longer(*self._edges, distance, share):
+            kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels, share)
+
+    def lengthen(self, distance: FloatArray, sources: SourceSet) -> None:
+        """Raise distances (n,) to the straight lines from the nearest source, in place, where positions are known."""
+        places = source_places(self._surface.V, self._surface.given_faces, sources)
+        if places is not None and self._surface.V is not None:
+            raise_to_lines(distance, self._surface.V, *places)
+
+
+def source_places(
+    V: FloatArray | None, F: IntArray | None, sources: SourceSet, *, of_curves: bool = False
+) -> tuple[FloatArray, FloatArray] | None:
+    """Positions (k, 3) and offsets (k,) of the sources; None where they are not known.
+
+    A curve has no one position; if asked for, the places `of_curves` are the ends of segments, with offsets that are
+    less by half the length of the segment: no point of it is farther from both.
+    """
+    if V is None:
+        return None
+    if sources.on_vertices_alone:
+        return np.ascontiguousarray(V[sources.vertices]), np.ascontiguousarray(sources.vertex_offset, np.float64)
+    if F is None or (len(sources.segments.faces) and not of_curves):
+        return None
+    segments = sources.segments
+    points = sources.points.joined(segments.ends())
+    inside = np.einsum("kc,kcx->kx", points.barycentric, V[F[points.faces]])
+    along = np.einsum("kc,kcx->kx", segments.end - segments.start, V[F[segments.faces]])
+    offset = points.offset.copy()
+    offset[len(offset) - 2 * len(along) :] -= np.tile(0.5 * np.linalg.norm(along, axis=1), 2)
+    return np.concatenate([V[sources.vertices], inside]), np.concatenate([sources.vertex_offset, offset])
+
+
+def raise_to_lines(distance: FloatArray, V: FloatArray, places: FloatArray, offsets: FloatArray) -> bool:
+    """Raise distances (n,) to the straight lines from the nearest place, in place; returns whether that was done.
+
+    Nothing is done for many places with different offsets.
+    """
+    if len(places) <= _FEW:
+        line = checking.straight_lines(V, places, offsets)
+    elif np.ptp(offsets) == 0:
+        from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
+
+        line = cKDTree(places).query(V)[0] + offsets[0]
+    else:
+        return False
+    # Less rounding, which is a share of the lines without the offsets.
+    np.maximum(distance, line - _ROUNDING * (line - offsets.min()), out=distance)
+    return True
+
+
+def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:
+    """Ends (e, 2) and lengths (e,) of edges, each once."""
+    F, lengths = np.ascontiguousarray(triangulation.F), np.ascontiguousarray(triangulation.l)
+    ends, length = kernels.glued_edges(F, lengths.ravel(), triangulation.twin)
+    return ends, length
