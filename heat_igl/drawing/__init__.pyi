@@ -1,9 +1,6 @@
-from heat_igl.drawing.figure import PAGE_SUFFIXES as PAGE_SUFFIXES
-from heat_igl.drawing.figure import PICTURE_SUFFIXES as PICTURE_SUFFIXES
 from heat_igl.drawing.plots import Page as Page
 from heat_igl.drawing.plots import Picture as Picture
 from heat_igl.drawing.plots import page as page
 from heat_igl.drawing.plots import plot as plot
 from heat_igl.drawing.plots import plot_field as plot_field
 from heat_igl.drawing.plots import plot_labels as plot_labels
-from heat_igl.drawing.plots import write_line_drawing as write_line_drawing

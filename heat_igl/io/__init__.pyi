@@ -1,12 +1,10 @@
 from heat_igl.io.by_nibabel import MAP_SUFFIXES as MAP_SUFFIXES
 from heat_igl.io.curves import CURVE_SUFFIXES as CURVE_SUFFIXES
-from heat_igl.io.curves import Polyline as Polyline
 from heat_igl.io.curves import is_flat as is_flat
 from heat_igl.io.curves import read_polylines as read_polylines
 from heat_igl.io.curves import write_curves as write_curves
 from heat_igl.io.curves import write_svg as write_svg
 from heat_igl.io.files import MESH_SUFFIXES as MESH_SUFFIXES
-from heat_igl.io.files import POINT_CLOUD_SUFFIXES as POINT_CLOUD_SUFFIXES
 from heat_igl.io.files import is_mesh_or_cloud_path as is_mesh_or_cloud_path
 from heat_igl.io.files import read_attributes as read_attributes
 from heat_igl.io.files import read_mesh as read_mesh

@@ -1,15 +1,10 @@
 from heat_igl.mesh.cloud_normals import usable_normals as usable_normals
-from heat_igl.mesh.cloud_orientation import is_oriented_manifold as is_oriented_manifold
-from heat_igl.mesh.cloud_orientation import two_sided_cover as two_sided_cover
-from heat_igl.mesh.contours import Segments as Segments
 from heat_igl.mesh.contours import crossings as crossings
 from heat_igl.mesh.contours import edge_curve as edge_curve
 from heat_igl.mesh.contours import joined_segments as joined_segments
 from heat_igl.mesh.contours import level_segments as level_segments
 from heat_igl.mesh.contours import region_boundary as region_boundary
 from heat_igl.mesh.mesh import Mesh as Mesh
-from heat_igl.mesh.mesh import checked_faces as checked_faces
-from heat_igl.mesh.mesh import checked_positions as checked_positions
 from heat_igl.mesh.objects import MeshLike as MeshLike
 from heat_igl.mesh.objects import as_mesh as as_mesh
 from heat_igl.mesh.objects import as_simplices as as_simplices
@@ -32,7 +27,6 @@ from heat_igl.mesh.report import DELAUNAY_TOLERANCE as DELAUNAY_TOLERANCE
 from heat_igl.mesh.report import CloudReport as CloudReport
 from heat_igl.mesh.report import MeshReport as MeshReport
 from heat_igl.mesh.surface_points import ON_SIDE as ON_SIDE
-from heat_igl.mesh.surface_points import ON_SIDE_COMPUTED as ON_SIDE_COMPUTED
 from heat_igl.mesh.surface_points import ClosestPoints as ClosestPoints
 from heat_igl.mesh.surface_points import NestedCurves as NestedCurves
 from heat_igl.mesh.surface_points import SurfaceCurve as SurfaceCurve
