@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl import HeatMethodSolver, Mesh, cluster, read_mesh, shapes, write_mesh
-from heat_igl.cluster.solver_cache import PROCESS_MEMORY, solver_memory
+from heat_igl.cluster.worker import PROCESS_MEMORY, solver_memory
 from heat_igl.geodesic import DistanceMethod
 
 from harness import Row, Table, collected, parsed, publish, ratio, subdivided

@@ -333,7 +333,7 @@ def test_a_name_that_would_overwrite_something_else_is_refused(client, tmp_path,
 
 def test_a_mesh_too_large_for_its_worker_is_a_row(client, tmp_path, monkeypatch):
     # The workers are threads of this process.
-    monkeypatch.setattr("heat_igl.cluster.solver_cache.memory_for_solvers", lambda: 2**20)
+    monkeypatch.setattr("heat_igl.cluster.worker.memory_for_solvers", lambda: 2**20)
     meshes = {"ball": heat_igl.shapes.icosphere(4), "fan": FAN}
     report = cluster.distances(meshes, [0], tmp_path / "store", client=client)
     (row,) = report.failed
