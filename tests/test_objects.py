@@ -387,7 +387,7 @@ def test_a_mesh_of_another_library_gives_the_same(name, tmp_path, monkeypatch):
     if name.startswith("plots."):
         pytest.importorskip("matplotlib")
         monkeypatch.setattr("heat_igl.drawing.plots.lay_out", Drawn)
-        monkeypatch.setattr("heat_igl.drawing.line_drawing._PIXELS", 100)
+        monkeypatch.setattr("heat_igl.drawing.plots._PIXELS", 100)
     found, expected = plain(CALLS[name](OTHER)), plain(CALLS[name](MESH))
     if isinstance(found, np.ndarray):
         np.testing.assert_array_equal(found, expected)

@@ -10,10 +10,9 @@ from surfaces import arcs, twice
 import heat_igl
 from heat_igl import shapes
 from heat_igl.drawing import figure, plots, raster
-from heat_igl.drawing.line_drawing import write_line_drawing
-from heat_igl.drawing.plots import Picture, plot, plot_field, plot_labels
+from heat_igl.drawing.figure import LINE, stripe_coverage
+from heat_igl.drawing.plots import Picture, plot, plot_field, plot_labels, write_line_drawing
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK
-from heat_igl.drawing.surface_image import LINE, stripe_coverage
 
 
 @pytest.fixture(autouse=True)

@@ -140,8 +140,7 @@ def page(
     check_style(style)
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
     table = colours(colormap)(np.linspace(0, 1, 256))
-    turned = seen.turned[seen.used, :2]
-    low, high = turned.min(axis=0), turned.max(axis=0)
+    middle, extent = seen.box
     arrays: dict[str, AnyArray] = {
         "positions": seen.V.astype("<f4"),
         "faces": seen.F.astype("<i4"),
@@ -151,8 +150,8 @@ def page(
         "unit": seen.unit,
         "centre": seen.centre.tolist(),
         "turn": seen.turn.tolist(),
-        "middle": ((low + high) / 2).tolist(),
-        "extent": np.maximum(high - low, 1e-3).tolist(),
+        "middle": middle.tolist(),
+        "extent": extent.tolist(),
         "sources": seen.vertices.tolist(),
         "dots": np.concatenate([seen.dots, seen.lines.reshape(-1, 3)]).round(7).ravel().tolist(),
         "spacing": spacing,

@@ -57,6 +57,13 @@ class Scene:
         """Positions (n, 3) in viewer coordinates: right, up and near."""
         return np.asarray(self.V @ self.turn.T)
 
+    @property
+    def box(self) -> tuple[FloatArray, FloatArray]:
+        """Middle and extent (2,) in viewer coordinates, right and up; no side is more than 1000 times the other."""
+        turned = self.turned[self.used, :2]
+        low, high = turned.min(axis=0), turned.max(axis=0)
+        return (low + high) / 2, np.maximum(high - low, 1e-3 * (high - low).max())
+
     def line(self, curve: SurfaceCurve, mesh: MeshLike) -> FloatArray:
         """The vertices (k, 3) of a curve on the mesh that is shown, in viewer coordinates."""
         return np.asarray((curve.positions(mesh) - self.centre) / self.unit @ self.turn.T)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from heat_igl.drawing.figure import fitted, mark_dots, surface_image
 from heat_igl.drawing.raster import to_pixels
 from heat_igl.drawing.scene import Scene, colours, scene
-from heat_igl.drawing.surface_image import fitted, mark_dots, surface_image
 from heat_igl.errors import MissingExtraError
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
@@ -300,8 +300,8 @@ def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[s
 
 def _paint(axes: Any, seen: Scene, table: Any) -> None:
     """Draw the surface in the colours of its values, and mark the sources."""
-    width, height = np.ptp(seen.turned[seen.used, :2], axis=0)
-    rows = int(np.clip(_PIXELS_ACROSS * height / max(width, 1e-3 * height), 200, _LARGEST_ROWS))
+    _, (width, height) = seen.box
+    rows = int(np.clip(_PIXELS_ACROSS * height / width, 200, _LARGEST_ROWS))
     scale, centre = fitted(seen, _PIXELS_ACROSS, rows, 0.02 * _PIXELS_ACROSS)
     image, depth = surface_image(to_pixels(seen.turned, scale, centre), seen, _PIXELS_ACROSS, rows, "plain", table)
     axes.imshow(image, interpolation="antialiased")
