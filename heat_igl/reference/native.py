@@ -130,16 +130,6 @@ def potpourri3d_heat(
 
 
 @_by_components
-def potpourri3d_marching(V: FloatArray, F: IntArray, sources: IntArray) -> _Solve:
-    """Fast marching of geometry-central through potpourri3d."""
-    import potpourri3d
-
-    solver = potpourri3d.MeshFastMarchingDistanceSolver(V, F)
-    # A curve of one point without barycentric coordinates denotes a vertex.
-    return lambda: np.ravel(solver.compute_distance([[(vertex, [])] for vertex in sources.tolist()]))
-
-
-@_by_components
 def meshlab_front(V: FloatArray, F: IntArray, sources: IntArray) -> _Solve:
     """MeshLab's front from selected vertices, without the cutoff."""
     import pymeshlab

@@ -52,7 +52,6 @@ _SOLVERS = {
     "meshlab_border": _Solver("meshlab_border", "pymeshlab", "pymeshlab"),
     "meshlab_heat": _Solver("meshlab_heat", "pymeshlab", "pymeshlab"),
     "potpourri3d_heat": _Solver("potpourri3d_heat", "potpourri3d", "potpourri3d", "bench"),
-    "potpourri3d_marching": _Solver("potpourri3d_marching", "potpourri3d", "potpourri3d", "bench"),
 }
 
 
@@ -108,8 +107,7 @@ def measured(
     ----------
     solver : str
         "exact" or "windows" for the windows of this package, one of `EXACT_SOLVERS`, or the name of another function of
-        `heat_igl.reference`: "meshlab", "meshlab_border", "meshlab_heat", "igl_heat", "potpourri3d_heat"; or
-        "potpourri3d_marching" for fast marching by potpourri3d.
+        `heat_igl.reference`: "meshlab", "meshlab_border", "meshlab_heat", "igl_heat", "potpourri3d_heat".
     mesh, sources
         As for `exact`.
     timeout, memory
