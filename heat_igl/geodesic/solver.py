@@ -286,7 +286,7 @@ class GeodesicSolver(BatchedSolver):
         self._triangles, originals = triangles, self._originals
         if chosen.engine == "sweep":
             sweep = _sweep_engine(triangles, originals)
-            chosen = sweep_plan(sweep.measures, chosen)
+            chosen = sweep_plan(sweep.measures, chosen, is_estimate=isinstance(self._domain, PointCloud))
             if chosen.engine == "sweep":
                 return chosen, sweep
         # All other engines are held to bounds where they are made.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.cloud_triangles import (
@@ -11,7 +10,6 @@ from heat_igl.mesh.cloud_triangles import (
     corner,
     glued_sides,
     pinched_vertices,
-    with_fans_joined,
 )
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -28,8 +26,6 @@ _NO_FOLD = -0.99
 # 100, 100, 87, 72 and 64 % of the triangles are oriented as on the mesh with 2, and 88, 100, 100, 88, 76 and 67 % with
 # 4; 6 is within 1 % of both in the mean, and 1 and 3 are down to 58 % on the teapot.
 _POWER, _LEAST_WEIGHT = 2, 1e-3
-# So many edges away from its nearest points, a border is torn.
-_EDGES_AWAY = 4
 
 
 def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[IntArray, IntArray]:
@@ -45,27 +41,24 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
     are many, or most of them flat, as on a surface with one side. Then as many neighbours as possible are oriented
     alike.
     """
-    is_turned, part, pairs, folds, pinched = _turned(P, F)
+    is_turned, part, pairs, folds = _turned(P, F)
     left_out = _in_pairs(pairs, len(F))
     # On a surface with one side, neighbours contradict each other where it is flat.
     if 0 < len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(folds) > _FLAT:
         F = np.delete(F, left_out, axis=0)
-        is_turned, part, pairs, folds, pinched = _turned(P, F)
+        is_turned, part, pairs, folds = _turned(P, F)
     F = np.where(is_turned[:, None], F[:, [0, 2, 1]], F)
     if normals is not None:
         area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
         along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))
         turned = along[part] < 0
         F[turned] = F[turned, ::-1]
-    return with_fans_joined(P, F, pinched), _points_between(F, pairs[folds > _FLAT])
+    return F, _points_between(F, pairs[folds > _FLAT])
 
 
-def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, FloatArray, IntArray]:
-    """Which of the triangles F (m, 3) to turn, their parts (m,), and pairs (k, 2) that contradict, with folds.
-
-    Also returns the points at which several fans meet.
-    """
-    first, second, runs_alike = glued = glued_sides(F, len(P))
+def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
+    """Which of the triangles F (m, 3) to turn, their parts (m,), and pairs (k, 2) that contradict, with folds."""
+    first, second, runs_alike = glued_sides(F, len(P))
     pairs = np.stack([first // 3, second // 3], axis=1)
     part, is_turned = _parts(pairs, runs_alike, len(F))
     contradicts, folds = np.zeros(len(pairs), bool), np.zeros(len(pairs))
@@ -81,8 +74,7 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
         wants_one = runs_alike != (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]])
         is_turned ^= turned_groups(pairs, np.where(wants_one, -weight, weight), group)
         contradicts = (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]]) != runs_alike
-    pinched = pinched_vertices(F, len(P), glued)
-    return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts], pinched
+    return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts]
 
 
 def _parts(pairs: IntArray, runs_alike: BoolArray, m: int) -> tuple[IntArray, BoolArray]:
@@ -163,21 +155,6 @@ def folded_points(surface: Mesh) -> IntArray:
     pairs = np.stack([first // 3, second // 3], axis=1)
     folds = _folds(surface.V, surface.F, pairs, runs_alike)
     return _points_between(surface.F, pairs[folds > FOLDED_BACK])
-
-
-def torn_points(surface: Mesh, nearest: IntArray) -> IntArray:
-    """Of the first points of the rows `nearest` (k, j), those from which one of the others is many edges away.
-
-    At a border with another sheet beside it, that is where a thin part is torn. Points in no triangle do not count.
-    """
-    (a, b), n = surface.edges.T, surface.n_vertices
-    edges = sp.coo_array((np.ones(2 * len(a), bool), (np.append(a, b), np.append(b, a))), shape=(n, n)).tocsr()
-    reached = edges[nearest[:, 0]]
-    for _ in range(_EDGES_AWAY - 1):
-        reached = reached + reached @ edges
-    row, others = np.repeat(np.arange(len(nearest)), nearest.shape[1] - 1), nearest[:, 1:].ravel()
-    is_far = ~np.asarray(reached[row, others]) & surface.referenced[others]
-    return np.asarray(nearest[np.unique(row[is_far]), 0])
 
 
 def two_sided_cover(surface: Mesh) -> Mesh:

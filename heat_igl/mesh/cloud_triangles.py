@@ -3,13 +3,14 @@
 In the union of the local triangulations (Sharp and Crane 2020, section 6), nearly all triangles are in the stars of all
 three corners. These never overlap, since each star is planar. If stars differ, on four points near a circle or on
 noisy points, triangles of more stars come first, and of these the smaller ones; others that do not fit are left out.
-Then loops of outer edges are filled in space, and points of parts that are too small for a surface are inserted into
-the nearest triangle.
+Once neighbours are oriented alike, fans that meet in a point are joined, loops of outer edges are filled in space, and
+points of parts that are too small for a surface are inserted into the nearest triangle.
 """
 
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
 from heat_igl.kernels.cloud.agreeing import agreement
 from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
@@ -18,8 +19,8 @@ from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles
 from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.connectivity import ascending_rows, connected_components, facets
-from heat_igl.mesh.neighbourhoods import Neighbourhoods, PointTree
+from heat_igl.mesh.connectivity import ascending_rows, connected_components, group_by_label
+from heat_igl.mesh.neighbourhoods import K, Neighbourhoods, PointTree
 from heat_igl.runtime import over_rows
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
@@ -35,11 +36,18 @@ _BLOCK = 1 << 14
 GluedSides = tuple[IntArray, IntArray, BoolArray]
 # Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge.
 _OTHER_SHEET = -0.25
-# Cosine of the angle to the next triangle above which the two fold back and may join sheets wrongly: 60 degrees; and
-# above which they lie on each other.
-FOLDED_BACK, _MOST_FOLDED = 0.5, 0.99
+# Cosine of the angle to the next triangle above which the two fold back and may join sheets wrongly: 60 degrees.
+FOLDED_BACK = 0.5
+# The same above which a triangle is put into a gap only if it closes it, a right angle, as of a notch that belongs to
+# stairs; and above which it never is, since both lie on each other.
+_RIGHT_ANGLE, _MOST_FOLDED = -0.1, 0.99
 # Triangles of a part for each one that fills its gaps: with fewer, it is the border of the part that was filled.
 _PER_FILLED = 10
+# Sum of the angles around a point: the two sheets of a fold that is joined have 2 pi each, and vertices of scans and
+# of models, 2.6 pi at most but for one in a thousand.
+_CROWDED = 3 * np.pi
+# A gap is torn where one of so many nearest points is more than so many edges away.
+_NEAREST, _EDGES_AWAY = 12, 4
 
 
 def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) -> IntArray:
@@ -61,8 +69,68 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) ->
     # The angle of a corner is the same number in every star that has the triangle.
     both = np.concatenate([F, candidates])
     F = both[fitting_triangles(P, near.axes, both, len(F))]
-    F = np.concatenate([agreed[~is_open], F])
-    return _with_small_parts(P, with_loops_filled(P, F, near.reach, is_settled), near)
+    return np.concatenate([agreed[~is_open], F])
+
+
+def with_gaps_closed(
+    tree: PointTree, F: IntArray, near: Neighbourhoods, has_side: BoolArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """The triangles F (m, 3) int32, oriented alike, with their fans joined, their gaps filled and small parts inserted.
+
+    Gaps come after fans: where several fans meet, no single loop of outer edges passes the point.
+
+    Returns
+    -------
+    F : (k, 3) int32
+    doubtful : (d,) int64
+        Points that may belong to another sheet: around which the triangles turn by more than 3 pi, at a gap from which
+        one of the nearest points is many edges away, or in a part that is as near to the largest as neighbours there.
+    apart : (a,) int64
+        Points that neither the stars nor the gaps join to the largest part.
+    """
+    P, n = tree.P, len(tree.P)
+    is_gap, _ = _around_gaps(F, n)
+    F = with_loops_filled(P, with_fans_joined(P, F), near.reach)
+    part = connected_components(F, n)
+    size = np.bincount(part)
+    is_apart, is_part = part != np.argmax(size), (size > K)[part]
+    # Stars are flat: there is more only where triangles came after them.
+    is_doubtful = is_gap & (_angles(P, F[at_some_corner(is_gap, F)]) > _CROWDED)
+    at_gap = np.flatnonzero(is_gap & is_part & (near.index[:, -1] < 0))
+    is_doubtful[_torn_points(F, tree.neighbours[0][at_gap, : _NEAREST + 1], is_part)] = True
+    others = np.flatnonzero(is_apart & is_part)
+    if len(others):
+        beside, distance = _nearest_of(P, ~is_apart, others)
+        is_other_sheet = np.einsum("kx,kx->k", *near.axes[[others, beside], 2]) < _OTHER_SHEET
+        is_doubtful[others] |= (distance <= near.reach[beside]) & ~(is_other_sheet & has_side[others])
+    F = _with_small_parts(P, F, near.reach, part, size)
+    return F, np.flatnonzero(is_doubtful), np.flatnonzero(is_apart)
+
+
+def _torn_points(F: IntArray, nearest: IntArray, is_part: BoolArray) -> IntArray:
+    """Of the first points of the rows `nearest` (k, j), those from which one of the others is many edges away.
+
+    Beside another sheet, that is where a thin part is torn. Only others that belong to a part (n,) count.
+    """
+    if not len(nearest):
+        return np.empty(0, np.int64)
+    a, b, c = F.T
+    ends = np.concatenate([a, b, c, b, c, a]), np.concatenate([b, c, a, a, b, c])
+    edges = sp.csr_array((np.ones(len(ends[0]), bool), ends), shape=(len(is_part), len(is_part)))
+    reached = edges[nearest[:, 0]]
+    for _ in range(_EDGES_AWAY - 1):
+        reached = reached + reached @ edges
+    row, others = np.repeat(np.arange(len(nearest)), nearest.shape[1] - 1), nearest[:, 1:].ravel()
+    is_far = is_part[others] & ~np.asarray(reached[row, others])
+    return np.asarray(nearest[np.unique(row[is_far]), 0])
+
+
+def _angles(P: FloatArray, F: IntArray) -> FloatArray:
+    """The sum (n,) of the angles of triangles F (m, 3) at each point."""
+    side = P[F[:, [1, 2, 0]]] - P[F]
+    side /= np.maximum(np.linalg.norm(side, axis=2), np.finfo(float).tiny)[..., None]
+    cosine = -np.einsum("fcx,fcx->fc", side, side[:, [2, 0, 1]])
+    return np.asarray(np.bincount(F.ravel(), np.arccos(np.clip(cosine, -1, 1)).ravel(), len(P)))
 
 
 def _triangles_of_stars(
@@ -96,38 +164,47 @@ def _triangles_of_stars(
     return corners[count == 3], rows[order], is_settled.astype(bool)
 
 
-def _with_small_parts(P: FloatArray, F: IntArray, near: Neighbourhoods) -> IntArray:
+def _with_small_parts(P: FloatArray, F: IntArray, reach: FloatArray, part: IntArray, size: IntArray) -> IntArray:
     """The triangles, of which those are split that are nearest to points of small parts.
 
-    A part of fewer points than a neighbourhood, as single points that noise has put above others, is no surface of its
-    own if it is near another.
+    A part (n,) of a size (p,) below that of a neighbourhood, as single points that noise has put above others, is no
+    surface of its own where a gap to another part is no wider than those that are filled there, for `reach` (n,).
     """
-    part = connected_components(F, len(P))
-    size = np.bincount(part)
-    is_small = (size < near.index.shape[1])[part]
-    kept, points = F[~is_small[F[:, 0]]], np.flatnonzero(is_small)
-    if not len(points) or not len(kept):
-        return F
-    nearest, distance = _middles(P, kept).nearest(P[points], 1)
-    # Outliers are farther away than a neighbour would be.
-    is_far = distance > near.radius[kept[nearest[:, 0], 0]]
-    stays = np.bincount(part[points[is_far]], minlength=len(size)) > 0
-    points = points[~stays[part[points]]].astype(np.int32)
-    F = F[~is_small[F[:, 0]] | stays[part[F[:, 0]]]]
-    while len(points):
+    part, reach = part.copy(), reach.copy()
+    is_small = size <= K
+    is_small[np.argmax(size)] = False
+    is_other, is_inserted = is_small[part], np.zeros(len(size), bool)
+    while is_other.any():
+        points = np.flatnonzero(is_other)
+        beside, distance = _nearest_of(P, ~is_other, points)
+        # Of the triangles at the nearest point, that with the nearest middle.
+        faces = np.flatnonzero(at_some_corner(np.isin(np.arange(len(P)), beside), F))
+        corners, row = group_by_label(F[faces].ravel(), len(P)).of(beside)
+        faces = faces[corners // 3]
+        away = np.linalg.norm(P[F[faces]].mean(axis=1) - P[points[row]], axis=1)
+        first = np.lexsort((away, row))[np.searchsorted(row, np.arange(len(points)))]
+        is_inserted[part[points[np.minimum(distance, away[first]) <= 2 * _LARGEST_GAP * reach[beside]]]] = True
+        chosen = np.flatnonzero(is_inserted[part[points]])
+        if not len(chosen):
+            break
         # One point in each triangle and round.
-        face, chosen = np.unique(_middles(P, F).nearest(P[points], 1)[0][:, 0], return_index=True)
-        point = points[chosen]
+        face, row = np.unique(faces[first[chosen]], return_index=True)
+        point, beside = points[chosen[row]], beside[chosen[row]]
         a, b, c = F[face].T
-        F = np.concatenate([F, np.stack([b, c, point], axis=1), np.stack([c, a, point], axis=1)])
+        added = np.stack([b, c, point, c, a, point], axis=1).reshape(-1, 3).astype(F.dtype)
         F[face, 2] = point
-        points = np.delete(points, chosen)
+        F = np.concatenate([F[~is_inserted[part[F[:, 0]]]], added])
+        is_other[point], part[point] = False, part[beside]
+        # Other points are as near to it as to the surface: its own neighbours may be far away.
+        reach[point] = np.minimum(reach[point], reach[beside])
     return F
 
 
-def _middles(P: FloatArray, F: IntArray) -> PointTree:
-    """The middles of triangles."""
-    return PointTree(P[F].mean(axis=1), np.arange(len(F)))
+def _nearest_of(P: FloatArray, is_kept: BoolArray, points: IntArray) -> tuple[IntArray, FloatArray]:
+    """The nearest to some of the points (k,) of those that are kept, and the distance (k,)."""
+    kept = np.flatnonzero(is_kept)
+    nearest, distance = PointTree(P[kept], kept).nearest(P[points], 1)
+    return kept[nearest[:, 0]], distance
 
 
 def at_all_corners(is_chosen: BoolArray, F: IntArray) -> BoolArray:
@@ -167,25 +244,40 @@ def glued_sides(F: IntArray, n: int) -> GluedSides:
     return first, twin[first].astype(np.int64), is_aligned[first] == 0
 
 
+def outer_sides(F: IntArray, n: int) -> IntArray:
+    """The sides 3 f + c (k,) of the triangles F (m, 3), on n points, without a neighbour."""
+    return np.flatnonzero(glue(F.astype(np.int64), np.zeros((n, 3)), 1.0)[1] < 0)
+
+
 def corner(sides: IntArray, turn: int | IntArray) -> IntArray:
     """The corner 3 f + c at the beginning, for 1, or the end, for 2, of sides, which are opposite to corner c."""
     return sides - sides % 3 + (sides + turn) % 3
 
 
-def with_fans_joined(P: FloatArray, F: IntArray, pinched: IntArray) -> IntArray:
-    """The triangles F (m, 3), and others between the fans of `pinched` vertices (k,) that have several with an end.
+def with_fans_joined(P: FloatArray, F: IntArray) -> IntArray:
+    """The triangles F (m, 3) int32, and others between the fans of vertices that have several with an end.
 
     Two parts of a surface that meet in one vertex alone are connected for distance, but not for vectors, which need a
     tangent plane along the way. Between two fans goes the triangle with the shortest third side that runs along its
     sides against the neighbours. Where there is none, the largest fan stays, unless parts or points would be cut off.
     """
+    is_outer, around = _around_gaps(F, len(P))
+    pinched = pinched_vertices(around, len(P), glued_sides(around, len(P)))
+    pinched = pinched[is_outer[pinched]]
     if not len(pinched):
         return F
     is_near = np.zeros(len(P), bool)
     is_near[pinched] = True
     is_near[F[at_some_corner(is_near, F)]] = True
-    added = joining_triangles(P, F[at_some_corner(is_near, F)].astype(np.int32), pinched)
-    return _with_largest_fans(np.concatenate([F, added.astype(F.dtype)]), len(P))
+    return _with_largest_fans(np.concatenate([F, joining_triangles(P, F[at_some_corner(is_near, F)], pinched)]), len(P))
+
+
+def _around_gaps(F: IntArray, n: int) -> tuple[BoolArray, IntArray]:
+    """Which of n points lie on outer edges, and those of the triangles F (m, 3) that have such a corner."""
+    sides = outer_sides(F, n)
+    is_outer = np.zeros(n, bool)
+    is_outer[F.ravel()[corner(sides, 1)]] = is_outer[F.ravel()[corner(sides, 2)]] = True
+    return is_outer, F[at_some_corner(is_outer, F)]
 
 
 def _with_largest_fans(F: IntArray, n: int) -> IntArray:
@@ -202,7 +294,7 @@ def _with_largest_fans(F: IntArray, n: int) -> IntArray:
     return found
 
 
-def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_settled: BoolArray) -> IntArray:
+def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray) -> IntArray:
     """The triangles F (m, 3) int32, and others in gaps all around which points have two outer edges.
 
     Parameters
@@ -213,28 +305,23 @@ def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_settled:
         Triangles that are a surface.
     reach : (n,) float64
         See `Neighbourhoods`.
-    is_settled : (n,) bool
-        Points without gaps around them.
     """
     n = len(P)
-    near_gaps = F[~at_all_corners(is_settled, F)]
-    found = facets(near_gaps, n)
-    is_outer = (found.n_faces == 1) & ~is_settled[found.vertices].any(axis=1)
-    if not is_outer.any():
+    sides = outer_sides(F, n)
+    if not len(sides):
         return F
-    number = np.cumsum(is_outer) - 1
-    ends = found.vertices[is_outer].astype(np.int32)
-    opposite = np.empty(len(ends), np.int32)
-    is_side = is_outer[found.of_face]
-    opposite[number[found.of_face[is_side]]] = near_gaps[is_side]
+    ends = np.stack([F.ravel()[corner(sides, 1)], F.ravel()[corner(sides, 2)]], axis=1)
+    is_outer = np.zeros(n, bool)
+    is_outer[ends] = True
+    edges = F[at_some_corner(is_outer, F)][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
     filled, is_closed = filling_triangles(
         P,
         ends,
-        opposite,
+        F.ravel()[sides],
         _two_edges_at(ends, n),
         _LARGEST_GAP * reach,
-        found.vertices[:, 0] * n + found.vertices[:, 1],
-        FOLDED_BACK,
+        np.sort(edges.min(axis=1) * n + edges.max(axis=1)),
+        _RIGHT_ANGLE,
         _MOST_FOLDED,
     )
     if not len(filled):

@@ -16,7 +16,7 @@ from heat_igl.runtime import over_rows, warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Nearest points from which the plane of a point and its triangles are found.
-_K = 30
+K = 30
 # Points at a time: bounds the memory for their neighbours.
 _BLOCK = 1 << 12
 # Points in a leaf of the tree that sorts them: as many as in the smallest boxes.
@@ -73,8 +73,8 @@ class PointTree:
 
     @cached_property
     def neighbours(self) -> tuple[AnyArray, FloatArray]:
-        """The `_K` nearest other points (n, k + 1) int32 of each, after the point itself, and the distance (n,)."""
-        return self.neighbours_of(slice(None), min(_K, len(self.P) - 1))
+        """The `K` nearest other points (n, k + 1) int32 of each, after the point itself, and the distance (n,)."""
+        return self.neighbours_of(slice(None), min(K, len(self.P) - 1))
 
     def neighbours_of(self, chosen: slice | IntArray, k: int) -> tuple[AnyArray, FloatArray]:
         """The k nearest other points (b, k + 1) int32 of some, after the point itself, and the distance (b,)."""
@@ -219,7 +219,7 @@ def without_noise(tree: PointTree) -> PointTree:
     noise is many spacings, neighbours are first found among some of the points, and then among more.
     """
     n = len(tree.P)
-    if n <= 4 * _K:
+    if n <= 4 * K:
         return tree
     sample = np.unique(np.linspace(0, n - 1, _SAMPLE).astype(np.int64))
 
@@ -228,14 +228,14 @@ def without_noise(tree: PointTree) -> PointTree:
         _, noise, thickness = _onto_quadrics(tree.P, _nearest(tree, sample, k, stride))
         return float(np.median(noise)), float(np.median(thickness))
 
-    few, of_few = of_sample(_K // 2)
+    few, of_few = of_sample(K // 2)
     if few < _NOISE:
         return tree
-    noise, thickness = of_sample(_K)
+    noise, thickness = of_sample(K)
     if few < noise * (_NOISE_NOT_DETAIL if of_few <= _NO_DISC else _THICK_NOISE_NOT_DETAIL):
         return tree
     moved = tree
-    for k, stride in _spreads(of_sample, {_K // 2: of_few, _K: thickness}, n):
+    for k, stride in _spreads(of_sample, {K // 2: of_few, K: thickness}, n):
         index = _nearest(moved, np.arange(n), k, stride)
         moved = moved.moved(_smoothed(moved.P, index, sample))
     return moved
@@ -258,11 +258,11 @@ def _spreads(
 ) -> list[tuple[int, int]]:
     """How many neighbours, and among every how many-th of n points, in the order in which they are taken.
 
-    As many as are flattest: more than `_K` where noise thickens these, and fewer where the surface bends. Where as many
+    As many as are flattest: more than `K` where noise thickens these, and fewer where the surface bends. Where as many
     as are taken show no surface at all, they are taken among fewer points first. `found` has the thickness of
     neighbourhoods of so many points.
     """
-    k, stride, most = _K, 1, min(_LARGEST_K, n // 4)
+    k, stride, most = K, 1, min(_LARGEST_K, n // 4)
     thickness = found[k]
     while thickness > _THICKNESS and k < most:
         k = min(2 * k, most)
@@ -287,7 +287,7 @@ def _spreads(
 def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyArray:
     """The indices (b, k + 1) int32 of some points of the tree and of their k neighbours, among every `stride`-th."""
     if stride == 1:
-        return tree.neighbours[0][chosen, : k + 1] if k <= _K else tree.neighbours_of(chosen, k)[0]
+        return tree.neighbours[0][chosen, : k + 1] if k <= K else tree.neighbours_of(chosen, k)[0]
     fewer = PointTree(np.ascontiguousarray(tree.P[::stride]), tree.order[::stride])
 
     def fill(rows: slice) -> AnyArray:

@@ -30,8 +30,8 @@ _LARGE_ERROR = 0.05
 # the vertices of 16 meshes of which distance is nearer than by potpourri3d it is at most 0.0011, on random points with
 # outliers 0.004, and from 0.0069 on where parts are joined or torn.
 _MOST_DOUBTFUL = 0.005
-# A border is torn where one of so many nearest points is many edges away.
-_NEAREST = 12
+# Share of the points outside of the largest part above which clouds warn: scans have up to as many outliers.
+_MOST_APART = 0.02
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,7 +65,7 @@ class PointCloud:
     Notes
     -----
     Copies of a point are kept: they are at distance 0 from each other. A point that is farther from all others than
-    these are from their neighbours, an outlier, belongs to no triangle, and the distance there is ``inf``. If the
+    a gap that is filled is wide, an outlier, belongs to no triangle, and the distance there is ``inf``. If the
     points are noisy, distance is measured on a surface through the noise, see `triangles`. Arrays are read-only.
 
     Examples
@@ -169,9 +169,9 @@ class PointCloud:
         Warns
         -----
         AccuracyWarning
-            If normals are left out; if the points do not tell their surface, see `CloudReport`; if noise makes distance
-            wrong by more than 5 % in the mean; or if without normals two sheets that are nearer than the points in them
-            are taken for one with noise.
+            If normals are left out; if the points do not tell their surface or fall into parts, see `CloudReport`; if
+            noise makes distance wrong by more than 5 % in the mean; or if without normals two sheets that are nearer
+            than the points in them are taken for one with noise.
         """
         return self._made[0]
 
@@ -179,8 +179,8 @@ class PointCloud:
     def _made(self) -> tuple[Mesh, IntArray]:
         """The triangles, and the points (k,) at which these contradict each other or may be torn."""
         from heat_igl.mesh.cloud_normals import oriented_normals
-        from heat_igl.mesh.cloud_orientation import oriented, torn_points
-        from heat_igl.mesh.cloud_triangles import cloud_triangles
+        from heat_igl.mesh.cloud_orientation import oriented
+        from heat_igl.mesh.cloud_triangles import cloud_triangles, with_gaps_closed
         from heat_igl.mesh.neighbourhoods import neighbourhoods, point_tree, without_noise
 
         # Copies of a point would compete for the same triangles.
@@ -196,25 +196,29 @@ class PointCloud:
             raise MeshError(
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
             )
-        F, doubtful = oriented(tree.P, triangles, normals)
+        F, between = oriented(tree.P, triangles, normals)
+        F, beside, apart = with_gaps_closed(tree, F, near, has_side)
         V = np.empty_like(self.P)
         V[number] = tree.P
         found = Mesh(V[distinct[original]], number[F]).with_originals(distinct[original])
         if tree is not given:
             _warn_of_noise(np.linalg.norm(tree.P - given.P, axis=1), normals is None, float(found.measures.sum()))
-        doubtful = number[doubtful]
-        # At borders where neighbours were left out since they lie on another sheet, a thin part may be torn. Outliers
-        # that are many enough to be near each other make small parts of their own.
-        is_large = np.bincount(found.components)[found.components] > _MOST_DOUBTFUL * len(self.P)
-        beside = np.flatnonzero((near.index[:, -1] < 0) & (found.boundary & is_large)[number])
-        if len(beside):
-            doubtful = np.union1d(doubtful, torn_points(found, number[tree.neighbours[0][beside, : _NEAREST + 1]]))
+        doubtful = number[np.union1d(between, beside)]
         if len(doubtful) > _MOST_DOUBTFUL * len(self.P):
             warn_caller(
                 f"the points do not tell their surface: at {len(doubtful)} of {len(self.P)}, among "
-                "PointCloud.report().doubtful_points, triangles contradict each other's sides or end at another sheet, "
-                "as where a part is thin or walls have points at their edges alone. Parts may be joined or cut off, "
-                "and distance may be far off: give the mesh, more points, or normals",
+                "PointCloud.report().doubtful_points, triangles contradict each other's sides, lie on each other or "
+                "end beside another sheet, as where a part is thin or walls have points at their edges alone. Parts "
+                "may be joined or cut off, and distance may be far off: give the mesh, more points, or normals",
+                AccuracyWarning,
+            )
+        if len(apart) > _MOST_APART * len(self.P):
+            cut_off = int(_outside_largest(found.components)[number].sum())
+            warn_caller(
+                f"the points are in several parts: triangles join {len(apart)} of {len(self.P)} points to none in the "
+                f"largest. From there, distance is inf at {cut_off} of them, see PointCloud.report().cut_off_points, "
+                "and the others are put into the nearest triangle. If they belong to one surface, give the mesh or "
+                "more points between the parts",
                 AccuracyWarning,
             )
         return found, doubtful
@@ -261,10 +265,16 @@ class PointCloud:
         return CloudReport(
             **{field.name: getattr(report, field.name) for field in fields(report)},
             boundary_points=np.flatnonzero(self.boundary),
+            cut_off_points=np.flatnonzero(_outside_largest(self.triangles.components)[self.originals]),
             doubtful_points=np.union1d(self._made[1], folded_points(self.triangles)),
             n_copies=self.n_vertices - len(self._distinct[0]),
             noise=float(np.sqrt(np.square(moved).sum(axis=1).mean())),
         )
+
+
+def _outside_largest(component: IntArray) -> BoolArray:
+    """Which points (n,) are not in the component that has most of them."""
+    return np.asarray(component != np.argmax(np.bincount(component)))
 
 
 def _remedy(P: object) -> str:

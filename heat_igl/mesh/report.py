@@ -122,10 +122,12 @@ class CloudReport(MeshReport):
     ----------
     boundary_points : (k,) int64
         Points at a border of the triangles: of the surface, of a hole, or of a part that was not scanned.
+    cut_off_points : (k,) int64
+        Points in no triangle of the largest part, from which their distance is ``inf``.
     doubtful_points : (k,) int64
         Points at which the triangles may join sheets that are apart, or tear one: at an edge of two triangles that
-        contradict each other's orientation or fold back, with less than 60 degrees between them; or at a border beside
-        another sheet, more than four edges away from a point nearby.
+        contradict each other's orientation or fold back, with less than 60 degrees between them; with one and a half
+        turns of triangles around them; or beside another sheet, more than four edges away from a point nearby.
     n_copies : int
         Points that are copies of earlier ones.
     noise : float
@@ -133,6 +135,7 @@ class CloudReport(MeshReport):
     """
 
     boundary_points: IntArray
+    cut_off_points: IntArray
     doubtful_points: IntArray
     n_copies: int
     noise: float

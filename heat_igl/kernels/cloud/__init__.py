@@ -17,8 +17,8 @@ neighbours are near in memory. All kernels take rows, or a range of them, and sh
     In how many stars of its corners a triangle is. Those in all three never overlap.
 `fitting_triangles`
     Of the other triangles, one after the other, those that overlap none before them at a corner.
-`loop_filling`
-    Ears cut from small loops of outer edges, in space, where no tangent plane shows a gap.
 `joining_fans`
     Triangles between the fans of a vertex in which parts meet.
+`loop_filling`
+    Ears cut from small loops of outer edges, in space, where no tangent plane shows a gap.
 """
