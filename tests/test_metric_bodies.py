@@ -18,6 +18,7 @@ from heat_igl import (
     speed_operators,
 )
 from heat_igl.operators import MetricSimplices
+from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine
 from heat_igl.typing import FloatArray
 from heat_igl.validation.closed_forms import straight
@@ -26,6 +27,12 @@ from heat_igl.validation.zoo import tetrahedra
 
 def solver(mesh: Mesh, metric: FloatArray) -> GeodesicSolver:
     return GeodesicSolver(metric_operators(mesh, metric))
+
+
+def engine(mesh: Mesh, metric: FloatArray, source: int) -> FloatArray:
+    """Distance by the Hopf-Lax formula, from a metric at the vertices, also where there are windows."""
+    simplices = MetricSimplices.in_metric(mesh, metric, float(np.linalg.eigvalsh(metric).min() ** 0.5), True)
+    return HopfLaxEngine(simplices).distance(source_set(source, mesh.n_vertices, mesh.F))
 
 
 def sheared(x: FloatArray, a: float) -> tuple[FloatArray, FloatArray]:
@@ -162,14 +169,31 @@ def test_thin_triangles_that_turn():
 
 
 @pytest.mark.filterwarnings("ignore:the metric turns farther")
-def test_vertices_that_rest_on_each_other_do_not_lower_each_other():
-    """Up to 1:102, more than the mesh resolves: 26 % too short where nothing bounds how far the square bends."""
+@pytest.mark.parametrize("place", [[0.45, 0.3, 0], [0.7, 0.1, 0], [-0.2, 0.5, 0]])
+def test_fronts_that_run_against_the_order_of_distance(place):
+    """Up to 1:102, most vertices have their distance from a farther one: 17 % too long before each was settled."""
     mesh, image, g = twisted_disk(64, 10.0)
-    source = int(np.linalg.norm(mesh.V - [0.45, 0.3, 0], axis=1).argmin())
+    source = int(np.linalg.norm(mesh.V - place, axis=1).argmin())
     exact = straight(image, source)
     found = solver(mesh, g).distance(source)
-    assert (found >= 0.88 * exact).all()
-    assert np.abs(found - exact).mean() < 0.015 * exact.mean()
+    assert (found >= 0.96 * exact).all()
+    assert np.abs(found - exact).mean() < 0.006 * exact.mean()
+
+
+@pytest.mark.filterwarnings("ignore:the metric turns farther")
+def test_a_finer_mesh_is_not_worse():
+    """Up to 1:38; with 20 visits for each vertex the largest error stayed at 6.6 %, and the mean at .17 and .20 %."""
+    mean, largest = [], []
+    for n in (32, 64):
+        mesh, image, g = twisted_disk(n, 6.0)
+        source = int(np.linalg.norm(mesh.V - [0.4, 0.3, 0], axis=1).argmin())
+        exact = straight(image, source)
+        error = np.abs(engine(mesh, g, source) - exact)[exact > 0] / exact[exact > 0]
+        mean.append(error.mean())
+        largest.append(error.max())
+    assert mean[1] < 0.4 * mean[0]
+    assert largest[1] < 0.6 * largest[0]
+    assert mean[1] < 0.0006
 
 
 def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():

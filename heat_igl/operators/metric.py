@@ -22,8 +22,9 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
 # for its length.
 _ONE_LENGTH = 0.1
-# Share that has to remain of the length by which two sides of a triangle are longer than the third.
-_SLACK = 0.03
+# Share that has to remain of the length by which two sides of a triangle are longer than the third: with the mean of
+# two lengths for each side, and with lengths integrated in a smooth metric, for which the Hopf-Lax formula is better.
+_SLACK, _SMOOTH_SLACK = 0.03, 0.5
 # Squared lengths in a metric per squared length; areas are their squares.
 _LARGEST = 1e120
 # Asymmetry of a metric, and a negative direction across a triangle, that are taken for rounding.
@@ -65,8 +66,8 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
         the triangles: those after flips if most edges have one length.
 
         With a metric at the vertices, the length of an edge is the integral along it. Where these are the sides of
-        triangles, they are an intrinsic triangulation; if there is a face where they are not, since the metric turns
-        too far along an edge, distance is that of the Hopf-Lax formula.
+        triangles much like those in the metric of each face, they are an intrinsic triangulation; if there is a face
+        where they are not, since the metric changes too far along an edge, distance is that of the Hopf-Lax formula.
 
         Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of the Hopf-Lax
         formula, of first order, sharpened to second where the metric and the distance are smooth. Where the tensors of
@@ -297,7 +298,7 @@ def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Laplac
     axes = plane_axes(mesh)
     inside = axes @ mean @ np.swapaxes(axes, 1, 2)
     sides = simplices.measured[2][:, ::-1]  # opposite each corner
-    if (sides.sum(axis=1) > 2 * (1 + _ROUNDING) * longest_sides(sides)).all():
+    if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1]), _SMOOTH_SLACK):
         domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
         return replace(domain, contrast=_contrast(inside))
     # For heat: what each face says alone.
@@ -314,8 +315,13 @@ def _common_lengths(mesh: Mesh, own: FloatArray) -> FloatArray | None:
     if (longest - shortest > _ONE_LENGTH * longest).any():
         return None
     mean = (np.bincount(of_side.ravel(), own.ravel()) / np.bincount(of_side.ravel()))[of_side]
-    slack, was_slack = (sides.sum(axis=1) - 2 * longest_sides(sides) for sides in (mean, own))
-    return None if (slack < _SLACK * was_slack).any() else np.asarray(mean)
+    return np.asarray(mean) if _keeps_shape(mean, own, _SLACK) else None
+
+
+def _keeps_shape(sides: FloatArray, was: FloatArray, share: float) -> bool:
+    """Whether of triangles with sides `was` (m, 3), those with these sides keep a share of the slack."""
+    slack, was_slack = (a.sum(axis=1) - 2 * longest_sides(a) for a in (sides, was))
+    return bool((slack >= share * was_slack).all())
 
 
 def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:

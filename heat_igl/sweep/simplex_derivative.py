@@ -63,21 +63,17 @@ class _FacetUpdate:
 
     Parameters
     ----------
-    is_sloped, is_new : (k, p) bool
-        Whether the slope at a corner is known, and was not found through the vertex itself.
+    is_sloped : (k, p) bool
+        Whether the slope at a corner is known.
     same : (k, p, p) bool
         Whether two corners have their distance from one source.
     share : (k, p) float64
         The place on the facet; corners of share 0 keep it.
-    bend : (k,) float64
-        How far the square of distance may bend where it falls below both ends of an edge, in its squared length.
     """
 
-    def __init__(
-        self, is_sloped: BoolArray, is_new: BoolArray, same: BoolArray, share: FloatArray, bend: FloatArray
-    ) -> None:
-        self._is_trusted, self._same = is_sloped & is_new, same & is_sloped[:, :, None] & is_sloped[:, None]
-        self.share, self._bend = share.copy(), bend
+    def __init__(self, is_sloped: BoolArray, same: BoolArray, share: FloatArray) -> None:
+        self._is_sloped, self._same = is_sloped, same & is_sloped[:, :, None] & is_sloped[:, None]
+        self.share = share.copy()
         self._of: AnyArray | None = None
 
     def place(self, at: _Inputs) -> None:
@@ -169,7 +165,7 @@ class _FacetUpdate:
         metric = product if product.shape[1] == 1 else product[:, 1:]
         w = np.einsum("kix,kjx->kij", at.slope, e)
         square = np.einsum("kij,kijl,kil->ki", w, np.linalg.inv(np.broadcast_to(metric, (k, p, p, p))), w)
-        is_known = self._is_trusted & (np.real(square) > 0)
+        is_known = self._is_sloped & (np.real(square) > 0)
         trust = _larger(1 - np.log(np.where(is_known, square, 1.0)) ** 2, 0.0) * is_known
         flat = np.zeros(k, bool)
         if p == 3:
@@ -205,9 +201,6 @@ class _FacetUpdate:
                     for d, g in zip((Di, Dj), edge, strict=True)
                 )
                 sag = _smaller(sag, _smaller(rise + from_i, from_j - rise) - level)
-                base = product[:, :, i, i] + product[:, :, j, j] - 2 * product[:, :, i, j]
-                base = np.take_along_axis(base, np.real(base).argmax(axis=1)[:, None], axis=1)[:, 0]
-                sag = _smaller(sag, _larger(self._bend * base, _size(rise)) - level)
                 sag = _larger(sag, _larger(rise - from_i, -from_j - rise) - level)
                 result[:, i, j] = result[:, j, i] = np.where(doubted | flat | ~self._same[:, i, j], 0, sag)
         return result
@@ -327,8 +320,6 @@ class FixedPointDerivative(SimplexDerivative):
         Vertices.
     answer : (n,) float64
         The distance that the engine gives.
-    bend : (m,) float64
-        As for `HopfLax`.
     distance, label, facet, place, slope, is_sloped
         What `HopfLax` found before bounds were kept.
     """
@@ -338,7 +329,6 @@ class FixedPointDerivative(SimplexDerivative):
         simplices: MetricSimplices,
         sources: SourceSet,
         answer: FloatArray,
-        bend: FloatArray,
         distance: FloatArray,
         label: IntArray,
         facet: IntArray,
@@ -358,10 +348,8 @@ class FixedPointDerivative(SimplexDerivative):
         labels = label[self._vertices[:, 1:]]
         self._first = np.take_along_axis(labels, sources.vertex_offset[labels].argmin(axis=1)[:, None], axis=1)[:, 0]
         same = labels[:, :, None] == labels[:, None]
-        through = simplices.corners[facet // size] * (facet >= 0)[:, None] - (facet < 0)[:, None]
-        is_new = (through[self._vertices[:, 1:]] != v[:, None, None]).all(axis=2)
         is_known = is_sloped[self._vertices[:, 1:]].astype(bool)
-        self._update = _FacetUpdate(is_known, is_new, same, place[v], bend[self._simplex])
+        self._update = _FacetUpdate(is_known, same, place[v])
         self._rank = np.empty(n, np.int64)
         self._rank[np.argsort(distance, kind="stable")] = np.arange(n)
         self._state = np.concatenate([distance[:, None], slope], axis=1)

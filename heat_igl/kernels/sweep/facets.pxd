@@ -1,7 +1,7 @@
 cdef extern from *:
     """
     // Share of a facet by which the place moves in the last step of Newton's method; the error is of second order in it.
-    #define PLACED 1e-4
+    #define PLACED 1e-8
     // Squared volume of a flat tetrahedron, over that of three edges at right angles. Without this bound, single vertices
     // next to tetrahedra of 1e-7 are up to 40 % too short; with 1e-4 not more so than with first order.
     #define FLAT 1e-4

@@ -3,21 +3,17 @@ from heat_igl.kernels.sweep.facets cimport Facet
 
 cdef extern from *:
     """
-    // First order ends once no distance falls by more than GAIN of itself; it begins with the larger FIRST_GAIN. In metrics
-    // of 1:17, falls that are handed on at once, however small, make a vertex fall a hundred times as often.
-    #define FIRST_GAIN 1e-2
-    #define GAIN 0.9e-6
-    // Second order ends once no distance changes by more than SETTLED of itself; it begins with the larger one.
-    #define FIRST_SETTLED 1e-2
-    #define SETTLED 0.9e-4
+    // In the first order, a fall of a distance by less than this share of it is not handed on.
+    #define GAIN 1e-2
+    // By which share of a distance the changes along a path that the second order does not hand on may add up, about.
+    #define SETTLED 1e-3
     // Difference of values, as a share of them, that is rounding.
     #define EQUAL 1e-12
     """
-    double FIRST_GAIN, GAIN, FIRST_SETTLED, SETTLED, EQUAL
+    double GAIN, SETTLED, EQUAL
 
 cdef enum:
-    # Of a vertex, in the second order.
-    MOST_VISITS = 20
+    MOST_ROUNDS = 100
 
 
 cdef class HopfLax(Facet):
@@ -32,6 +28,11 @@ cdef class HopfLax(Facet):
     cdef PriorityQueue queue
     cdef double[::1] pending
     cdef int[::1] n_visits
+    # Of the topological order: depth-first search has not seen a vertex, has it open, or is done with it.
+    cdef int[::1] order
+    cdef int[::1] roots
+    cdef int[::1] stack
+    cdef unsigned char[::1] state
     cdef long long n_carried
     cdef double unit, low
     cdef const unsigned char[::1] fixed
@@ -48,7 +49,6 @@ cdef class HopfLax(Facet):
     cdef double[:, ::1] place
     cdef double[::1] widest
     cdef double[::1] slack
-    cdef double[::1] bend
     # The corners of the facet in the simplex, and distance at these.
     cdef int side[3]
     cdef double level[3]
@@ -62,6 +62,7 @@ cdef class HopfLax(Facet):
     cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
     cdef double across(self, int s, int c, double room) noexcept nogil
     cdef void sharpen(self, double least) noexcept nogil
+    cdef void arrange(self) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
     cdef bint rests_on(self, int v, int u) noexcept nogil

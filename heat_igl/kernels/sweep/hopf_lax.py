@@ -16,15 +16,8 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, invert, mean_velocity, multiply
-from cython.cimports.heat_igl.kernels.sweep.hopf_lax import (
-    EQUAL,
-    FIRST_GAIN,
-    FIRST_SETTLED,
-    GAIN,
-    MOST_VISITS,
-    SETTLED,
-)
-from cython.cimports.libc.math import INFINITY, fabs, log, log2, sqrt
+from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, GAIN, MOST_ROUNDS, SETTLED
+from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 from heat_igl.kernels.signals import raise_caught
 
@@ -122,15 +115,12 @@ def measured(
     -------
     widest, gradient
         As there.
-    growth : (m,) float64
-        The square of the volume in the mean metric, over that in space, as a power of two.
     """
     size: cython.int = corners.shape[1]
     m = corners.shape[0]
-    widths, gradients, growths = np.zeros(m), np.zeros((m, size, 3)), np.zeros(m)
+    widths, gradients = np.zeros(m), np.zeros((m, size, 3))
     widest: cython.double[::1] = widths
     gradient: cython.double[:, :, ::1] = gradients
-    growth: cython.double[::1] = growths
     e: cython.double[3][3]
     P: cython.double[3][3]
     with cython.nogil:
@@ -160,10 +150,7 @@ def measured(
                     # A triangle without area has no gradient.
                     gradient[s, i, x] = gradient[s, i, x] / volume if volume != 0.0 else 0.0
                     gradient[s, 0, x] -= gradient[s, i, x]
-            square: cython.double = P[0][0] * (P[1][1] * P[2][2] - P[1][2] * P[1][2])
-            square += 2.0 * P[0][1] * P[1][2] * P[0][2] - P[1][1] * P[0][2] * P[0][2] - P[2][2] * P[0][1] * P[0][1]
-            growth[s] = log2(square / (fabs(volume) if size == 3 else volume * volume))
-    return widths, gradients, growths
+    return widths, gradients
 
 
 @cython.cfunc
@@ -197,19 +184,17 @@ class HopfLax(Facet):
         Squared distances in one metric for each simplex, in which T is found that is linear.
     widest, slack : (m,) float64
         The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
-    bend : (m,) float64
-        How far, in squared lengths of an edge, the square of T may bend where it falls below both ends of the edge.
     gradient : (m, p + 1, 3) float64
         Of the barycentric coordinates of each simplex.
     V : (n, 3) float64
         Positions.
     """
 
-    def __init__(self, corners, first, incident, squares, velocity, mean, widest, slack, bend, gradient, V):
+    def __init__(self, corners, first, incident, squares, velocity, mean, widest, slack, gradient, V):
         self.corners, self.first, self.incident, self.squares = corners, first, incident, squares
         self.velocity, self.mean, self.widest, self.slack = velocity, mean, widest, slack
         self.gradient, self.V = gradient, V
-        self.bend, self.p, self.q = bend, corners.shape[1] - 1, squares.shape[1]
+        self.p, self.q = corners.shape[1] - 1, squares.shape[1]
         self.unit = sqrt(np.mean(widest))
 
     def first_order(self, d, label, offset):
@@ -239,7 +224,7 @@ class HopfLax(Facet):
         Parameters
         ----------
         settled : float
-            It ends once no distance changes by more than this share of it, or after `MOST_VISITS` of a vertex.
+            Share of a distance by which the changes along a path that are not handed on may add up, about.
 
         Returns
         -------
@@ -253,7 +238,9 @@ class HopfLax(Facet):
         n = self.d.shape[0]
         self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
         np.asarray(self.facet)[np.asarray(self.fixed).view(bool)] = -1
-        self.place = np.zeros((n, self.p))
+        self.place = np.ones((n, self.p))
+        self.order = np.argsort(self.d).astype(np.int32)
+        self.roots, self.state, self.stack = np.zeros(n, np.int32), np.zeros(n, np.uint8), np.zeros(4 * n, np.int32)
         self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen(settled)
@@ -277,36 +264,31 @@ class HopfLax(Facet):
         return v
 
     def spread(self) -> cython.void:
-        """First order: Dijkstra's algorithm, in which a vertex comes again if its distance falls again."""
+        """First order: Dijkstra's algorithm, in which a vertex comes again if its distance falls much again."""
         v: cython.int
         size: cython.int = self.p + 1
-        gain: cython.double = FIRST_GAIN
-        while True:
-            for v in range(self.d.shape[0]):
-                if self.d[v] + gain * fabs(self.d[v]) < self.handed[v]:
-                    self.wait(v)
+        for v in range(self.d.shape[0]):
+            if self.d[v] < INFINITY:
+                self.wait(v)
+        v = self.nearest_waiting()
+        while v >= 0:
+            self.handed[v] = self.d[v]
+            for k in range(self.first[v], self.first[v + 1]):
+                s: cython.int = self.incident[k] // size
+                for c in range(size):
+                    u: cython.int = self.corners[s, c]
+                    if u == v:
+                        continue
+                    nearest: cython.double = self.face(s, c)
+                    if not nearest < self.d[u]:
+                        continue
+                    value: cython.double = self.linear(s, c, self.d[u] - nearest, v)
+                    if value < self.d[u]:
+                        self.label[u] = self.label[self.corners[s, self.nearest_corner()]]
+                        self.d[u], self.facet[u] = value, s * size + c
+                        if value + GAIN * fabs(value) < self.handed[u]:
+                            self.wait(u)
             v = self.nearest_waiting()
-            while v >= 0:
-                self.handed[v] = self.d[v]
-                for k in range(self.first[v], self.first[v + 1]):
-                    s: cython.int = self.incident[k] // size
-                    for c in range(size):
-                        u: cython.int = self.corners[s, c]
-                        if u == v:
-                            continue
-                        nearest: cython.double = self.face(s, c)
-                        if not nearest < self.d[u]:
-                            continue
-                        value: cython.double = self.linear(s, c, self.d[u] - nearest, v)
-                        if value < self.d[u]:
-                            self.label[u] = self.label[self.corners[s, self.nearest_corner()]]
-                            self.d[u], self.facet[u] = value, s * size + c
-                            if value + gain * fabs(value) < self.handed[u]:
-                                self.wait(u)
-                v = self.nearest_waiting()
-            if self.queue.count > 0 or not gain > GAIN:
-                break
-            gain *= 0.1
 
     @cython.cfunc
     @cython.inline
@@ -433,40 +415,91 @@ class HopfLax(Facet):
         return self.level[0] + b * fb + e * fe + far
 
     def sharpen(self, least: cython.double) -> cython.void:
-        """Second order: the nearest vertex next, until no distance around any has changed by more than is settled."""
+        """Second order, in rounds: each vertex after those it has its distance from, which may be farther away."""
         v: cython.int
         size: cython.int = self.p + 1
-        settled: cython.double = FIRST_SETTLED
-        while True:
-            for v in range(self.d.shape[0]):
-                if self.pending[v] > settled and not self.fixed[v] and self.n_visits[v] < MOST_VISITS:
-                    self.wait(v)
-            v = self.nearest_waiting()
-            while v >= 0:
+        turn: cython.double[3]
+        # Changes add up along a path.
+        settled: cython.double = least * self.order.shape[0] ** (-1.0 / self.p)
+        for _round in range(MOST_ROUNDS):
+            is_settled: cython.bint = True
+            self.arrange()
+            if is_interrupted():
+                break
+            for at in range(self.order.shape[0]):
+                v = self.order[at]
+                # Where the metric turns far within a simplex, distances may go in circles: more so each time.
+                if not self.pending[v] > settled * self.n_visits[v] or self.fixed[v]:
+                    continue
+                is_settled = False
                 self.pending[v] = 0.0
                 self.n_visits[v] += 1
                 old: cython.double = self.d[v]
                 change: cython.double = 0.0 if self.is_sloped[v] else INFINITY
+                for k in range(3):
+                    turn[k] = self.slope[v, k]
                 self.visit(v)
-                change = max(change, fabs(self.d[v] - old) / max(fabs(old - self.low), fabs(self.d[v] - self.low)))
+                span: cython.double = max(fabs(old - self.low), fabs(self.d[v] - self.low))
+                change = max(change, fabs(self.d[v] - old) / span)
+                for k in range(3):
+                    turn[k] = (self.slope[v, k] - turn[k]) / (8.0 * span)
                 for k in range(self.first[v], self.first[v + 1]):
                     s: cython.int = self.incident[k] // size
+                    most: cython.double = change
+                    # T changes by an eighth, in the middle of an edge, of how far a slope changes along it.
                     for c in range(size):
                         u: cython.int = self.corners[s, c]
-                        if u == v or self.fixed[u] or not change > self.pending[u]:
-                            continue
+                        by: cython.double = 0.0
+                        for i in range(3):
+                            by += turn[i] * (self.V[u, i] - self.V[v, i])
+                        most = max(most, fabs(by))
+                    for c in range(size):
+                        u = self.corners[s, c]
                         # Farther away, v matters to u if it now has a slope, and u gains by that.
-                        if not (self.d[v] < self.d[u] or self.rests_on(u, v)) and not (
-                            change == INFINITY and self.through(s, c, self.d[u]) < self.d[u]
+                        if (
+                            most > self.pending[u]
+                            and u != v
+                            and (
+                                self.d[v] < self.d[u]
+                                or self.rests_on(u, v)
+                                or (change == INFINITY and self.through(s, c, self.d[u]) < self.d[u])
+                            )
                         ):
-                            continue
-                        self.pending[u] = change
-                        if change > settled and self.n_visits[u] < MOST_VISITS:
-                            self.wait(u)
-                v = self.nearest_waiting()
-            if self.queue.count > 0 or not settled > least:
+                            self.pending[u] = most
+            if is_settled:
                 break
-            settled *= 0.1
+
+    def arrange(self) -> cython.void:
+        """Order vertices topologically: each behind the corners that it has its distance from, but for circles."""
+        v: cython.int
+        size: cython.int = self.p + 1
+        n_done: cython.int = 0
+        n: cython.int = self.order.shape[0]
+        for at in range(n):
+            self.roots[at] = self.order[at]
+            self.state[at] = 0
+        for at in range(n):
+            n_open: cython.int = 1
+            self.stack[0] = self.roots[at]
+            while n_open > 0:
+                v = self.stack[n_open - 1]
+                if self.state[v] == 0 and self.facet[v] >= 0:
+                    self.state[v] = 1
+                    k: cython.int = 0
+                    for c in range(size):
+                        if c == self.facet[v] % size:
+                            continue
+                        u: cython.int = self.corners[self.facet[v] // size, c]
+                        if self.state[u] == 0 and self.place[v, k] > 0.0:
+                            self.stack[n_open] = u
+                            n_open += 1
+                        k += 1
+                    continue
+                n_open -= 1
+                if self.state[v] < 2:
+                    self.state[v] = 2
+                    self.order[n_done] = v
+                    n_done += 1
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it."""
@@ -633,11 +666,6 @@ class HopfLax(Facet):
         from_j: cython.double = 2.0 * Dj * sqrt(self.squares[s, self.side[j] if self.q > 1 else 0, edge])
         most: cython.double = min(rise + from_i, from_j - rise) - level
         least: cython.double = max(rise - from_i, -from_j - rise) - level
-        base: cython.double = 0.0
-        for k in range(self.q):
-            base = max(base, self.squares[s, k, edge])
-        # Where T falls below both ends, vertices that rest on each other would lower each other.
-        most = min(most, max(self.bend[s] * base, fabs(rise)) - level)
         return max(min(sag, most), least)
 
     def trust(self, s: cython.int, c: cython.int, i: cython.int) -> cython.double:
@@ -647,7 +675,7 @@ class HopfLax(Facet):
         found through the vertex for which it is asked says nothing new: two such vertices would lower each other.
         """
         v: cython.int = self.corners[s, self.side[i]]
-        if not self.is_sloped[v] or self.rests_on(v, self.corners[s, c]):
+        if not self.is_sloped[v]:
             return 0.0
         e: cython.double[3]
         for j in range(3):
