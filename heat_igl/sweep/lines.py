@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.kernels.bodies.bends import bend_around
-from heat_igl.kernels.bodies.bodies import Body
+from heat_igl.kernels.bodies.rays import Body
 from heat_igl.kernels.bodies.sight import look_around
 from heat_igl.mesh import connectivity
 from heat_igl.mesh.connectivity import unique_rows

@@ -3,18 +3,14 @@
 They bend at edges of the body with more than half a turn inside. Such an edge is a source like a given one, once its
 ends have distances.
 
-- `bodies` lists the tetrahedron behind each side, and the neighbours of each vertex. `rays` follows a line through the
-  tetrahedra, until it leaves the body. `lines.pxd` is the length of a straight line.
+- `rays` lists the tetrahedron behind each side and the neighbours of each vertex, and follows a line through the
+  tetrahedra until it arrives or leaves the body.
 - `sight`: from near to far, each vertex looks for the sources of its neighbours, the nearest first, and takes the
   shortest line that stays inside. Then neighbours that do not see this source look again, until nothing changes. A
   vertex that sees no source stays at infinity.
 - `bends`: each edge, from near to far, whose ends have got shorter distances is fitted, and vertices around it take the
-  ways around it as far as they see it; until no end gets shorter. What it knows of an edge is made in three classes,
-  each derived from the one before:
-  `bent_ways`, the length of a way to a point that bends around the edge;
-  `edge_sight`, whether a vertex sees a point of the edge;
-  `fitted_bends`, distance along the edge: that from one point beside it, if this agrees at the middle and the quarters,
-  else the values there.
+  ways around it as far as they see it; until no end gets shorter. Distance along an edge is that from one point beside
+  it, if this agrees at the middle and the quarters, else the values there.
 
 Where tetrahedra touch in a point only, and in small bodies with several sources, lines and bends are found in turn.
 """

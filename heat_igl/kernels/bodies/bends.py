@@ -2,31 +2,19 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bodies.bends import LEVEL, MOST_ROUNDS, SLACK
-from cython.cimports.heat_igl.kernels.bodies.bent_ways import GAIN
-from cython.cimports.heat_igl.kernels.bodies.bodies import Body
-from cython.cimports.heat_igl.kernels.bodies.fitted_bends import FittedBends
-from cython.cimports.heat_igl.kernels.bodies.rays import Ray
-from cython.cimports.libc.math import sqrt
+from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, Body, Ray
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-_BEND = np.dtype(
-    [
-        ("at", "f8", 5),
-        ("tangent", "f8", 3),
-        ("outward", "f8", 3),
-        ("before", "f8", 3),
-        ("length", "f8"),
-        ("start", "f8"),
-        ("along", "f8"),
-        ("height", "f8"),
-        ("wall", "f8"),
-        ("a", "i4"),
-        ("b", "i4"),
-        ("fits", "i4"),
-        ("has_before", "i4"),
-    ],
-    align=True,
-)
+# Share of the longest edge at a vertex by which a way to it may be too long, and the search still goes on behind it.
+_SLACK = cython.declare(cython.double, 0.2)
+# Share of that edge by which a vertex may lie below the plane of a wall and still be on it.
+_LEVEL = cython.declare(cython.double, 1e-6)
+# Share of an edge by which the fitted distance may be wrong at its quarters.
+_MISFIT = cython.declare(cython.double, 1e-3)
+# Change of the slope along an edge below which a front is straight there.
+_STRAIGHT_FRONT = cython.declare(cython.double, 1e-7)
+# Rounds over the edges around which ways bend.
+_MOST_ROUNDS = cython.declare(cython.int, 50)
 
 
 def bend_around(
@@ -75,28 +63,20 @@ def bend_around(
         Number of times that vertices were searched around an edge.
     """
     n, e = body.positions.shape[0], edges.shape[0]
-    all_bends = np.zeros(e, _BEND)
-    ends = np.asarray(edges)
-    X = np.asarray(body.positions)[ends]
-    all_bends["a"], all_bends["b"] = ends.T
-    all_bends["length"] = np.linalg.norm(X[:, 1] - X[:, 0], axis=1)
-    all_bends["tangent"] = (X[:, 1] - X[:, 0]) / all_bends["length"][:, None]
-    all_bends["outward"], all_bends["wall"] = outward, wall
-    all_bends["at"] = np.inf
-    one = _Search()
-    one.ray = Ray(body)
-    one.bends = all_bends
-    one.corners, one.first, one.incident, one.positions = body.corners, body.first, body.incident, body.positions
-    one.first_neighbour, one.neighbours, one.reach = body.first_neighbour, body.neighbours, body.reach
-    one.beside, one.sources, one.offset = beside, sources, offset
-    one.d, one.begin, one.label, one.way = d, begin, label, way
+    ends = np.asarray(body.positions)[np.asarray(edges)]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    one = _Bends(body, sources, offset, d, begin, label)
+    one.edges, one.outward, one.wall, one.beside, one.way = edges, outward, wall, beside, way
+    one.length, one.tangent = lengths, (ends[:, 1] - ends[:, 0]) / lengths[:, None]
+    one.at, one.before, one.has_before = np.full((e, 5), np.inf), np.zeros((e, 3)), np.zeros(e, np.uint8)
+    one.start, one.along, one.height, one.fits = np.zeros(e), np.zeros(e), np.zeros(e), np.zeros(e, np.uint8)
     one.seen, one.lit, one.queue = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
     with cython.nogil:
-        for _rounds in range(MOST_ROUNDS):
+        for _rounds in range(_MOST_ROUNDS):
             before: cython.int = one.stamp
-            for i in range(one.bends.shape[0]):
+            for i in range(e):
                 if one.is_stale(i):
-                    one.stamp += 1
+                    one.stamp, one.sought = one.stamp + 1, i
                     one.fit(i)
                     one.search(i)
             if one.stamp == before:
@@ -106,29 +86,222 @@ def bend_around(
 
 @cython.final
 @cython.cclass
-class _Search(FittedBends):
-    """The vertices around an edge that is searched: `seen` (n,) has the last search that came to each.
+class _Bends(Ray):
+    """Edges of a body around which ways bend, the ways, and the search around an edge.
 
-    `is_below` tells whether the vertex that was last looked at is hidden by the wall behind the edge.
+    Distance along an edge that `fits` is ``start + |(x - along, height)|``, x along the edge; at its ends, the quarters
+    and the middle it is `at`. `before` is the point from which the way comes to the middle, if it `has_before`.
+
+    Of the way that was last asked for, `x` (3,) is the point at which it bends last, `share` the place of this point
+    along the edge, and `beyond` by how much the way would miss the edge on a line through it.
+
+    Of the search around the edge `sought`, `stamp` is the number; `seen` (n,) has the last search that came to each
+    vertex, and `lit` (n,) the last in which it saw the edge. `is_below` tells whether the vertex that was last looked
+    at is hidden by the wall behind the edge.
     """
 
-    first_neighbour: cython.const[cython.int][::1]
-    neighbours: cython.const[cython.int][::1]
-    reach: cython.const[cython.double][::1]
+    edges: cython.const[cython.int][:, ::1]
+    outward: cython.const[cython.double][:, ::1]
+    wall: cython.const[cython.double][::1]
+    length: cython.double[::1]
+    tangent: cython.double[:, ::1]
+    at: cython.double[:, ::1]
+    before: cython.double[:, ::1]
+    has_before: cython.uchar[::1]
+    start: cython.double[::1]
+    along: cython.double[::1]
+    height: cython.double[::1]
+    fits: cython.uchar[::1]
+    way: cython.int[::1]
+    x: cython.double[3]
+    share: cython.double
+    beyond: cython.double
+    sought: cython.int
+    stamp: cython.int
     seen: cython.int[::1]
+    lit: cython.int[::1]
     queue: cython.int[::1]
     beside: cython.double
     is_below: cython.bint
 
     @cython.cfunc
     @cython.nogil
+    def is_stale(self, i: cython.int) -> cython.bint:
+        """Whether the ends of an edge have distances, and others than when it was fitted."""
+        to_a: cython.double = self.d[self.edges[i, 0]]
+        to_b: cython.double = self.d[self.edges[i, 1]]
+        if to_a == INFINITY or to_b == INFINITY:
+            return False
+        return self.at[i, 0] > to_a * (1 + GAIN) or self.at[i, 4] > to_b * (1 + GAIN)
+
+    @cython.cfunc
+    @cython.nogil
+    def fit(self, i: cython.int) -> cython.void:
+        """Find distance along an edge from the ways to its ends."""
+        x: cython.double[3]
+        a: cython.int = self.edges[i, 0]
+        b: cython.int = self.edges[i, 1]
+        to_a: cython.double = self.d[a]
+        to_b: cython.double = self.d[b]
+        # The way to one end continues along the edge unless it is hidden at the other end.
+        a_reaches: cython.bint = self.value(a, cython.address(self.positions[b, 0])) >= to_b * (1 - GAIN)
+        b_reaches: cython.bint = self.value(b, cython.address(self.positions[a, 0])) >= to_a * (1 - GAIN)
+        self.at[i, 0], self.at[i, 4] = to_a, to_b
+        for j in range(1, 4):
+            for k in range(3):
+                x[k] = self.positions[a, k] + 0.25 * j * self.length[i] * self.tangent[i, k]
+            from_a: cython.double = self.value(a, x)
+            from_b: cython.double = self.value(b, x)
+            a_is_seen: cython.bint = a_reaches or self.is_lit_from(a, x, 0.25 * j)
+            b_is_seen: cython.bint = b_reaches or self.is_lit_from(b, x, 0.25 * j)
+            if a_is_seen and b_is_seen:
+                self.at[i, j] = min(from_a, from_b)
+            elif a_is_seen:
+                self.at[i, j] = from_a
+            elif b_is_seen:
+                self.at[i, j] = from_b
+            else:
+                self.at[i, j] = max(from_a, from_b)
+            if j == 2:
+                self.value(a, x)
+                self.has_before[i] = self.way[a] > -2
+                for k in range(3):
+                    self.before[i, k] = self.x[k]
+        self.lay_flat(i, a, b)
+
+    @cython.cfunc
+    @cython.nogil
+    def lay_flat(self, i: cython.int, a: cython.int, b: cython.int) -> cython.void:
+        """Find the point beside an edge from which distance along it is measured, and whether there is one."""
+        size: cython.double = self.length[i]
+        to_a: cython.double = self.at[i, 0]
+        middle: cython.double = self.at[i, 2] - to_a
+        to_b: cython.double = self.at[i, 4] - to_a
+        turn: cython.double = to_b - 2 * middle
+        way_a: cython.int = self.way[a]
+        if way_a == -1 and self.way[b] == -1 and self.label[a] == self.label[b]:
+            self.start[i] = self.offset[self.label[a]] - to_a
+        elif turn > _STRAIGHT_FRONT * size:
+            self.start[i] = (to_b * to_b - 2 * middle * middle - 0.5 * size * size) / (2 * turn)
+        elif way_a >= 0:
+            self.start[i] = self.start[way_a] - to_a
+        elif way_a == -1:
+            self.start[i] = self.offset[self.label[a]] - to_a
+        else:
+            self.start[i] = -size / _STRAIGHT_FRONT
+        self.start[i] = max(self.start[i], -size / _STRAIGHT_FRONT)
+        radius: cython.double = -self.start[i]
+        other: cython.double = to_b - self.start[i]
+        self.along[i] = 0.5 * ((radius - other) * (radius + other) / size + size)
+        squared: cython.double = radius * radius - self.along[i] * self.along[i]
+        self.fits[i] = radius >= 0 and other >= 0 and squared >= 0
+        self.start[i] += to_a
+        if not self.fits[i]:
+            return
+        self.height[i] = sqrt(squared)
+        for j in range(1, 4):
+            off: cython.double = 0.25 * j * size - self.along[i]
+            if fabs(self.start[i] + sqrt(off * off + squared) - self.at[i, j]) > _MISFIT * size:
+                self.fits[i] = False
+
+    @cython.cfunc
+    @cython.nogil
+    def value(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+        """Distance at a point near vertex v, by the way to v; `x` becomes the point at which this way bends last."""
+        if self.way[v] >= 0:
+            return self.around(self.way[v], x)
+        source: cython.int = v
+        value: cython.double = self.d[v]
+        if self.way[v] == -1:
+            source, value = self.sources[self.label[v]], self.offset[self.label[v]]
+        squared: cython.double = 0.0
+        for k in range(3):
+            self.x[k] = self.positions[source, k]
+            squared += (x[k] - self.x[k]) * (x[k] - self.x[k])
+        return value + sqrt(squared)
+
+    @cython.cfunc
+    @cython.nogil
+    def around(self, i: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+        """Length of the way to a point that bends around an edge last; sets `x`, `share` and `beyond`."""
+        away: cython.double = 0.0
+        along: cython.double = 0.0
+        for k in range(3):
+            off: cython.double = x[k] - self.positions[self.edges[i, 0], k]
+            away += off * off
+            along += off * self.tangent[i, k]
+        squared: cython.double = max(away - along * along, 0.0)
+        best: cython.double = INFINITY
+        self.beyond = 0.0
+        if self.fits[i]:
+            height: cython.double = sqrt(squared)
+            both: cython.double = height + self.height[i]
+            self.share = self.along[i]
+            if both > 0:
+                self.share = (self.along[i] * height + along * self.height[i]) / both
+            self.beyond = max(-self.share, self.share - self.length[i], 0.0)
+            self.share = min(max(self.share / self.length[i], 0.0), 1.0)
+            if 0 < self.share < 1:
+                best = self.start[i] + sqrt((along - self.along[i]) * (along - self.along[i]) + both * both)
+        if best == INFINITY:
+            for j in range(5):
+                if self.fits[i] and 0 < j < 4:
+                    continue
+                off = along - 0.25 * j * self.length[i]
+                through: cython.double = self.at[i, j] + sqrt(squared + off * off)
+                if through < best:
+                    best, self.share = through, 0.25 * j
+        for k in range(3):
+            self.x[k] = self.positions[self.edges[i, 0], k] + self.share * self.length[i] * self.tangent[i, k]
+        return best
+
+    @cython.cfunc
+    @cython.nogil
+    def away(self, v: cython.int) -> cython.double:
+        """Distance of v from `x`."""
+        squared: cython.double = 0.0
+        for k in range(3):
+            squared += (self.positions[v, k] - self.x[k]) * (self.positions[v, k] - self.x[k])
+        return sqrt(squared)
+
+    @cython.cfunc
+    @cython.nogil
+    def is_lit_from(
+        self, v: cython.int, x: cython.pointer[cython.const[cython.double]], share: cython.double
+    ) -> cython.bint:
+        """Whether the source from which the way to v is straight sees a point of the edge."""
+        if self.way[v] != -1:
+            return False
+        self.share = share
+        return self.sees(self.sources[self.label[v]], x)
+
+    @cython.cfunc
+    @cython.nogil
+    def is_there(self, t: cython.int) -> cython.bint:
+        """As `Ray.is_there`: at the point of the edge at `share`."""
+        has_a: cython.bint = self.share > 1 - NUDGE
+        has_b: cython.bint = self.share < NUDGE
+        for c in range(4):
+            has_a = has_a or self.corners[t, c] == self.edges[self.sought, 0]
+            has_b = has_b or self.corners[t, c] == self.edges[self.sought, 1]
+        return has_a and has_b
+
+    @cython.cfunc
+    @cython.nogil
+    def is_lit(self, v: cython.int) -> cython.bint:
+        """As `Ray.is_lit`: in this search."""
+        return self.lit[v] == self.stamp
+
+    @cython.cfunc
+    @cython.nogil
     def search(self, i: cython.int) -> cython.void:
         """Give the vertices around an edge their ways around it, as far as they see it and may need it."""
-        bend = cython.address(self.bends[i])
         stamp: cython.int = self.stamp
-        self.seen[bend.a] = self.seen[bend.b] = self.lit[bend.a] = self.lit[bend.b] = stamp
-        size: cython.int = self.push_around(bend.a, 0, stamp)
-        size = self.push_around(bend.b, size, stamp)
+        a: cython.int = self.edges[i, 0]
+        b: cython.int = self.edges[i, 1]
+        self.seen[a] = self.seen[b] = self.lit[a] = self.lit[b] = stamp
+        size: cython.int = self.push_around(a, 0, stamp)
+        size = self.push_around(b, size, stamp)
         next_one: cython.int = 0
         while next_one < size:
             u: cython.int = self.queue[next_one]
@@ -137,18 +310,18 @@ class _Search(FittedBends):
             old: cython.double = self.d[u]
             is_better: cython.bint = value < old * (1 - GAIN)
             # Farther along, ways are shorter around another edge.
-            if not is_better and (self.beyond > self.reach[u] or value > old + SLACK * self.reach[u]):
+            if not is_better and (self.beyond > self.reach[u] or value > old + _SLACK * self.reach[u]):
                 continue
             if not self.is_hidden_from_before(i, u):
                 continue
             # A vertex that gains nothing, or sees nothing of the edge, may lie between those that do.
             if is_better and not self.is_below:
-                if not self.sees(i, u):
+                if not self.sees(u, self.x):
                     continue
                 self.lit[u] = stamp
                 self.d[u], self.way[u] = value, i
                 self.begin[u] = value - self.away(u)
-                self.label[u] = self.label[bend.a if self.share < 0.5 else bend.b]
+                self.label[u] = self.label[a if self.share < 0.5 else b]
             size = self.push_around(u, size, stamp)
 
     @cython.cfunc
@@ -171,9 +344,8 @@ class _Search(FittedBends):
         Seen along the edge, the line from v to the point from which the way comes passes outside, and v is not below
         the plane of the wall behind the edge.
         """
-        bend = cython.address(self.bends[i])
         self.is_below = False
-        if bend.outward[0] == 0 and bend.outward[1] == 0 and bend.outward[2] == 0:
+        if self.outward[i, 0] == 0 and self.outward[i, 1] == 0 and self.outward[i, 2] == 0:
             return True
         before_out: cython.double = 0.0
         before_side: cython.double = 0.0
@@ -182,19 +354,19 @@ class _Search(FittedBends):
         for k in range(3):
             j: cython.int = (k + 1) % 3
             m: cython.int = (k + 2) % 3
-            across: cython.double = bend.tangent[j] * bend.outward[m] - bend.tangent[m] * bend.outward[j]
-            y: cython.double = bend.before[k] - self.positions[bend.a, k]
-            off: cython.double = self.positions[v, k] - self.positions[bend.a, k]
-            before_out += y * bend.outward[k]
+            across: cython.double = self.tangent[i, j] * self.outward[i, m] - self.tangent[i, m] * self.outward[i, j]
+            y: cython.double = self.before[i, k] - self.positions[self.edges[i, 0], k]
+            off: cython.double = self.positions[v, k] - self.positions[self.edges[i, 0], k]
+            before_out += y * self.outward[i, k]
             before_side += y * across
-            out += off * bend.outward[k]
+            out += off * self.outward[i, k]
             side += off * across
         near: cython.double = self.beside * self.reach[v]
-        below: cython.double = out - bend.wall * sqrt(out * out + side * side)
-        self.is_below = below > LEVEL * self.reach[v]
+        below: cython.double = out - self.wall[i] * sqrt(out * out + side * side)
+        self.is_below = below > _LEVEL * self.reach[v]
         if below > near:
             return False
-        if not bend.has_before:
+        if not self.has_before[i]:
             return True
         if before_side < 0:
             before_side, side = -before_side, -side

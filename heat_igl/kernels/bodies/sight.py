@@ -2,11 +2,14 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bodies.bodies import Body
-from cython.cimports.heat_igl.kernels.bodies.lines import STRAIGHT_LINE, straight
-from cython.cimports.heat_igl.kernels.bodies.rays import MOST_STEPS, NUDGE, Ray
-from cython.cimports.heat_igl.kernels.bodies.sight import GAIN, MOST_LOOKS, MOST_PASSES
-from cython.cimports.libc.math import INFINITY
+from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, Body, Ray
+from cython.cimports.libc.math import INFINITY, sqrt
+
+# Part by which a way may be longer than a straight line and still be one.
+_STRAIGHT_LINE = cython.declare(cython.double, 1e-6)
+# Sources that a vertex looks for each time, the nearest first, and passes over the vertices that wait.
+_MOST_LOOKS = cython.declare(cython.int, 4)
+_MOST_PASSES = cython.declare(cython.int, 100)
 
 
 def look_around(
@@ -47,16 +50,12 @@ def look_around(
         Distances, the value at which the front that arrives seems to begin, and the source of each; changed.
     """
     n = order.shape[0]
-    one = _Sight()
-    one.corners, one.first, one.incident, one.positions = body.corners, body.first, body.incident, body.positions
-    one.first_neighbour, one.neighbours, one.ray = body.first_neighbour, body.neighbours, Ray(body)
-    one.sources, one.offset, one.turns, one.guess = sources, offset, turns, guess
-    one.is_concave = is_concave
-    one.d, one.begin, one.label = d, begin, label
+    one = _Sight(body, sources, offset, d, begin, label)
+    one.turns, one.is_concave, one.guess = turns, is_concave, guess
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
     one.is_waiting = is_waiting
     with cython.nogil:
-        for _passes in range(MOST_PASSES):
+        for _passes in range(_MOST_PASSES):
             n_changed: cython.Py_ssize_t = 0
             for i in range(n):
                 if is_waiting[order[i]]:
@@ -68,25 +67,14 @@ def look_around(
 
 @cython.final
 @cython.cclass
-class _Sight:
-    """What is read and written, and the line that is followed."""
+class _Sight(Ray):
+    """What is read and written, the line that is followed, and the source that is looked for."""
 
-    corners: cython.const[cython.int][:, ::1]
-    first: cython.const[cython.int][::1]
-    incident: cython.const[cython.int][::1]
-    positions: cython.const[cython.double][:, ::1]
-    first_neighbour: cython.const[cython.int][::1]
-    neighbours: cython.const[cython.int][::1]
-    sources: cython.const[cython.int][::1]
-    offset: cython.const[cython.double][::1]
     turns: cython.const[cython.uchar][::1]
     is_concave: cython.bint
     guess: cython.int[::1]
-    d: cython.double[::1]
-    begin: cython.double[::1]
-    label: cython.int[::1]
     is_waiting: cython.uchar[::1]
-    ray: Ray
+    sought: cython.int
 
     @cython.cfunc
     @cython.nogil
@@ -95,14 +83,14 @@ class _Sight:
         below: cython.double = self.d[v]
         if below < INFINITY:
             below -= GAIN * (below - self.begin[v])
-        looks: cython.int = MOST_LOOKS
+        looks: cython.int = _MOST_LOOKS
         nearest: cython.int = self.guess[v]
         if nearest >= 0:
             self.guess[v] = -1
             # There is no other.
             if self.sources.shape[0] == 1:
                 looks = 0
-            if self.line(v, nearest) < below and self.sees(v, nearest):
+            if self.line(v, nearest) < below and self.sees_source(v, nearest):
                 self.take(v, nearest)
                 return True
         above: cython.double = -INFINITY
@@ -113,7 +101,7 @@ class _Sight:
                 nearest = self.nearest_around(self.sources[self.label[v]], v, above, below, nearest)
             if nearest < 0:
                 return False
-            if self.sees(v, nearest):
+            if self.sees_source(v, nearest):
                 self.take(v, nearest)
                 return True
             above = self.line(v, nearest)
@@ -126,7 +114,7 @@ class _Sight:
         self.d[v], self.begin[v], self.label[v] = self.line(v, label), self.offset[label], label
         for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
             u: cython.int = self.neighbours[k]
-            if self.label[u] != label or not self.is_lit(u, label):
+            if self.label[u] != label or not self.has_line(u, label):
                 self.is_waiting[u] = True
 
     @cython.cfunc
@@ -154,76 +142,58 @@ class _Sight:
     def line(self, v: cython.int, label: cython.int) -> cython.double:
         """The value at v along the straight line from a source."""
         source: cython.int = self.sources[label]
-        away: cython.double = straight(cython.address(self.positions[v, 0]), cython.address(self.positions[source, 0]))
-        return self.offset[label] + away
+        squared: cython.double = 0.0
+        for k in range(3):
+            off: cython.double = self.positions[v, k] - self.positions[source, k]
+            squared += off * off
+        return self.offset[label] + sqrt(squared)
 
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    def is_lit(self, v: cython.int, label: cython.int) -> cython.bint:
+    def has_line(self, v: cython.int, label: cython.int) -> cython.bint:
         """Whether the way to v is known to be a straight line from this source."""
         if self.label[v] != label:
             return False
-        return (self.d[v] - self.offset[label]) * (1 - STRAIGHT_LINE) <= self.line(v, label) - self.offset[label]
+        return (self.d[v] - self.offset[label]) * (1 - _STRAIGHT_LINE) <= self.line(v, label) - self.offset[label]
 
     @cython.cfunc
     @cython.nogil
-    def sees(self, v: cython.int, label: cython.int) -> cython.bint:
+    def sees_source(self, v: cython.int, label: cython.int) -> cython.bint:
         """Whether the straight line from v to a source stays in the tetrahedra."""
         source: cython.int = self.sources[label]
         if self.first[v] == self.first[v + 1] or self.first[source] == self.first[source + 1]:
             return False
-        goal = cython.address(self.positions[source, 0])
-        for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
-            if self.neighbours[k] == source:
-                return True
-        begin: cython.int = self.ray.cone(v, goal)
-        if begin >= 0:
-            return self.arrives_from(v, begin, label)
-        # Along faces and edges, several tetrahedra are as good to begin with, and some may end at a wall.
-        for k in range(self.first[v], self.first[v + 1]):
-            if self.ray.begins(self.incident[k], goal) and self.arrives_from(v, self.incident[k], label):
+        self.sought = label
+        return self.sees(v, cython.address(self.positions[source, 0]))
+
+    @cython.cfunc
+    @cython.nogil
+    def is_there(self, t: cython.int) -> cython.bint:
+        """As `Ray.is_there`: at the source."""
+        source: cython.int = self.sources[self.sought]
+        for c in range(4):
+            if self.corners[t, c] == source:
                 return True
         return False
 
     @cython.cfunc
     @cython.nogil
-    def arrives_from(self, v: cython.int, begin: cython.int, label: cython.int) -> cython.bint:
-        """Whether the line from v that begins in the tetrahedron of a corner gets to the source.
+    def is_lit(self, v: cython.int) -> cython.bint:
+        """As `Ray.is_lit`, without concave walls: the corner of a cavity may stand between such vertices."""
+        return not self.is_concave and self.has_line(v, self.sought)
 
-        A line that touches a wall is moved to all sides, one of which is inside.
-        """
-        source: cython.int = self.sources[label]
-        into: cython.int = -1 if self.turns[label] else self.incident[self.first[source]] // 4
+    @cython.cfunc
+    @cython.nogil
+    def arrives_from(self, v: cython.int, begin: cython.int) -> cython.bint:
+        """As `Ray.arrives_from`; a line that touches a wall is moved to all sides, one of which is inside."""
+        into: cython.int = self.incident[self.first[self.sources[self.sought]]] // 4
+        if self.turns[self.sought]:
+            into = -1
         for toward in range(-1, 4 if self.is_concave else 0):
             if toward == begin % 4:
                 continue
-            self.ray.aim(v, begin // 4, cython.address(self.positions[source, 0]), into, NUDGE, toward)
-            if self.ray.enters(begin // 4, begin % 4) and self.arrives(label):
+            if self.arrives(v, begin, into, toward):
                 return True
             into = -1
-        return False
-
-    @cython.cfunc
-    @cython.nogil
-    def arrives(self, label: cython.int) -> cython.bint:
-        """Whether the ray gets to the source before it leaves the body.
-
-        Without concave walls it does once it passes between three vertices that see the source. The corner of a cavity
-        may stand between such vertices.
-        """
-        source: cython.int = self.sources[label]
-        for _steps in range(MOST_STEPS):
-            a: cython.int = self.ray.a
-            b: cython.int = self.ray.b
-            c: cython.int = self.ray.c
-            if not self.is_concave and self.is_lit(a, label) and self.is_lit(b, label) and self.is_lit(c, label):
-                return True
-            o: cython.int = self.ray.cross()
-            if o < 0:
-                return False
-            if o == source:
-                return True
-            if not self.ray.turn(o):
-                return False
         return False
