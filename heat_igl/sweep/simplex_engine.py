@@ -82,8 +82,6 @@ class SimplexEngine(Engine):
             # In place of a value that is no number, a path along edges is found.
             distance[np.isnan(distance)] = np.inf
             np.maximum(distance, line * (1 - ROUNDING), out=distance)
-        if bounds.is_longer(*self._edges, distance):
-            labels = label.astype(np.int64)
-            first, incident = bounds.incident_edges(self._edges[0], len(distance))
-            bounds.shorten(*self._edges, first, incident, distance, labels)
-            label[:] = labels
+        labels = label.astype(np.int64)
+        bounds.EdgePaths(*self._edges, len(distance)).shorten(distance, labels)
+        label[:] = labels

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,7 +37,6 @@ _REPORT = "please report this as a bug, with the mesh and the sources"
 _ROUNDING = 1e-12
 # With more sources, a tree finds the nearest sooner than a loop over all.
 _FEW = 32
-_NO_LABELS = np.empty(0, np.int64)
 
 
 class Invariants:
@@ -308,28 +307,22 @@ class Bounds:
         self._surface = surface
 
     @cached_property
-    def _edges(self) -> tuple[AnyArray, FloatArray]:
-        """Ends (e, 2) and lengths (e,) of the edges unfolded in, and of the given ones if some were flipped."""
+    def _edges(self) -> Any:
+        """Paths along the edges unfolded in, and along the given ones if some were flipped."""
         unfolding, given = self._surface.unfolding, self._surface.faces
-        if given is None or not unfolding.n_flips:
-            return _sides(unfolding)
-        # Most edges are there twice then, which costs less than to find out which.
-        ends, length = zip(_sides(unfolding), _sides(given), strict=True)
-        return np.concatenate(ends), np.concatenate(length)
-
-    @cached_property
-    def _incident(self) -> tuple[IntArray, AnyArray]:
-        """Edges by vertex, see `kernels.incident_edges`: only distances that are too long ask for them."""
-        first, incident = kernels.incident_edges(self._edges[0], self._surface.unfolding.n)
-        return first, incident
+        ends, length = _sides(unfolding)
+        if given is not None and unfolding.n_flips:
+            # Most edges are there twice then, which costs less than to find out which.
+            more_ends, more_length = _sides(given)
+            ends, length = np.concatenate([ends, more_ends]), np.concatenate([length, more_length])
+        return kernels.EdgePaths(ends, length, unfolding.n)
 
     def shorten(self, distance: FloatArray, labels: IntArray | None = None, share: float = 0.0) -> None:
         """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them.
 
         With a `share`, only from edges on which they are too long by more than that share of the length.
         """
-        if kernels.is_longer(*self._edges, distance, share):
-            kernels.shorten(*self._edges, *self._incident, distance, _NO_LABELS if labels is None else labels, share)
+        self._edges.shorten(distance, labels, share)
 
     def lengthen(self, distance: FloatArray, sources: SourceSet) -> None:
         """Raise distances (n,) to the straight lines from the nearest source, in place, where positions are known."""
