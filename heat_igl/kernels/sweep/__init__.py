@@ -5,8 +5,8 @@ in the plane of their triangle; the distance of v is that of the straight line t
 
 - `spokes` fills a record per spoke, an edge seen from v: its length, the triangle to its left laid out flat, and
   the corner w of the triangle beyond the side ab.
-- `visit_order` finds the order of the vertices as Dijkstra's algorithm does, by lengths of edges; its queue sorts by
-  bands of distance, without a heap (`band_queue.pxd`).
+- `visit_order` finds the order of the vertices as Dijkstra's algorithm does, by lengths of edges, and sorts them by
+  bands of distance, without a heap.
 - `sweeping` visits v: each spoke proposes a value from a and b, the best is found again with w, which is nearer to the
   source, and v keeps the least (formulas: `planar_updates.pxd`). If v falls below a vertex that came before, the sweep
   goes back to that one.

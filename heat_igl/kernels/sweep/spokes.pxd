@@ -9,8 +9,3 @@ cdef struct Spoke:
 cdef struct Corner:
     double x, y, angle
 
-
-cdef class SpokeTable:
-    cdef const int[::1] first
-    cdef const Spoke[::1] spoke
-

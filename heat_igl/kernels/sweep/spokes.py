@@ -4,22 +4,11 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.signals import is_interrupted
-from cython.cimports.heat_igl.kernels.sweep.spokes import Corner, Spoke
 from cython.cimports.libc.math import M_PI, NAN, atan2, fabs, sqrt
 
 from heat_igl.kernels.signals import raise_caught
 
 _CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("angle", "f8")])
-
-
-@cython.final
-@cython.cclass
-class SpokeTable:
-    """Views of the arrays of `heat_igl.sweep.sweep.Spokes`."""
-
-    def __init__(self, spokes):
-        self.first = spokes.first
-        self.spoke = spokes.spoke
 
 
 def first_spokes(edges, n: cython.int):

@@ -18,20 +18,24 @@ from cython.cimports.heat_igl.kernels.sweep.planar_updates import (
     front_across_side,
     over_one,
 )
-from cython.cimports.heat_igl.kernels.sweep.spokes import SpokeTable
-from cython.cimports.heat_igl.kernels.sweep.sweeping import (
-    AHEAD,
-    CACHED,
-    GIVE_UP,
-    GO_BACK,
-    NEGLIGIBLE,
-    SIDES,
-    SWEEP_ROUNDING,
-)
+from cython.cimports.heat_igl.kernels.sweep.spokes import Spoke
 from cython.cimports.heat_igl.kernels.sweep.visit_order import VisitOrder
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from heat_igl.kernels.signals import raise_caught
+
+# Changes by less than this are not passed on: on a curved surface the sweep is wrong by more anyway.
+_NEGLIGIBLE = cython.declare(cython.double, 3e-4)
+# In a flat domain it is exact, provided that all changes are passed on.
+_SWEEP_ROUNDING = cython.declare(cython.double, 1e-12)
+# Visits per vertex up to which the sweep goes back at once, and after which it gives up. Heat's order takes 1.1 in all,
+# a random one 20 to 40.
+_GO_BACK = cython.declare(cython.int, 10)
+_GIVE_UP = cython.declare(cython.int, 50)
+# Spokes up to which it costs more to fetch them ahead of time than to wait for them.
+_CACHED = cython.declare(cython.int, 1 << 15)
+# The order knows so many vertices in advance, whose data can be fetched meanwhile.
+_AHEAD = cython.declare(cython.int, 4)
 
 
 def sweep(
@@ -58,11 +62,10 @@ def sweep(
     """
     n = d.shape[0]
     one = _Sweep()
-    one.t = SpokeTable(spokes)
-    one.is_large = one.t.spoke.shape[0] > CACHED
+    one.first, one.spoke = spokes.first, spokes.spoke
+    one.is_large = one.spoke.shape[0] > _CACHED
     one.d, one.is_stale, one.offset, one.group = d, is_stale, offset, group
-    one.n_ordered = 0
-    one.visits = VisitOrder(one.t, d, width)
+    one.visits = VisitOrder(spokes, d, width)
     one.order, one.rank = one.visits.order, one.visits.rank
     one.is_flat = spokes.is_flat.view(np.uint8)
     one.has_labels = label is not None
@@ -81,7 +84,8 @@ class _Sweep:
     The first `n_ordered` entries of `order` are known, and `visits` finds the others.
     """
 
-    t: SpokeTable
+    first: cython.const[cython.int][::1]
+    spoke: cython.const[Spoke][::1]
     order: cython.int[::1]
     rank: cython.int[::1]
     is_large: cython.bint
@@ -104,9 +108,9 @@ class _Sweep:
         i: cython.Py_ssize_t = 0
         again: cython.Py_ssize_t = n  # rank to begin at once more when the end is reached
         self.n_visits = 0
-        while self.n_visits < GIVE_UP * n:
-            if i + AHEAD > self.n_ordered and self.n_ordered < n:
-                self.n_ordered = self.visits.advance(i, AHEAD)
+        while self.n_visits < _GIVE_UP * n:
+            if i + _AHEAD > self.n_ordered and self.n_ordered < n:
+                self.n_ordered = self.visits.advance(i, _AHEAD)
             if i == self.n_ordered:
                 if again == n:
                     break
@@ -123,7 +127,7 @@ class _Sweep:
                 break
             back: cython.Py_ssize_t = self.visit(v)
             if back < i:
-                if self.n_visits < GO_BACK * n:
+                if self.n_visits < _GO_BACK * n:
                     i = back
                 else:
                     again = min(again, back)
@@ -134,15 +138,15 @@ class _Sweep:
     def read_ahead(self, i: cython.Py_ssize_t) -> cython.void:
         """Prefetch the data of the next visits: on large meshes that takes longer than the visits."""
         if i + 3 < self.n_ordered:
-            prefetch(cython.address(self.t.first[self.order[i + 3]]))
+            prefetch(cython.address(self.first[self.order[i + 3]]))
         if i + 1 < self.n_ordered:
             v = self.order[i + 1]
-            for k in range(self.t.first[v], self.t.first[v + 1]):
-                prefetch(cython.address(self.t.spoke[k]))
+            for k in range(self.first[v], self.first[v + 1]):
+                prefetch(cython.address(self.spoke[k]))
         if i < self.n_ordered:
             v = self.order[i]
-            for k in range(self.t.first[v], self.t.first[v + 1]):
-                prefetch(cython.address(self.d[self.t.spoke[k].neighbour]))
+            for k in range(self.first[v], self.first[v + 1]):
+                prefetch(cython.address(self.d[self.spoke[k].neighbour]))
 
     @cython.cfunc
     @cython.inline
@@ -165,15 +169,15 @@ class _Sweep:
 
         All triangles are computed and the best is chosen without branches, which at random cost more than arithmetic.
         """
-        spoke: cython.int = self.t.first[v]
+        spoke: cython.int = self.first[v]
         best: cython.double = self.d[v]
         across: cython.double = INFINITY  # squared
         # The sides that a straight line crosses, with the squared distance; mostly one or two.
         found: cython.double[SIDES]
         at: cython.int[SIDES]
         n_found: cython.int = 0
-        for k in range(self.t.first[v], self.t.first[v + 1]):
-            s = cython.address(self.t.spoke[k])
+        for k in range(self.first[v], self.first[v + 1]):
+            s = cython.address(self.spoke[k])
             da: cython.double = self.d[s.neighbour]
             db: cython.double = self.d[s.next_neighbour]
             along: cython.double = da + s.length
@@ -201,9 +205,9 @@ class _Sweep:
         # The triangle of the best value of either kind.
         ignored: cython.int = -1
         along_edge: cython.int = v
-        spoke: cython.int = self.t.first[v]
-        for k in range(self.t.first[v], self.t.first[v + 1]):
-            s = cython.address(self.t.spoke[k])
+        spoke: cython.int = self.first[v]
+        for k in range(self.first[v], self.first[v + 1]):
+            s = cython.address(self.spoke[k])
             da: cython.double = self.d[s.neighbour]
             db: cython.double = self.d[s.next_neighbour]
             if da + s.length < best:
@@ -242,7 +246,7 @@ class _Sweep:
         If the corners are not measured from the same source the distance stays. `source` is set to the one it comes
         from, if there are labels.
         """
-        s = cython.address(self.t.spoke[k])
+        s = cython.address(self.spoke[k])
         da: cython.double = self.d[s.neighbour]
         db: cython.double = self.d[s.next_neighbour]
         w: cython.int = s.beyond
@@ -277,7 +281,7 @@ class _Sweep:
         From one corner and the source of it together with the corner beyond, if that is measured from the same.
         `source` is set to the one it comes from; ``inf`` if there is none, or none below `below`.
         """
-        s = cython.address(self.t.spoke[k])
+        s = cython.address(self.spoke[k])
         best: cython.double = INFINITY
         w: cython.int = s.beyond
         if w < 0 or not self.d[w] < below or self.label[w] < 0:
@@ -300,10 +304,10 @@ class _Sweep:
         """
         back: cython.Py_ssize_t = self.order.shape[0]
         if self.is_flat[v]:
-            if self.d[v] < old * (1 - SWEEP_ROUNDING):
+            if self.d[v] < old * (1 - _SWEEP_ROUNDING):
                 back = self.mark_farther(v)
                 back = min(back, self.mark_nearer(v, begin))
-        elif self.d[v] < old * (1 - NEGLIGIBLE):
+        elif self.d[v] < old * (1 - _NEGLIGIBLE):
             # With curvature around, the gain that `mark_nearer` finds is less than the sweep's error.
             back = self.mark_farther(v)
         return back
@@ -315,8 +319,8 @@ class _Sweep:
         """Mark the farther neighbours, which a smaller d[v] can improve. Those still to come are stale anyway."""
         lowest: cython.Py_ssize_t = self.order.shape[0]
         dv: cython.double = self.d[v]
-        for k in range(self.t.first[v], self.t.first[v + 1]):
-            a: cython.int = self.t.spoke[k].neighbour
+        for k in range(self.first[v], self.first[v + 1]):
+            a: cython.int = self.spoke[k].neighbour
             # Either alone is true at random.
             if (dv < self.d[a]) & (not self.is_stale[a]):
                 self.is_stale[a] = True
@@ -333,13 +337,13 @@ class _Sweep:
         """
         lowest: cython.Py_ssize_t = self.order.shape[0]
         dv: cython.double = self.d[v] - begin
-        for k in range(self.t.first[v], self.t.first[v + 1]):
-            s = cython.address(self.t.spoke[k])
+        for k in range(self.first[v], self.first[v + 1]):
+            s = cython.address(self.spoke[k])
             a, b = s.neighbour, s.next_neighbour
             da: cython.double = self.d[a] - begin
             db: cython.double = self.d[b] - begin
             right: cython.double = s.length
-            left: cython.double = self.t.spoke[s.next].length
+            left: cython.double = self.spoke[s.next].length
             if (not self.is_stale[a]) & (db < da) & (2.0 * da * s.along < right * right) and beyond_side(
                 s.base, s.along, s.height, left, db, dv
             ) < da * da * self.kept(a):
@@ -357,7 +361,7 @@ class _Sweep:
     @cython.nogil
     def kept(self, v: cython.int) -> cython.double:
         """The part of v's distance that a shorter one must fall below to count."""
-        return 1 - SWEEP_ROUNDING if self.is_flat[v] else 1 - NEGLIGIBLE
+        return 1 - _SWEEP_ROUNDING if self.is_flat[v] else 1 - _NEGLIGIBLE
 
 
 @cython.cfunc
