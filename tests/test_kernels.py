@@ -17,7 +17,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from heat_igl import kernels, shapes
-from heat_igl.kernels.ordering import ascending
 from heat_igl.linear import factorize, multifrontal
 from heat_igl.linear.multifrontal import dissect
 from heat_igl.operators import operators
@@ -44,16 +43,6 @@ def test_any_graph_is_dissected_factored_and_solved(n, density, seed):
     x = np.where(free[:, None], np.random.default_rng(seed).standard_normal((n, 11)), 0)
     found = multifrontal.MultifrontalAnalysis(A).factorize(A, free).solve(A @ x)
     np.testing.assert_allclose(found, x, rtol=0, atol=1e-9)
-
-
-@settings(deadline=None, max_examples=60)
-@given(st.lists(st.floats(-1e300, 1e300) | st.sampled_from([np.inf, 0.0, -0.0]), max_size=300))
-def test_ascending_sorts_up_to_the_bits_it_looks_at(keys):
-    keys = np.array(keys, np.float64)
-    order = ascending(keys)
-    assert (np.sort(order) == np.arange(len(keys))).all()
-    low, high = keys[order][:-1], keys[order][1:]
-    assert ((low <= high + 1e-6 * np.abs(high)) | (np.abs(low) < 1e-300)).all()
 
 
 def test_every_build_solves_alike(monkeypatch):
