@@ -5,7 +5,6 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corn
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.mesh.flipping import FLIP
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, next_half_edge, previous_half_edge
 from cython.cimports.libc.math import sqrt
 

@@ -1,20 +1,6 @@
 from heat_igl.kernels.mesh.flipping cimport Flips
 from heat_igl.kernels.priority_queue cimport PriorityQueue
 
-cdef extern from *:
-    """
-    /* Barycentric coordinates of a new vertex are at least this, so that no split makes a triangle without area. */
-    #define LEAST 0.01
-    /* A cone of less than 60 degrees in all keeps the angle that it has. */
-    #define SHARPEST 1.0471975511965976
-    """
-    const double LEAST
-    const double SHARPEST
-
-cdef enum:
-    # A walk to a circumcenter crosses few triangles, since the triangulation is Delaunay.
-    MOST_STEPS = 200
-
 # A point by the barycentric coordinates in a face; face -1 for no point.
 cdef struct Location:
     int face

@@ -8,7 +8,6 @@ Delaunay again. Only for surfaces without a boundary: there the walk cannot leav
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.flipping import SPLIT, Flips
-from cython.cimports.heat_igl.kernels.mesh.refinement import LEAST, MOST_STEPS, SHARPEST, Location
 from cython.cimports.heat_igl.kernels.mesh.straight import INSIDE, OVER_SIDE, Exit, Heading, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
@@ -16,6 +15,13 @@ from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.libc.math import atan2, sqrt
 
 from heat_igl.kernels.signals import raise_caught
+
+# Barycentric coordinates of a new vertex are at least this, so that no split makes a triangle without area.
+_LEAST = cython.declare(cython.double, 0.01)
+# A cone of less than 60 degrees in all keeps the angle that it has.
+_SHARPEST = cython.declare(cython.double, 1.0471975511965976)
+# A walk to a circumcenter crosses few triangles, since the triangulation is Delaunay.
+_MOST_STEPS = cython.declare(cython.int, 200)
 
 
 @cython.final
@@ -81,9 +87,9 @@ class _Refinement:
 
     def insert(self, at: Location) -> cython.int:
         """Make a location a vertex and flip edges until all are Delaunay."""
-        u: cython.double = max(at.u, LEAST)
-        v: cython.double = max(at.v, LEAST)
-        w: cython.double = max(at.w, LEAST)
+        u: cython.double = max(at.u, _LEAST)
+        v: cython.double = max(at.v, _LEAST)
+        w: cython.double = max(at.w, _LEAST)
         total: cython.double = u + v + w
         f: cython.int = at.face
         g: cython.int = self.n_faces
@@ -157,7 +163,7 @@ class _Refinement:
 
 
 def _find_sharp(t: Flips, n_faces: cython.int, seen: cython.uchar[::1], is_sharp: cython.uchar[::1]) -> cython.void:
-    """Mark vertices with a fan of faces whose angles sum to less than `SHARPEST`: no split or flip changes that."""
+    """Mark vertices with a fan of faces whose angles sum to less than `_SHARPEST`: no split or flip changes that."""
     for first in range(3 * n_faces):
         at: cython.int = first
         total: cython.double = 0.0
@@ -169,7 +175,7 @@ def _find_sharp(t: Flips, n_faces: cython.int, seen: cython.uchar[::1], is_sharp
             d: cython.double = t.length[previous_half_edge(at)]
             total += atan2(4.0 * area(a, b, d), b * b + d * d - a * a)
             at = next_half_edge(t.twin[following])
-        if 0.0 < total < SHARPEST:
+        if 0.0 < total < _SHARPEST:
             is_sharp[t.vertex[first]] = True
 
 
@@ -194,7 +200,7 @@ def _circumcenter(t: Flips, f: cython.int) -> Location:
     dy: cython.double = w * height - y
     left: cython.double = sqrt(dx * dx + dy * dy)
     ray: Heading = Heading(3 * f + 2, INSIDE, x, y, dx / left, dy / left)
-    for _ in range(MOST_STEPS):
+    for _ in range(_MOST_STEPS):
         h: cython.int = ray.h
         size: cython.double = area(t.length[h], t.length[next_half_edge(h)], t.length[previous_half_edge(h)])
         way: Exit = cross(cython.address(t.length[0]), 2.0 * size, cython.address(ray))

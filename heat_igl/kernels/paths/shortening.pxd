@@ -1,38 +1,6 @@
 from heat_igl.kernels.mesh.segments cimport SegmentList
 from heat_igl.kernels.paths.strips cimport Detour, FaceTable, Funnel, Place, Strip
 
-cdef extern from *:
-    """
-    // A bend is worth repairing when the angle another way falls short of pi by more than this; it saves the square.
-    #define NEARLY_STRAIGHT 1e-7
-    // A curve that becomes shorter by less than this share has not changed: rounding.
-    #define GAIN_OF_CURVE 1e-13
-    // The other side of a vertex is tried on open paths unless it promises to lose more than this share of the square of
-    // a straight part. The promise looks at one vertex alone: other vertices beside it change the length by some percent.
-    #define LARGEST_LOSS 0.01
-    // Cosine by which the angle that a path spans may fall short of half of those around the vertex.
-    #define MARGIN_OF_TURN 0.03
-    // The base of a loop does not slide by a smaller share of its edge.
-    #define SHORTEST_SLIDE 1e-4
-    """
-    double NEARLY_STRAIGHT
-    double GAIN "GAIN_OF_CURVE"
-    double LARGEST_LOSS
-    double MARGIN_OF_TURN
-    double SHORTEST_SLIDE
-
-cdef enum:
-    # So many vertices are noted at a time, and tried altogether on one path.
-    MOST_CHOICES = 64
-    MOST_TRIED = 256
-    # A loop whose length stays the same from this many bases, one after another, is straight at all of them.
-    BOTH_WAYS = 2
-    # Before the loop is straightened from one, it is led past its bends from so many: with 3 and without bound, more loops
-    # are longer than those of flips of edges.
-    FIRST_BASES = 8
-    # From so many at most: a loop moves to the next vertex with each.
-    MOST_BASES = 100000
-
 # A path starts at `start` in `face`, at `vertex` if that is not -1, and ends at `end` in the last face of its strip.
 cdef struct Ends:
     int face, vertex

@@ -14,19 +14,6 @@ shortest. The length falls with every such step unless the loop is locally short
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.segments import SegmentList
-from cython.cimports.heat_igl.kernels.paths.shortening import (
-    BOTH_WAYS,
-    FIRST_BASES,
-    GAIN,
-    LARGEST_LOSS,
-    MARGIN_OF_TURN,
-    MOST_BASES,
-    MOST_CHOICES,
-    MOST_TRIED,
-    NEARLY_STRAIGHT,
-    SHORTEST_SLIDE,
-    Choice,
-)
 from cython.cimports.heat_igl.kernels.paths.strips import (
     SNAP,
     Detour,
@@ -45,6 +32,28 @@ from cython.cimports.heat_igl.kernels.paths.strips import (
 )
 from cython.cimports.libc.math import INFINITY, M_PI, acos, atan2, cos, fabs, sqrt
 
+# A bend is worth repairing when the angle another way falls short of pi by more than this; it saves the square.
+_NEARLY_STRAIGHT = cython.declare(cython.double, 1e-7)
+# A curve that becomes shorter by less than this share has not changed: rounding.
+_GAIN = cython.declare(cython.double, 1e-13)
+# The other side of a vertex is tried on open paths unless it promises to lose more than this share of the square of a
+# straight part. The promise looks at one vertex alone: other vertices beside it change the length by some percent.
+_LARGEST_LOSS = cython.declare(cython.double, 0.01)
+# Cosine by which the angle that a path spans may fall short of half of those around the vertex.
+_MARGIN_OF_TURN = cython.declare(cython.double, 0.03)
+# The base of a loop does not slide by a smaller share of its edge.
+_SHORTEST_SLIDE = cython.declare(cython.double, 1e-4)
+# So many vertices are noted at a time, and tried altogether on one path.
+_MOST_CHOICES = cython.declare(cython.int, 64)
+_MOST_TRIED = cython.declare(cython.int, 256)
+# A loop whose length stays the same from this many bases, one after another, is straight at all of them.
+_BOTH_WAYS = cython.declare(cython.int, 2)
+# Before the loop is straightened from one, it is led past its bends from so many: with 3 and without bound, more loops
+# are longer than those of flips of edges.
+_FIRST_BASES = cython.declare(cython.int, 8)
+# From so many at most: a loop moves to the next vertex with each.
+_MOST_BASES = cython.declare(cython.int, 100000)
+
 _CHOICE = np.dtype([("saved", "f8"), ("vertex", "i4"), ("first", "i4"), ("last", "i4")], align=True)
 
 
@@ -61,7 +70,7 @@ class Shortener:
         self.s, self.half_turn = faces, half_turn
         self.strip, self.other, self.kept = Strip(), Strip(), Strip()
         self.detour, self.funnel, self.segments = Detour(most_corners), Funnel(), SegmentList()
-        self.choice, self.tried = np.empty(MOST_CHOICES, _CHOICE), np.empty(MOST_TRIED, np.int32)
+        self.choice, self.tried = np.empty(_MOST_CHOICES, _CHOICE), np.empty(_MOST_TRIED, np.int32)
 
     def shorten(
         self,
@@ -80,7 +89,7 @@ class Shortener:
         for c in range(3):
             start.c[c], end.c[c] = ends[0, c], ends[1, c]
         # A loop is straightened from many bases.
-        self.largest_loss = 0.0 if is_closed else LARGEST_LOSS
+        self.largest_loss = 0.0 if is_closed else _LARGEST_LOSS
         self.segments.n, self.length = 0, 0.0
         with cython.nogil:
             self.begin(face[0], start)
@@ -175,7 +184,7 @@ class Shortener:
         while True:
             length: cython.double = self.lay_out()
             # Rounding can make two ways around a vertex look shorter than one another.
-            failures = 0 if length < shortest * (1.0 - GAIN) else failures + 1
+            failures = 0 if length < shortest * (1.0 - _GAIN) else failures + 1
             shortest = min(shortest, length)
             if failures > 3 or not self.repair():
                 break
@@ -234,7 +243,7 @@ class Shortener:
         after.other = self.s.triangle[e].angle[corner_of(self.s, e, v)] - after.this
         if self.is_one_way(bend.first, bend.last, v):
             before.this = INFINITY  # on the side of the strip there is no other way
-        return self.detour.find(self.s, v, h, before, e, g, after, M_PI - NEARLY_STRAIGHT)
+        return self.detour.find(self.s, v, h, before, e, g, after, M_PI - _NEARLY_STRAIGHT)
 
     def is_one_way(self, first: cython.int, last: cython.int, v: cython.int) -> cython.bint:
         """Whether these crossings at v neither close around it nor cross an edge at which ways branch.
@@ -287,7 +296,7 @@ class Shortener:
                 if not self.lead(self.choice[i]):
                     continue
                 trial: cython.double = self.settle()
-                if trial < length * (1.0 - GAIN):
+                if trial < length * (1.0 - _GAIN):
                     length = trial
                     is_better = True
                     break
@@ -321,7 +330,7 @@ class Shortener:
                     qy: cython.double = q.y - gate.y[side]
                     product: cython.double = sqrt((px * px + py * py) * (qx * qx + qy * qy))
                     spanned: cython.double = px * qx + py * qy
-                    if spanned < (half + MARGIN_OF_TURN) * product:
+                    if spanned < (half + _MARGIN_OF_TURN) * product:
                         # The law of cosines, for the angles on both sides.
                         turn: cython.double = 2.0 * acos(half) - acos(max(spanned / product, -1.0))
                         self.note(j, side, 2.0 * (product * cos(turn) - spanned) / squared)
@@ -332,7 +341,7 @@ class Shortener:
         v: cython.int = self.funnel.gate[j].vertex[side]
         if not saved > -self.largest_loss or self.is_tried(v):
             return
-        if self.n_choices == MOST_CHOICES:
+        if self.n_choices == _MOST_CHOICES:
             if not saved > self.choice[self.n_choices - 1].saved:
                 return
             self.n_choices -= 1
@@ -353,7 +362,7 @@ class Shortener:
 
     def lead(self, choice: Choice) -> cython.bint:
         """Lead the path that was kept around a vertex the other way; False if no faces are there."""
-        if self.n_tried == MOST_TRIED:
+        if self.n_tried == _MOST_TRIED:
             return False
         self.tried[self.n_tried] = choice.vertex
         self.n_tried += 1
@@ -376,7 +385,7 @@ class Shortener:
     def shorten_loop(self) -> cython.double:
         """Lead the strip to the shortest loop of its class that is found; returns the length."""
         # Past all bends once, from each of the first bases.
-        for _ in range(FIRST_BASES):
+        for _ in range(_FIRST_BASES):
             self.lay_out()
             if not self.repair():
                 break
@@ -386,14 +395,14 @@ class Shortener:
         shortest: cython.double = INFINITY
         n_stalled: cython.int = 0
         length: cython.double = 0.0
-        for _ in range(MOST_BASES):
+        for _ in range(_MOST_BASES):
             length = self.slide(self.settle())
-            if not length < shortest * (1.0 - GAIN):
+            if not length < shortest * (1.0 - _GAIN):
                 length = self.improve(length)
             # One more base shows whether the loop is straight at the one before.
-            n_stalled = 0 if length < shortest * (1.0 - GAIN) else n_stalled + 1
+            n_stalled = 0 if length < shortest * (1.0 - _GAIN) else n_stalled + 1
             shortest = min(shortest, length)
-            if n_stalled == BOTH_WAYS or self.strip.count == 0 or not self.move_base():
+            if n_stalled == _BOTH_WAYS or self.strip.count == 0 or not self.move_base():
                 break
         return length
 
@@ -424,15 +433,15 @@ class Shortener:
         share: cython.double = min(max(-(dx * ex + dy * ey) / squared, 0.0), 1.0)
         dx += share * ex
         dy += share * ey
-        if not sqrt(dx * dx + dy * dy) < length * (1.0 - GAIN):
+        if not sqrt(dx * dx + dy * dy) < length * (1.0 - _GAIN):
             return length
         here: cython.double = self.ends.start.c[b]
         self.save()
         # The straight line may leave the strip. The length is a convex function of the share: a shorter way helps.
-        while fabs(share - here) > SHORTEST_SLIDE:
+        while fabs(share - here) > _SHORTEST_SLIDE:
             self.place_base(f, a, b, a_end, b_end, share)
             trial: cython.double = self.settle()
-            if trial < length * (1.0 - GAIN):
+            if trial < length * (1.0 - _GAIN):
                 return trial
             self.restore()
             share = 0.5 * (share + here)

@@ -1,23 +1,6 @@
 from heat_igl.kernels.mesh.segments cimport SegmentList
 from heat_igl.kernels.mesh.straight cimport Exit, Heading
 
-cdef extern from *:
-    """
-    #define PI 3.14159265358979323846
-    /* A geodesic meets a vertex that it would pass by less than this share of the way to it, or of the side that it
-       crosses if that is shorter: across 10000 faces rounding moves it by some 1e-12. */
-    #define ON_RAY 1e-10
-    /* Angles that differ by less are equal: those of the faces around a vertex are rounded, and the direction is. */
-    #define LEAST_ANGLE 1e-10
-    """
-    const double PI
-    const double ON_RAY
-    const double LEAST_ANGLE
-
-cdef enum:
-    # Steps without length, one after another, after which a geodesic ends: only in places where all edges have length 0.
-    MOST_IDLE = 10000
-
 
 cdef class _Tracer:
     cdef double[:, ::1] l

@@ -4,8 +4,15 @@ import cython
 from cython.cimports.heat_igl.kernels.mesh.segments import SegmentList
 from cython.cimports.heat_igl.kernels.mesh.straight import INSIDE, OUT_OF_TAIL, OVER_SIDE, Heading, cross
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot
-from cython.cimports.heat_igl.kernels.paths.straightest import LEAST_ANGLE, MOST_IDLE, ON_RAY, PI
-from cython.cimports.libc.math import atan2, cos, fabs, hypot, sin
+from cython.cimports.libc.math import M_PI, atan2, cos, fabs, hypot, sin
+
+# A geodesic meets a vertex that it would pass by less than this share of the way to it, or of the side that it crosses
+# if that is shorter: across 10000 faces rounding moves it by some 1e-12.
+_ON_RAY = cython.declare(cython.double, 1e-10)
+# Angles that differ by less are equal: those of the faces around a vertex are rounded, and the direction is.
+_LEAST_ANGLE = cython.declare(cython.double, 1e-10)
+# Steps without length, one after another, after which a geodesic ends: only in places where all edges have length 0.
+_MOST_IDLE = cython.declare(cython.int, 10000)
 
 
 @cython.final
@@ -32,7 +39,7 @@ class _Tracer:
             self.entry[c] = self.leave[c] = at[c]
         self.end_face, self.travelled = face, 0.0
         goes_on: cython.bint = length > 0.0 and self.start(face, turn)
-        while goes_on and idle <= MOST_IDLE:
+        while goes_on and idle <= _MOST_IDLE:
             f: cython.longlong = self.ray.h // 3
             self.exit = cross(cython.address(self.l[0, 0]), 2.0 * self.area[f], cython.address(self.ray))
             step: cython.double = self.find_exit()
@@ -67,15 +74,15 @@ class _Tracer:
                 k = c
         # The angle from the side that leaves from this corner.
         if k == 1:
-            turn -= PI - self.angle[f, 1]
+            turn -= M_PI - self.angle[f, 1]
         elif k == 2:
-            turn += PI - self.angle[f, 0]
+            turn += M_PI - self.angle[f, 0]
         if self.entry[k] == 1.0:
-            if turn > PI:
-                turn -= 2.0 * PI
-            if turn > self.angle[f, k] and turn - self.angle[f, k] < LEAST_ANGLE:
+            if turn > M_PI:
+                turn -= 2.0 * M_PI
+            if turn > self.angle[f, k] and turn - self.angle[f, k] < _LEAST_ANGLE:
                 turn = self.angle[f, k]
-            if turn < 0.0 and turn > -LEAST_ANGLE:
+            if turn < 0.0 and turn > -_LEAST_ANGLE:
                 turn = 0.0
             return self.leave_corner(3 * f + k, turn)
         side: cython.int = (k + 2) % 3
@@ -103,7 +110,7 @@ class _Tracer:
             # Clockwise; on the boundary only.
             t = self.twin[3 * f + (k + 2) % 3]
             if t < 0:
-                if turn < -LEAST_ANGLE:
+                if turn < -_LEAST_ANGLE:
                     return False
                 turn = 0.0
                 break
@@ -113,8 +120,8 @@ class _Tracer:
         while turn > self.angle[f, k]:
             t = self.twin[3 * f + (k + 1) % 3]
             steps += 1
-            if t < 0 or steps > MOST_IDLE:
-                if turn - self.angle[f, k] > LEAST_ANGLE:
+            if t < 0 or steps > _MOST_IDLE:
+                if turn - self.angle[f, k] > _LEAST_ANGLE:
                     return False
                 turn = self.angle[f, k]
                 break
@@ -135,8 +142,8 @@ class _Tracer:
         p = cython.address(self.exit)
         length: cython.double = self.l[p.h // 3, p.h % 3]
         # Rounding moves a ray by a share of its length: what it misses by less, it meets, also if it grazes the side.
-        meets_tail: cython.bint = p.right < ON_RAY * min(self.travelled + p.tail_ahead, length)
-        meets_head: cython.bint = p.left < ON_RAY * min(self.travelled + p.head_ahead, length)
+        meets_tail: cython.bint = p.right < _ON_RAY * min(self.travelled + p.tail_ahead, length)
+        meets_head: cython.bint = p.left < _ON_RAY * min(self.travelled + p.head_ahead, length)
         if meets_tail == meets_head and (meets_tail or p.right + p.left == 0.0):
             # It runs along the side, and takes the end that lies farther ahead.
             self.share = 1.0 if p.head_ahead > p.tail_ahead else 0.0
@@ -158,17 +165,17 @@ class _Tracer:
         turn: cython.double = atan2(fabs(p.dy), p.dx)
         if self.share == 1.0:
             k = (p.h + 2) % 3
-            turn += self.angle[f, k] - PI
+            turn += self.angle[f, k] - M_PI
         half: cython.double = self.half[f, k]
         if half > 0.0:
             self.leave_corner(3 * f + k, turn + half)
             return True
         # On the boundary: straight on if one side of the ray has an angle of pi, but not if both have.
-        clockwise: cython.bint = self.leave_corner(3 * f + k, turn - PI)
-        if clockwise == self.leave_corner(3 * f + k, turn + PI):
+        clockwise: cython.bint = self.leave_corner(3 * f + k, turn - M_PI)
+        if clockwise == self.leave_corner(3 * f + k, turn + M_PI):
             return False
         if clockwise:
-            self.leave_corner(3 * f + k, turn - PI)
+            self.leave_corner(3 * f + k, turn - M_PI)
         return True
 
     def cross_side(self) -> cython.bint:

@@ -8,17 +8,6 @@ a polygon, in which a funnel finds the shortest path (Lee and Preparata 1984).
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.paths.strips import (
-    Corners,
-    Crossing,
-    FunnelCorner,
-    Place,
-    Sides,
-    corner_of,
-    next_side,
-    other_side,
-    weighted,
-)
 from cython.cimports.libc.math import hypot
 
 _CROSSING = np.dtype([("leave", "i4"), ("enter", "i4")])
