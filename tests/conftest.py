@@ -3,6 +3,7 @@
 Real meshes come from the pymeshlab wheel; all others are made by the shapes and the zoo of the package, from seeds.
 """
 
+import contextlib
 import importlib
 import importlib.util
 import os
@@ -106,6 +107,42 @@ def in_this_process(monkeypatch):
         return guarded.Reply(dict(getattr(importlib.import_module(module), name)(**arrays, **(parameters or {}))), None)
 
     monkeypatch.setattr(guarded, "call", call)
+
+
+class KilledError(Exception):
+    """In place of a signal: from some write on, nothing reaches the disk."""
+
+
+@contextlib.contextmanager
+def killed_at(crash: int, error: Exception | None = None):
+    """Let `crash` files of a zarr store be written and nothing more; yields the list of what was written."""
+    zarr = pytest.importorskip("zarr")
+    written: list[str] = []
+    plain = zarr.storage.LocalStore.set
+
+    async def set_or_die(self, key, value):
+        if len(written) == crash:
+            partial = self.root / f"{key}.partial"
+            partial.parent.mkdir(parents=True, exist_ok=True)
+            partial.write_bytes(b"half of it")
+            raise error or KilledError
+        written.append(key)
+        await plain(self, key, value)
+
+    with pytest.MonkeyPatch.context() as patch, contextlib.suppress(KilledError):
+        patch.setattr(zarr.storage.LocalStore, "set", set_or_die)
+        yield written
+
+
+@pytest.fixture(scope="session")
+def client():
+    """Two workers, as threads of this process: real ones are started where processes have to die."""
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0") as local,
+        distributed.Client(local) as connected,
+    ):
+        yield connected
 
 
 @pytest.fixture(scope="session")
