@@ -2,11 +2,10 @@
 
 import math
 import warnings
-from functools import cache
 
 import numpy as np
 import pytest
-from conftest import load_script, mean_error
+from conftest import mean_error, zoo
 
 from heat_igl import (
     AccuracyWarning,
@@ -24,37 +23,11 @@ from heat_igl.typing import FloatArray
 from heat_igl.validation.closed_forms import around_the_wall, by_fermat
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 
-# Heat on shapes that no default was tuned for, and the check that every answer gets
-
-
-# Mean error in percent over three sources as measured; a bound on either side.
-MEASURED = {
-    "capped cylinder 128": 0.61,
-    "plate": 1.1,
-    "box cube": 0.92,
-    "hull of 12": 0.52,
-    "scattered square 1000": 0.52,
-    "sheared grid by 3": 0.61,
-    "height field coarse": 1.4,
-    "noise 10 times": 3.0,
-    "beams": 2.18,
-    "maze": 0.53,
-    "regular grid": 1.45,
-    "spiky sphere": 2.85,
-    "two spheres 1 to 100": 0.39,
-}
-BY_NAME = {shape.name: shape for shape in SHAPES}
-
-
-@cache
-def made(name: str) -> Mesh:
-    return BY_NAME[name].make()
-
 
 def test_a_third_is_held_out():
     assert len(SHAPES) >= 60
     assert 0.33 < np.mean([shape.held_out for shape in SHAPES]) < 0.5
-    assert len(BY_NAME) == len(SHAPES)
+    assert len({shape.name for shape in SHAPES}) == len(SHAPES)
 
 
 @pytest.mark.parametrize("kind", FAMILIES)
@@ -67,18 +40,21 @@ def test_a_seed_is_a_mesh_of_its_own(kind):
     assert len(np.unique(one.F)) == one.n_vertices
 
 
-@pytest.mark.parametrize("name", MEASURED)
-def test_heat_on_shapes_of_the_zoo(name):
-    table = load_script("accuracy")
-    mesh = made(name)
-    solver = HeatMethodSolver(mesh)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AccuracyWarning)
-        errors = [
-            100 * mean_error(solver.distance(int(source)), geodesic_distance(mesh, int(source)))
-            for source in table.seeded_sources(mesh)
-        ]
-    assert 0.6 * MEASURED[name] < np.mean(errors) < 1.3 * MEASURED[name] + 0.1
+UNEVEN = [
+    "capped cylinder 128", "plate", "box cube", "hull of 12", "scattered square 1000", "sheared grid by 3", "maze",
+    "height field coarse", "noise 10 times", "beams", "spiky sphere", "two spheres 1 to 100",
+]  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+@pytest.mark.parametrize("name", UNEVEN)
+def test_heat_on_uneven_shapes_is_nearer_than_the_papers(name):
+    mesh, errors = zoo(name), []
+    for options in ({}, {"laplacian": "cotan", "magnitude": "unit"}):
+        solver = HeatMethodSolver(mesh, **options)
+        for source in np.random.default_rng(0).choice(np.unique(mesh.F), 3).tolist():
+            errors.append(mean_error(solver.distance(source), geodesic_distance(mesh, source)))
+    assert sum(errors[:3]) < 0.6 * sum(errors[3:])
 
 
 # Components of different size.
@@ -134,7 +110,6 @@ def test_a_wrong_answer_is_raised_to_straight_lines_or_warns():
     solver = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
     assert mean_error(solver.distance(210), lines) < 0.02
     check = solver.solve(210).diagnostics.check
-    assert check is not None
     assert check.shortfall > 0.1
     assert check.raised
     # The paper's method keeps its answer.
@@ -148,7 +123,6 @@ def test_a_wrong_answer_is_raised_to_straight_lines_or_warns():
     # Nothing is known about lines without positions.
     with pytest.warns(AccuracyWarning, match=r"off by 2\d\.\d % on average"):
         unchecked = HeatMethodSolver(solver.operators).solve(210)
-    assert unchecked.diagnostics.check is not None
     assert np.isnan(unchecked.diagnostics.check.shortfall)
     assert np.mean(unchecked.distance < 0.9 * lines) > 0.2
 
@@ -157,7 +131,6 @@ def test_a_good_answer_is_left_alone():
     mesh = shapes.icosphere(3)
     solution = HeatMethodSolver(mesh, t_coef=0.5).solve(0)
     check = solution.diagnostics.check
-    assert check is not None
     assert not check.raised
     assert 0 <= check.shortfall < 0.005
     assert check.steepness < 0.01
