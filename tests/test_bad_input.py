@@ -234,6 +234,7 @@ LOOSE = heat_igl.Mesh([*GRID.V, [5, 5, 5]], GRID.F)
 VECTORS = heat_igl.VectorHeatSolver(BALL)
 WEST, SOLID = GRID.V[:, 0] < 0.6, np.ones((2, 2, 2), bool)
 AT, INSIDE = [[1, 0, 0]], heat_igl.SurfacePoints([7], [[0.2, 0.3, 0.5]])
+PULL_BACK, CLOUD = heat_igl.GeodesicSolver(BALL).distance_vjp(INSIDE)[1], heat_igl.PointCloud(BALL.V)
 HIDDEN = np.ma.masked_array([1, 2], mask=[True, False])
 ERRORS = "ValueError|SourceError|MeshError|TypeError|ReferenceSolverError"
 # What is asked of a sphere of 42 vertices and 80 faces, and how it is refused.
@@ -383,6 +384,25 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: heat_igl.SignedHeatSolver(TURNED), r"face \d+ and a neighbour are oriented differently.*bfs_orient"),
     (lambda _: heat_igl.SignedHeatSolver(BOOK), r"more than two faces meet at .* \(\d+ edges.*cut\(mesh, curves\)"),
     (lambda _: heat_igl.SignedHeatSolver(BOX), "the mesh is tetrahedral"),
+    # Derivatives.
+    *(
+        (lambda _, g=g: PULL_BACK(g), pattern)
+        for g, pattern in (
+            (np.ones(5), r"g must have shape \(42,\) or \(k, 42\), one entry per vertex, but it has shape \(5,\)"),
+            (np.ones((2, 3, 42)), "one entry per vertex"),
+            (np.where(np.arange(42) == 7, np.nan, 1.0), "finite at reachable vertices, but is nan at vertex 7"),
+        )
+    ),
+    (lambda _: PULL_BACK.push_forward(np.ones(3)), r"dV must be \(42, 3\) finite numbers"),
+    (
+        lambda m: PULL_BACK.push_forward(m.V, [np.nan, 0, 0]),
+        r"points must be \(1, 3\) finite numbers, one velocity",
+    ),
+    (lambda _: PULL_BACK.by_speed(np.ones(42)), "no metric to change: make it on speed_operators"),
+    (lambda _: PULL_BACK.by_metric(np.ones(42)), "no metric to change: make it on metric_operators"),
+    (lambda m: heat_igl.GeodesicSolver(m).distance_vjp(CURVE), "a curve is among the sources: place points on it"),
+    (lambda _: heat_igl.GeodesicSolver(SPHERE, method="sweep").distance_vjp(0), "derivatives are those of paths"),
+    (lambda _: heat_igl.GeodesicSolver(CLOUD).distance_vjp(0), "derivatives need a surface of triangles"),
     # Curves and waypoints.
     (lambda m: heat_igl.SignedHeatSolver(m).distance([]), "curves is empty"),
     (lambda m: heat_igl.SignedHeatSolver(m).distance(7), "curves must be a SurfaceCurve, OrientedPoints, a mask"),

@@ -189,6 +189,9 @@ def test_points_in_faces_and_curves_are_sources(name, method):
             assert_close(row, prepared.distance(each), name, method)
         np.testing.assert_array_equal(prepared.distance([[curve, [point]], 5]), prepared.distance([curve, point, 5]))
         assert_close(prepared.distance(OffsetSources(point, 7.0)) - 7, found, name, method)
+        late = 0.3 * found.max()
+        first, nearest = prepared.distance(3), prepared.distance(OffsetSources([point, 3], [late, 0]))
+        assert np.abs(nearest - np.minimum(found + late, first)).mean() < 2 * largest_mean_error(name, method) * late
 
 
 @table()
@@ -256,8 +259,9 @@ def test_a_cutoff_and_targets_leave_the_values(name, method):
     if isinstance(made, Operators):  # the front door takes meshes
         return
     assert_close(heat_igl.geodesic_distance(made, 3, method=method, cutoff=cutoff), near, name, method)
-    targets = sources(name)[::-1]
+    targets = [*sources(name)[::-1], 3]
     assert_close(heat_igl.geodesic_distance(made, 3, method=method, targets=targets), whole[targets], name, method)
+    assert np.isinf(heat_igl.geodesic_distance(made, 3, method=method, targets=targets[:2], cutoff=1e-3)).all()
 
 
 @table()

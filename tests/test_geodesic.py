@@ -1,10 +1,8 @@
 """GeodesicSolver, geodesic_distance and the plan: which engine answers, for every kind of source, cutoff and target."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from conftest import flat_perturbed, perturbed
+from conftest import perturbed
 
 import heat_igl
 from heat_igl import (
@@ -13,7 +11,6 @@ from heat_igl import (
     Mesh,
     OffsetSources,
     SurfacePoints,
-    edge_curve,
     geodesic_distance,
     shapes,
 )
@@ -22,44 +19,7 @@ from heat_igl.windows import engine
 from heat_igl.windows.tables import from_mesh
 
 # --- `geodesic_distance`, and `as_mesh` in front of everything that takes a mesh
-
-
-SQUARE = flat_perturbed(shapes.grid(12))
 TORUS = perturbed(shapes.torus(20, 30))
-INSIDE = SurfacePoints([17, 250], [[0.2, 0.5, 0.3], [0.6, 0.3, 0.1]])
-
-
-def lines(mesh: Mesh, *places: tuple[Any, float]) -> np.ndarray:
-    """Distance in a convex part of the plane, from positions and where distance begins at each."""
-    return np.min([offset + np.linalg.norm(mesh.V - place, axis=1) for place, offset in places], axis=0)
-
-
-def in_the_plane() -> dict[str, tuple[Any, np.ndarray]]:
-    V, n = SQUARE.V, SQUARE.n_vertices
-    mask = np.zeros(n, bool)
-    mask[[3, 80]] = True
-    first, second = INSIDE.positions(SQUARE)
-    two = lines(SQUARE, (V[3], 0), (V[80], 0))
-    return {
-        "a vertex": (0, lines(SQUARE, (V[0], 0))),
-        "vertices": ([3, 80], two),
-        "a mask": (mask, two),
-        "points": (INSIDE, lines(SQUARE, (first, 0), (second, 0))),
-        "offsets at vertices": (OffsetSources([3, 80], [0.1, 0.3]), lines(SQUARE, (V[3], 0.1), (V[80], 0.3))),
-        "offsets at points": (OffsetSources(INSIDE, [0.2, 0]), lines(SQUARE, (first, 0.2), (second, 0))),
-        "a list": ([7, INSIDE], lines(SQUARE, (V[7], 0), (first, 0), (second, 0))),
-        "a curve": (edge_curve(SQUARE, np.arange(13)), V[:, 1]),  # the lower side
-    }
-
-
-@pytest.mark.parametrize("name", in_the_plane())
-@pytest.mark.parametrize("method", ["windows", "sweep", "heat", "exact"])
-def test_distance_in_the_plane(name, method):
-    sources, truth = in_the_plane()[name]
-    found = geodesic_distance(SQUARE, sources, method=method)
-    assert found.dtype == np.float64
-    allowed = {"windows": 1e-5, "sweep": 0.02, "heat": 0.1, "exact": 1e-9}[method]
-    assert np.abs(found - truth).max() < allowed * truth.max()
 
 
 @pytest.mark.parametrize("sources", [5, [5, 300], OffsetSources([5, 300], [0.1, 0.0])], ids=["one", "two", "late"])
@@ -75,24 +35,6 @@ def test_a_cutoff_looks_at_what_is_near_alone(sources, monkeypatch):
         np.testing.assert_allclose(found, near, rtol=1e-12)
     assert sizes == sorted(sizes)
     assert sizes[0] < 0.02 * mesh.n_faces
-
-
-def test_targets_alone():
-    mesh = shapes.torus(30, 20)
-    places = SurfacePoints([7, 300, 7], [[0.2, 0.5, 0.3], [0, 1, 0], [0.5, 0.5, 0]])
-    curve = edge_curve(mesh, mesh.F[0, :2])
-    for sources in (5, [5, SurfacePoints([40], [[0.2, 0.5, 0.3]])], curve):
-        whole = geodesic_distance(mesh, sources, method="exact")
-        for method, allowed in (("windows", 1e-5), ("exact", 1e-12), ("sweep", 0.05), ("heat", 0.2)):
-            some = geodesic_distance(mesh, sources, method=method, targets=[40, 3, 40])
-            np.testing.assert_allclose(some, whole[[40, 3, 40]], rtol=allowed)
-        near = geodesic_distance(mesh, sources, targets=[40, 3], cutoff=1e-3)
-        assert np.isinf(near).all()
-        at_places = geodesic_distance(mesh, sources, targets=places, method="exact")
-        np.testing.assert_allclose(at_places[1], whole[mesh.F[300, 1]], rtol=1e-12)
-        back = geodesic_distance(mesh, places, method="exact", targets=[5])
-        if sources == 5:
-            np.testing.assert_allclose(back, at_places.min(), rtol=1e-12)
 
 
 def test_faces_that_are_there_twice_count_once():

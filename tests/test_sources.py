@@ -269,18 +269,6 @@ def test_a_circle_around_the_sphere(method):
     assert np.log2(errors[0] / errors[2]) > (0.9 if method != "exact" else 3)
 
 
-@pytest.mark.parametrize("n_edges", [4, 16, 24])
-def test_refined_distance_from_a_curve_of_any_length(n_edges):
-    """In the plane: straight fronts beside the curve, round ones beyond its ends, and neither grows into the other."""
-    mesh = plane(32, 0.2)
-    line = [[0.5 - n_edges / 64, 0.5, 0], [0.5 + n_edges / 64, 0.5, 0]]
-    beside = np.clip(mesh.V[:, 0], line[0][0], line[1][0])
-    truth = np.hypot(mesh.V[:, 0] - beside, mesh.V[:, 1] - 0.5)
-    for method, bound in (("sweep", 4e-3), ("exact", 1e-4)):
-        distance = SolverChoice(method).on(mesh).distance(curve_on(mesh, line))
-        assert mean_error(distance, truth) < bound
-
-
 def test_edges_as_sources_are_nearer_than_their_ends():
     mesh = plane(16)
     path = [nearest_vertex(mesh, [x, 0.5, 0]) for x in np.linspace(0, 1, 17)]
