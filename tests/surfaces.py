@@ -42,9 +42,14 @@ def on_pages(V: np.ndarray, source: int) -> np.ndarray:
     return np.hypot(np.where(is_same, r - r[source], r + r[source]), V[:, 2] - V[source, 2])
 
 
-def bumpy() -> Mesh:
-    """A sphere of 642 vertices with curvature of both signs, and no symmetry."""
-    return perturbed(shapes.icosphere(3), 0.3, 1)
+def bumpy(subdivisions: int = 3) -> Mesh:
+    """A sphere with curvature of both signs, and no symmetry."""
+    return perturbed(shapes.icosphere(subdivisions), 0.3, 1)
+
+
+def angle_between(a: np.ndarray, b: np.ndarray | float = 0.0) -> np.ndarray:
+    """How far angles are from others, or from 0, up to whole turns."""
+    return np.abs(np.angle(np.exp(1j * (a - b))))
 
 
 def cube() -> Mesh:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed
 from scipy.spatial import ConvexHull
-from surfaces import nearest_vertex, on, twice
+from surfaces import angle_between, nearest_vertex, on, twice
 
 import heat_igl
 from heat_igl import (
@@ -20,10 +20,6 @@ from heat_igl import (
 )
 from heat_igl.mesh import region_boundary
 from heat_igl.windows import ExactSurface, vectors_from
-
-
-def angle_between(a: np.ndarray, b: np.ndarray | float) -> np.ndarray:
-    return np.abs(np.angle(np.exp(1j * (a - b))))
 
 
 def convex_hull(P: np.ndarray) -> Mesh:

@@ -588,16 +588,3 @@ def test_save_downloads_the_scene(browser, tmp_path):
     browser.wait(lambda: (tmp_path / "A-square-5-x-5-scene.html").exists())
     saved = browser.run("return window.heatIgl.saved()")
     assert (tmp_path / "A-square-5-x-5-scene.html").read_text(encoding="utf8") == saved
-
-
-def test_a_page_that_fails_says_so_in_the_console(browser):
-    """The fixture's check for errors finds them."""
-    mesh, x = square(3)
-    broken = page(mesh, x).html.replace(
-        "const SURFACE_VERTEX = `#version 300 es", "const SURFACE_VERTEX = `#version 99 es"
-    )
-    Page(broken).save(browser._folder / "broken.html")
-    browser.driver.get((browser._folder / "broken.html").as_uri())
-    found = []
-    browser.wait(lambda: bool(found.extend(browser.driver.get_log("browser")) or found))
-    assert "SEVERE" in {entry["level"] for entry in found}

@@ -23,6 +23,7 @@ from heat_igl import (
     shapes,
 )
 from heat_igl.mesh import connectivity
+from heat_igl.validation.zoo import tetrahedra
 
 # --- Mesh, MeshReport and connectivity on small shapes whose every number can be worked out by hand
 
@@ -199,15 +200,6 @@ def test_report_measures_lengths_angles_and_range():
     assert two_tetrahedra().report().is_intrinsic_delaunay is None
 
 
-def test_report_of_a_scaled_mesh_is_scaled():
-    mesh = sheet(4, 3)
-    small, large = Mesh(mesh.V * 1e-8, mesh.F).report(), Mesh(mesh.V * 1e8, mesh.F).report()
-    assert large.mean_edge == pytest.approx(1e16 * small.mean_edge, rel=1e-12)
-    for name in ("smallest_angle", "largest_angle", "edges_across"):
-        assert getattr(large, name) == pytest.approx(getattr(small, name), rel=1e-9)
-    assert len(small.degenerate_faces) == len(large.degenerate_faces) == 0
-
-
 # --- connectivity -----------------------------------------------------------------------------------------------------
 
 
@@ -361,27 +353,14 @@ def test_a_cube_of_quadrilaterals_is_not_taken_for_tetrahedra(F):
         Mesh(CORNERS, F)
 
 
-def scattered(n: int, seed: int) -> Mesh:
-    from scipy.spatial import Delaunay
-
-    points = np.random.default_rng(seed).random((n, 3))
-    return Mesh(points, Delaunay(points).simplices)
-
-
 @pytest.mark.parametrize("seed", range(10))
 def test_scattered_tetrahedra(seed):
-    mesh = scattered(8 + 40 * seed, seed)
     rng = np.random.default_rng(seed)
+    mesh = tetrahedra(rng.random((8 + 40 * seed, 3)))
     corners = rng.permuted(mesh.F, axis=1)
     flat = mesh.V * [1, 1, 1e-4]
     for V in (mesh.V, flat):
         assert Mesh(V, corners).is_tetrahedral
-
-
-@pytest.mark.parametrize("n", [1, 2, 9])
-def test_boxes_of_tetrahedra_are_not_taken_for_quadrilaterals(n):
-    assert shapes.box(n).n_faces == 6 * n**3
-    assert shapes.box(n, (1, 1, 1e-3)).n_faces == 6 * n**3
 
 
 def test_tetrahedra_without_neighbours():
@@ -477,19 +456,6 @@ def test_a_polyline_in_the_plane_keeps_its_shape(corners):
     assert np.linalg.norm(positions[:, None] - corners, axis=2).min(axis=0).max() < 1e-12
 
 
-def test_a_circle_around_the_sphere():
-    mesh = shapes.icosphere(4)
-    angle = np.linspace(0, 2 * np.pi, 200, endpoint=False)
-    for height in (0.0, 0.3):
-        radius = np.sqrt(1 - height**2)
-        circle = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(200, height)], axis=1)
-        curve = curve_on(mesh, circle, closed=True)
-        assert_connected(mesh, curve)
-        assert curve.is_closed
-        assert curve.lengths(mesh).sum() == pytest.approx(2 * np.pi * radius, rel=2e-3)
-        np.testing.assert_allclose(curve.positions(mesh)[:, 2], height, atol=5e-3)
-
-
 def test_more_corners_on_the_lines_of_a_polyline_change_no_curve():
     sphere, rng = shapes.icosphere(3), np.random.default_rng(3)
     mesh = Mesh(sphere.V * np.exp(0.2 * rng.normal(size=(sphere.n_vertices, 1))), sphere.F)
@@ -506,21 +472,6 @@ def test_more_corners_on_the_lines_of_a_polyline_change_no_curve():
         assert np.linalg.norm(curve.points[:, None] - corners, axis=2).min(axis=0).max() < 1e-12
 
 
-def test_a_polyline_over_a_real_mesh(bunny):
-    """Through vertices in space that are not neighbours, a mean edge length off the surface."""
-    rng = np.random.default_rng(0)
-    h = bunny.edge_lengths.mean()
-    path = [100]
-    for _ in range(8):
-        away = np.linalg.norm(bunny.V - bunny.V[path[-1]], axis=1)
-        path.append(int(rng.choice(np.flatnonzero((away > 2 * h) & (away < 4 * h)))))
-    corners = bunny.V[path] + rng.uniform(-0.5, 0.5, (9, 3)) * h
-    curve = curve_on(bunny, corners, tolerance=3 * h)
-    assert_connected(bunny, curve)
-    straight = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
-    assert straight * 0.7 < curve.lengths(bunny).sum() < straight * 1.5
-
-
 def test_a_curve_along_edges_passes_their_vertices_in_order():
     mesh = shapes.grid(4)
     path = [0, 1, 6, 11]
@@ -530,13 +481,6 @@ def test_a_curve_along_edges_passes_their_vertices_in_order():
     around = edge_curve(mesh, [0, 1, 6, 5], closed=True)
     assert_connected(mesh, around)
     np.testing.assert_allclose(around.positions(mesh), mesh.V[[0, 1, 6, 5, 0]], atol=1e-15)
-
-
-def test_positions_in_the_plane():
-    mesh, at = shapes.grid(4), [[0.2, 0.3], [0.8, 0.1]]
-    found, expected = (closest_points(mesh, np.pad(at, ((0, 0), (0, k)))) for k in (0, 1))
-    np.testing.assert_array_equal(found.points.barycentric, expected.points.barycentric)
-    np.testing.assert_allclose(curve_on(mesh, at).positions(mesh)[[0, -1]], np.pad(at, ((0, 0), (0, 1))), atol=1e-12)
 
 
 def test_a_jump_between_two_sheets_is_refused():

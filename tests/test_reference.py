@@ -371,8 +371,6 @@ def test_arrays_cross_without_a_copy():
     guarded.call("numpy:sum", {"a": big[:10]})
     with PeakMemory() as peak:
         reply = guarded.call("numpy:sum", {"a": big})
-    assert peak.bytes is not None
-    assert reply.peak_memory is not None
     assert peak.bytes < big.nbytes / 8
     # What the child holds of it is the file that the caller wrote, mapped.
     assert reply.peak_memory < 1.125 * big.nbytes

@@ -2,15 +2,10 @@
 
 import numpy as np
 import pytest
-from surfaces import arcs, twice
+from surfaces import arcs, bumpy, twice
 
 import heat_igl
 from heat_igl import Mesh, geodesic_errors, parcel_distances, shapes, smooth
-
-
-def bumpy() -> Mesh:
-    mesh = shapes.icosphere(2)
-    return Mesh(mesh.V * np.random.default_rng(3).uniform(0.7, 1.3, (mesh.n_vertices, 1)), mesh.F)
 
 
 def some_labels(n: int) -> np.ndarray:
@@ -25,7 +20,7 @@ def all_distances(mesh: Mesh) -> np.ndarray:
 @pytest.fixture(scope="module")
 def cases():
     """A mesh, a region of it or None, and all distances in the region."""
-    mesh = bumpy()
+    mesh = bumpy(2)
     region = mesh.V[:, 2] < 0.5
     of_faces = mesh.V[mesh.F].mean(axis=1)[:, 2] < 0.5
     found = [(mesh, None, all_distances(mesh))]
@@ -96,7 +91,7 @@ def test_width_of_a_smoothed_delta_on_a_sphere(fwhm):
 
 
 def test_smoothing_keeps_the_sum_and_is_linear():
-    mesh = bumpy()
+    mesh = bumpy(2)
     operators = heat_igl.HeatMethodSolver(mesh, laplacian="intrinsic-delaunay").operators
     values = np.random.default_rng(1).normal(size=(2, mesh.n_vertices))
     mass = operators.M.diagonal()[: mesh.n_vertices]
@@ -116,7 +111,7 @@ def test_smoothing_stays_in_its_region():
 
 
 def test_errors_of_matches():
-    mesh = bumpy()
+    mesh = bumpy(2)
     rng = np.random.default_rng(5)
     truth, matches = rng.integers(mesh.n_vertices, size=(2, 40))
     expected = all_distances(mesh)[truth, matches] / np.sqrt(mesh.measures.sum())

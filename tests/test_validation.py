@@ -74,22 +74,15 @@ def test_report_on_the_cow(cow):
     by_name = {row.method: row for row in report.rows}
     for row in report.rows:
         assert row.failure is None
-        assert row.errors is not None
         assert row.errors.n_compared == 3 * (cow.n_vertices - 1)
         assert row.errors.median <= row.errors.percentile_95 <= row.errors.maximum
-        assert row.precompute_seconds is not None
-        assert row.solve_seconds is not None
         assert row.precompute_seconds >= 0
         assert row.solve_seconds > 0
     exact = by_name["exact"]
-    assert exact.errors is not None
     assert exact.errors.maximum == 0
-    assert exact.bounds is not None
     assert (exact.bounds.n_below, exact.bounds.n_above) == (0, 0)
     assert exact.bounds.largest_above < 1e-12
-    assert exact.asymmetry is not None
     assert exact.asymmetry < 1e-12
-    assert exact.triangle_excess is not None
     assert exact.triangle_excess < 1e-12
     assert 0 < by_name["meshlab"].errors.mean < by_name["heat"].errors.mean < by_name["igl"].errors.mean
     assert by_name["heat"].parameters["t"] > 0
@@ -109,7 +102,6 @@ def test_report_in_every_format():
     assert again["sources"] == [[5], [7]]
     assert again["n_vertices"] == mesh.n_vertices
     errors = report.rows[0].errors
-    assert errors is not None
     assert again["rows"][0]["errors"]["mean"] == errors.mean
     lines = report.to_markdown().splitlines()
     assert lines[0].startswith("**ball**: 642 vertices, 1280 faces, 2 sets of sources, errors against exact")
@@ -214,7 +206,6 @@ def test_without_a_reference_the_rest_of_the_report_stands(monkeypatch):
 
     monkeypatch.setattr(reference, "measured", refusing)
     report = validate(TOUCHING, 1, ["heat", "sweep", "exact"])
-    assert report.failure is not None
     assert "two surfaces touch in a point" in report.failure
     assert (report.reference, report.truths) == ("exact", None)
     for row in report.rows[:2]:
@@ -275,8 +266,6 @@ def test_rows_of_other_domains():
     assert errors[1] < 0.4 * errors[0] < 0.01
     box = shapes.box(6)
     heat, lines = validate(box, [[0], [100, 7]], ["heat", "sweep"], reference=closed_forms.convex_solid).rows
-    assert heat.errors is not None
-    assert lines.errors is not None
     assert lines.errors.mean < 1e-6 < heat.errors.mean < 0.1
 
 
@@ -310,7 +299,6 @@ def test_drawn_sources_are_on_the_largest_component_and_repeat_with_the_seed():
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     heat_igl.write_mesh("disk.off", shapes.disk(8))
-    Path("noise.off").write_text("OFF\n3 1 0\n0 0 zero\n")
     return tmp_path
 
 
@@ -331,27 +319,6 @@ def test_command_prints_and_writes_the_report(folder, capsys):
     assert printed.out.splitlines()[4].split("|")[:12] == report.to_markdown().splitlines()[4].split("|")[:12]
     assert Path("errors.png").read_bytes().startswith(b"\x89PNG")
     assert {path.name for path in folder.iterdir()} == before | written
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["noise.off"], "noise.off"),
-        (["disk.off", "--methods", "heat,magic"], "'magic' is unknown"),
-        (["disk.off", "--sources", "1000"], "1000 sources cannot be drawn"),
-        (["disk.off", "--picture", "errors.gif"], "errors.gif"),
-        (["disk.off", "--json", "nowhere/report.json"], "nowhere"),
-    ],
-)
-def test_command_fails_in_one_line_and_leaves_nothing(folder, capsys, options, message):
-    before = {path.name for path in folder.iterdir()}
-    assert cli.run(["validate", *options]) == 1
-    printed = capsys.readouterr()
-    assert not printed.out
-    assert printed.err.startswith("heat-igl: ")
-    assert printed.err.count("\n") == 1
-    assert message in printed.err
-    assert {path.name for path in folder.iterdir()} == before
 
 
 # --- Error norms on cases that can be worked out by hand, and bounds that a true distance keeps and a wrong one break
