@@ -68,18 +68,18 @@ def shortest_paths(
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral:
         raise MeshError("paths need triangles, but the mesh is tetrahedral")
-    chosen = source_set(sources, mesh.n_vertices, mesh.F, mesh).with_vertices_moved(mesh.originals)
-    if region is None:
+    part = None if region is None else MeshPart.of(mesh, region)
+    chosen = source_set(sources, mesh.n_vertices, mesh.F, mesh, part=part, originals=mesh.originals)
+    if part is None:
         face, barycentric = places("targets", mesh, targets)
         return [path.on(mesh) for path in _exact(mesh, chosen, face, barycentric)]
-    part = MeshPart.of(mesh, region)
     if isinstance(targets, SurfacePoints):
         face, barycentric = places("targets", mesh, targets)
         face = part.numbers_of(face, "targets")
     else:
         part.require_vertices(named_vertices(targets, mesh.n_vertices, "targets"), "targets")
         face, barycentric = places("targets", part.mesh, targets)
-    paths = _exact(part.mesh, chosen.within(part), face, barycentric)
+    paths = _exact(part.mesh, chosen, face, barycentric)
     return [SurfaceCurve(part.faces[path.faces], path.start, path.end).on(mesh) for path in paths]
 
 

@@ -17,7 +17,7 @@ from heat_igl.operators import Operators
 from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod, Method, Plan, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
 from heat_igl.sources import OffsetSources, Sources, SourceSet, named_vertices, require_resolved, source_set
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
 
 if TYPE_CHECKING:
@@ -282,10 +282,14 @@ class GeodesicSolver(BatchedSolver):
         domain = self._domain
         return None if isinstance(domain, Operators) or not domain.has_copies else domain.originals
 
+    def _with_copies(self, values: AnyArray) -> AnyArray:
+        """Values (..., n) in which copies have those of their originals."""
+        return values if self._originals is None else values[..., self._originals]
+
     def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:
-        self._triangles, originals = triangles, self._originals
+        self._triangles = triangles
         if chosen.engine == "sweep":
-            sweep = _sweep_engine(triangles, originals)
+            sweep = _sweep_engine(triangles)
             chosen = sweep_plan(sweep.measures, chosen, is_estimate=isinstance(self._domain, PointCloud))
             if chosen.engine == "sweep":
                 return chosen, sweep
@@ -293,7 +297,7 @@ class GeodesicSolver(BatchedSolver):
         domain = self._domain.triangles if isinstance(self._domain, PointCloud) else self._domain
         # Noisy points are measured where they were moved to.
         V = None if isinstance(domain, Operators) else domain.V
-        return chosen, guarded_windows(triangles, V, originals, _sweep_engine)
+        return chosen, guarded_windows(triangles, V, _sweep_engine)
 
     def __repr__(self) -> str:
         tolerance = "" if self._plan.tolerance is None else f", tolerance={self._plan.tolerance:g}"
@@ -356,13 +360,13 @@ class GeodesicSolver(BatchedSolver):
             If `cutoff` is not positive.
         """
         limit = checked_cutoff(cutoff)
-        distance = self._engine.distance(self._source_set(sources), limit, n_threads())
+        distance: FloatArray = self._with_copies(self._engine.distance(self._source_set(sources), limit, n_threads()))
         distance[distance > limit] = np.inf
         return distance
 
     def _nearer(self, vertex: int, than: FloatArray) -> FloatArray:
         """Distance (n,) from a vertex where it is smaller than `than` (n,), the distance from others; else ``inf``."""
-        return self._engine.nearer(self._source_set(vertex), than, n_threads())
+        return np.asarray(self._with_copies(self._engine.nearer(self._source_set(vertex), than, n_threads())))
 
     @names_guessed
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
@@ -380,7 +384,8 @@ class GeodesicSolver(BatchedSolver):
             `distance` (n,) and `labels` (n,).
         """
         limit = checked_cutoff(cutoff)
-        distance, labels = self._engine.labelled(self._source_set(sources), limit, n_threads())
+        found = self._engine.labelled(self._source_set(sources), limit, n_threads())
+        distance, labels = map(self._with_copies, found)
         distance[distance > limit] = np.inf
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -410,12 +415,12 @@ class GeodesicSolver(BatchedSolver):
         chosen = self._source_set(sources)
         engine, frames = self._directed
         found = directions(*engine.directed(chosen), frames)
-        if isinstance(self._domain, PointCloud):
-            if self._domain.cover is not None:
-                from heat_igl.windows.directions import directions_from_one_side
+        if isinstance(self._domain, PointCloud) and self._domain.cover is not None:
+            from heat_igl.windows.directions import directions_from_one_side
 
-                found = directions_from_one_side(found, frames, self.n_vertices, self._domain.n_faces)
-            return found if self._originals is None else found.of(self._originals)
+            found = directions_from_one_side(found, frames, self.n_vertices, self._domain.n_faces)
+        if self._originals is not None:
+            found = found.of(self._originals)
         if self._part is None:
             return found
         start = unchecked_points(self._part.faces[found.start.faces], found.start.barycentric)
@@ -431,7 +436,7 @@ class GeodesicSolver(BatchedSolver):
             raise ValueError("directions need the positions of a mesh, which this solver does not have")
         surface = tangent_surface(domain)
         if isinstance(domain, PointCloud) and surface is not domain.triangles:
-            engine = guarded_windows(MeshTriangles(surface), surface.V, None, _sweep_engine)
+            engine = guarded_windows(MeshTriangles(surface), surface.V, _sweep_engine)
         return engine, tangent_frames(surface)
 
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative | SimplexDerivative]:
@@ -518,11 +523,7 @@ class GeodesicSolver(BatchedSolver):
         if part is not None:
             faces = None if self._triangles is None else part.whole
         surface = domain if part is None and isinstance(domain, Mesh) and not domain.is_tetrahedral else None
-        chosen = source_set(sources, self.n_vertices, faces, surface)
-        if self._originals is not None:
-            chosen = chosen.with_vertices_moved(self._originals)
-        if part is not None:
-            chosen = chosen.within(part)
+        chosen = source_set(sources, self.n_vertices, faces, surface, part=part, originals=self._originals)
         if chosen.offsets.any():
             if isinstance(domain, Operators):
                 h = domain.mean_edge_length
@@ -533,10 +534,10 @@ class GeodesicSolver(BatchedSolver):
 
     def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[None]]:
         rows = [self._engine.distance(sources, cutoff) for sources in source_sets]
-        return np.stack(rows), [None] * len(rows)
+        return self._with_copies(np.stack(rows)), [None] * len(rows)
 
 
-def _sweep_engine(triangles: Triangles, originals: IntArray | None) -> SweepEngine:
+def _sweep_engine(triangles: Triangles) -> SweepEngine:
     from heat_igl.sweep import SweepEngine
 
-    return SweepEngine(triangles, originals)
+    return SweepEngine(triangles)

@@ -123,7 +123,7 @@ class SignedHeatSolver:
         self._domain = parts.operators
         self._integration = NormalIntegration(self._mesh, self._faces, triangulation, parts)
         self._unsigned = HeatMethodSolver._of(parts)
-        self._exact = guarded_windows(MeshTriangles(self._mesh), self._mesh.V, None, SweepEngine)
+        self._exact = guarded_windows(MeshTriangles(self._mesh), self._mesh.V, SweepEngine)
         self._integrates = not is_default
 
     def __repr__(self) -> str:
@@ -255,7 +255,7 @@ class SignedHeatSolver:
 
     def _from(self, sources: Sources) -> FloatArray:
         """Exact distance (n,) from sources without a side."""
-        places = source_set(sources, self.n_vertices, self._mesh.F).with_vertices_moved(self._mesh.originals)
+        places = source_set(sources, self.n_vertices, self._mesh.F, originals=self._mesh.originals)
         require_resolved(places, self._domain.mean_edge_length)
         return self._exact.distance(places, threads=n_threads())
 

@@ -279,14 +279,11 @@ class HeatMethodSolver(BatchedSolver):
     def _source_set(self, sources: Sources) -> SourceSet:
         surface = self.operators.source_surface
         faces = None if surface is None else surface.given_faces
-        if self._part is not None and faces is not None:
-            faces = self._part.whole
-        mesh = self._mesh if isinstance(self._mesh, Mesh) and self._part is None and faces is not None else None
-        chosen = source_set(sources, self.n_vertices, faces, mesh)
-        if self._originals is not None:
-            chosen = chosen.with_vertices_moved(self._originals)
-        if self._part is not None:
-            chosen = chosen.within(self._part)
+        part = self._part
+        if part is not None and faces is not None:
+            faces = part.whole
+        mesh = self._mesh if isinstance(self._mesh, Mesh) and part is None and faces is not None else None
+        chosen = source_set(sources, self.n_vertices, faces, mesh, part=part, originals=self._originals)
         return require_resolved(chosen, self._parts.operators.mean_edge_length)
 
     def _answers(

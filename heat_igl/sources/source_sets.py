@@ -102,21 +102,6 @@ class SourceSet:
         points, segments = replace(self.points, offset=of_points), replace(self.segments, offset=of_segments)
         return replace(self, vertex_offset=offsets[:k], points=points, segments=segments)
 
-    def within(self, part: MeshPart) -> SourceSet:
-        """The same sources, by the faces of a part of the mesh; a `SourceError` names the first that is outside."""
-        part.require_vertices(self.vertices, position=self.vertex_label)
-        points = replace(self.points, faces=part.numbers_of(self.points.faces, position=self.points.label))
-        segments = replace(self.segments, faces=part.numbers_of(self.segments.faces, position=self.segments.label))
-        return replace(self, points=points, segments=segments)
-
-    def with_vertices_moved(self, to: IntArray) -> SourceSet:
-        """The same sources with vertex v at the vertex ``to[v]``; where several meet, the earliest stays."""
-        vertices = to[self.vertices]
-        order = np.lexsort((self.vertex_label, self.vertex_offset, vertices))
-        chosen = order[np.diff(vertices[order], prepend=-1) != 0]
-        label, offset = self.vertex_label[chosen], self.vertex_offset[chosen]
-        return replace(self, vertices=vertices[chosen], vertex_label=label, vertex_offset=offset)
-
 
 def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntArray:
     """Where the smallest of the values at each vertex is, of equal ones that of the first label; vertices ascending."""
@@ -170,17 +155,39 @@ _PLACES = (SurfacePoints, SurfaceCurve, OffsetSources)
 Sources = int | np.integer[Any] | Sequence[Any] | AnyArray | SurfacePoints | SurfaceCurve | OffsetSources
 
 
-def source_set(sources: Sources, n: int, F: IntArray | None, mesh: Mesh | None = None) -> SourceSet:
+def source_set(
+    sources: Sources,
+    n: int,
+    F: IntArray | None,
+    mesh: Mesh | None = None,
+    *,
+    part: MeshPart | None = None,
+    originals: IntArray | None = None,
+) -> SourceSet:
     """All that a user may pass as sources, as one checked object; a `SourceError` names the first that is none.
 
     Sources are counted as they are given: the i-th vertex of a sequence, the i-th set entry of a mask, the i-th of
     `SurfacePoints`, a curve as one; over the entries of a list, which may be nested, one after another. The domain has
     n vertices, and points and curves lie on the triangles F, None if there are none. Positions in space stand for the
-    closest points of `mesh`, which has these triangles; without it they are an error.
+    closest points of `mesh`, which has these triangles; without it they are an error. Of a `part` of a mesh, F are all
+    triangles; the result has the faces of the part. A vertex stands for the one of which it is a copy in `originals`.
     """
     builder = _Builder(n, F, mesh)
     builder.add(sources)
-    return builder.finish()
+    chosen = builder.finish()
+    if originals is not None:
+        vertices, label = originals[chosen.vertices], chosen.vertex_label
+        kept = nearest_first(vertices, chosen.vertex_offset, label)
+        chosen = replace(
+            chosen, vertices=vertices[kept], vertex_label=label[kept], vertex_offset=chosen.vertex_offset[kept]
+        )
+    if part is not None:
+        part.require_vertices(chosen.vertices, position=chosen.vertex_label)
+        points, segments = chosen.points, chosen.segments
+        points = replace(points, faces=part.numbers_of(points.faces, position=points.label))
+        segments = replace(segments, faces=part.numbers_of(segments.faces, position=segments.label))
+        chosen = replace(chosen, points=points, segments=segments)
+    return chosen
 
 
 def require_resolved(sources: SourceSet, mean_edge_length: float) -> SourceSet:

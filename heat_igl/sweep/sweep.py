@@ -103,12 +103,10 @@ class SweepEngine(TriangleEngine):
     ----------
     triangles : Triangles
         The surface; an intrinsic Delaunay triangulation, since long thin triangles hide the way from their neighbours.
-    originals : (n,) int64, optional
-        The vertex whose values each takes, see `PointCloud.originals`.
     """
 
-    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
-        super().__init__(triangles, originals)
+    def __init__(self, triangles: Triangles) -> None:
+        super().__init__(triangles)
         self._triangulation = triangles.surface.unfolding
         self._number, self._spokes = numbered_spokes(self._triangulation)
         lengths = self._spokes.spoke["length"]
@@ -161,7 +159,7 @@ class SweepEngine(TriangleEngine):
         self._bounds.shorten(distance, labels)
         self._bounds.lengthen(distance, sources)
         _warn_if_moved(swept, distance, self._triangles.mean_edge_length)
-        return self._with_copies(distance), self._with_copies(labels)
+        return distance, labels
 
     def _points(self, query: Query) -> SourcePoints:
         """The points of a query, and those that stand for its curves."""

@@ -11,10 +11,9 @@ import igl
 import numpy as np
 
 from heat_igl.mesh import Mesh, SurfacePoints
-from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.sources import SourceSet
-from heat_igl.typing import AnyArray, FloatArray, IntArray
-from heat_igl.windows.exact import ExactSolution, ExactSurface
+from heat_igl.typing import FloatArray, IntArray
+from heat_igl.windows.exact import ExactSurface
 from heat_igl.windows.tables import MARGIN, Tables, from_mesh, from_triangulation
 
 if TYPE_CHECKING:
@@ -195,12 +194,10 @@ class TriangleEngine(Engine):
     ----------
     triangles : Triangles
         The surface.
-    originals : (n,) int64, optional
-        The vertex whose values each takes: itself, or that of which it is a copy, see `PointCloud.originals`.
     """
 
-    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
-        self._triangles, self._originals = triangles, originals
+    def __init__(self, triangles: Triangles) -> None:
+        self._triangles = triangles
 
     @cached_property
     def on_delaunay(self) -> ExactSurface:
@@ -212,16 +209,12 @@ class TriangleEngine(Engine):
         """The faces before any flip, in which curves lie."""
         return ExactSurface(self._triangles.faces)
 
-    def _with_copies(self, values: AnyArray) -> AnyArray:
-        """Values (n,) in which copies of points have those of their originals."""
-        return values if self._originals is None else values[self._originals]
-
 
 class WindowEngine(TriangleEngine):
     """Distance by windows, directions and paths: all exact."""
 
-    def __init__(self, triangles: Triangles, originals: IntArray | None = None) -> None:
-        super().__init__(triangles, originals)
+    def __init__(self, triangles: Triangles) -> None:
+        super().__init__(triangles)
         # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
         self._from_vertices = ExactSurface(triangles.tables())
 
@@ -243,48 +236,32 @@ class WindowEngine(TriangleEngine):
         """Distance (n,)."""
         if not sources.on_vertices_alone or sources.vertex_offset.any():
             return super().distance(sources, cutoff, threads)
-        return self._with_copies(self._from_vertices.distance(sources, cutoff, threads))
+        return self._from_vertices.distance(sources, cutoff, threads)
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
         """As of all engines; the search ends where others are nearer."""
-        found = self._from_vertices.distance(sources, float(than.max()), threads, than)
-        return self._with_copies(found)
+        return self._from_vertices.distance(sources, float(than.max()), threads, than)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from."""
         query = Query.of(sources, self._triangles)
-        found = self.solution(query, query.cutoff(cutoff), threads=threads)
-        labels = sources.labels[found.origin.label]
-        return self._with_copies(query.with_begin(found.distance)), self._with_copies(labels)
+        found = self._surface(query.sources).solve(query.sources, cutoff=query.cutoff(cutoff), threads=threads)
+        return query.with_begin(found.distance), sources.labels[found.origin.label]
 
-    def solution(
-        self,
-        query: Query,
-        cutoff: float = np.inf,
-        *,
-        directed: bool = False,
-        targets: SurfacePoints | None = None,
-        goals: IntArray | None = None,
-        threads: int = 1,
-    ) -> ExactSolution:
-        """Distance and the paths from the sources of a query; see `ExactSurface.solve`."""
-        sources = query.sources
+    def _surface(self, sources: SourceSet, *, locates: bool = False) -> ExactSurface:
+        """The triangles to search in; `locates` asks for ones that know where points are."""
         if len(sources.segments.faces):
-            surface = self._on_faces
-        elif not sources.on_vertices_alone or targets is not None or directed:
-            surface = self.on_delaunay
-        else:
-            surface = self._from_vertices
-        return surface.solve(sources, cutoff=cutoff, targets=targets, goals=goals, directed=directed, threads=threads)
+            return self._on_faces
+        return self.on_delaunay if locates or not sources.on_vertices_alone else self._from_vertices
 
     def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
         """Distance (t,) of points or vertices; the search ends when all are known."""
         query = Query.of(sources, self._triangles)
-        places = targets if isinstance(targets, SurfacePoints) else None
-        goals = np.empty(0, np.int64) if isinstance(targets, SurfacePoints) else targets
-        found = self.solution(query, targets=places, goals=goals)
         if not isinstance(targets, SurfacePoints):
+            found = self._surface(query.sources).solve(query.sources, goals=targets)
             return query.with_begin(found.distance)[targets]
+        surface = self._surface(query.sources, locates=True)
+        found = surface.solve(query.sources, targets=targets, goals=np.empty(0, np.int64))
         if query.begin is None:
             return found.target_distance
         begin = query.begin[self._triangles.given_faces[targets.faces, 0]]
@@ -300,15 +277,9 @@ class WindowEngine(TriangleEngine):
         """
         query = Query.of(sources, self._triangles)
         directions = self._curve_directions if len(sources.segments.faces) else self._directions
-        found = self.solution(query, directed=True)
-        angles, starts = directions.of_windows(found, sources)
-        labels = sources.labels[found.origin.label]
-        distance = query.with_begin(found.distance)
-        distance, labels = self._with_copies(distance), self._with_copies(labels)
-        if self._originals is not None:
-            starts = unchecked_points(starts.faces[self._originals], starts.barycentric[self._originals])
-            angles = type(angles)(*(angle[self._originals] for angle in angles))
-        return distance, labels, angles, starts
+        found = self._surface(query.sources, locates=True).solve(query.sources, directed=True)
+        distance, labels = query.with_begin(found.distance), sources.labels[found.origin.label]
+        return distance, labels, *directions.of_windows(found, sources)
 
 
 def _as_thin_as_given(surface: Surface) -> Surface:

@@ -264,21 +264,17 @@ class GuardedEngine(Engine):
 def guarded_windows(
     triangles: Triangles,
     V: FloatArray | None,
-    originals: IntArray | None = None,
-    other: Callable[[Triangles, IntArray | None], Engine] | None = None,
+    other: Callable[[Triangles], Engine] | None = None,
 ) -> GuardedEngine:
     """Windows on triangles with positions V (n, 3), if known; an `other` engine answers where they contradict
     themselves.
-
-    Triangles and originals as for `WindowEngine`, and for the other engine.
     """
-    components = triangles.components if originals is None else triangles.components[originals]
+    components = triangles.components
     if V is None:
         invariants = Invariants(triangles.faces.F, components, lengths=triangles.faces.l)
     else:
         invariants = Invariants(triangles.given_faces, components, V)
-    windows = WindowEngine(triangles, originals)
-    return GuardedEngine(windows, invariants, () if other is None else (partial(other, triangles, originals),))
+    return GuardedEngine(WindowEngine(triangles), invariants, () if other is None else (partial(other, triangles),))
 
 
 def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:
