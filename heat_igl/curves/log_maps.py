@@ -16,7 +16,7 @@ from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simpl
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.windows import PathDirections, WindowWays, contradicted, in_circle, vectors_from
+from heat_igl.windows import Origin, PathDirections, contradicted, in_circle, vectors_from
 from heat_igl.windows.local import search_each
 from heat_igl.windows.tables import MARGIN, Tables, from_triangulation
 
@@ -194,20 +194,20 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     chosen = triangles.originals[np.arange(n) if sources is None else named_vertices(sources, n)]
     surface = unfolding_surface(triangles, MARGIN)
     directions, tables = PathDirections(surface), from_triangulation(surface.unfolding)
-    indptr, ways, distance = _paths(tables, triangles.V, chosen, limit)
-    angles, polar = directions.of_ways(ways), directions.angles
-    back = polar.from_polar(ways.vertex, angles.back)
-    departure = polar.from_polar(np.repeat(chosen, np.diff(indptr)), angles.departure)
+    vertex, ways, distance = _paths(tables, triangles.V, chosen, limit)
+    angles, polar = directions.of_ways(vertex, ways), directions.angles
+    back = polar.from_polar(vertex, angles.back)
+    departure = polar.from_polar(chosen[ways.label], angles.departure)
     turn = back + np.pi - departure - angles.turning
     rotation = turn - 2 * np.pi * np.rint(turn / (2 * np.pi))
     values = [np.nan_to_num(value) for value in (angles.departure, in_circle(back + np.pi), rotation)]
-    shape = len(chosen), n
-    found = (sp.csr_array((data, ways.vertex, indptr), shape=shape) for data in (distance, *values))
+    indptr, shape = np.append(0, np.cumsum(np.bincount(ways.label, minlength=len(chosen)))), (len(chosen), n)
+    found = (sp.csr_array((data, vertex, indptr), shape=shape) for data in (distance, *values))
     return LogMapsWithin(*(array[:, triangles.originals] if triangles.has_copies else array for array in found))
 
 
-def _paths(tables: Tables, V: FloatArray, chosen: IntArray, radius: float) -> tuple[IntArray, WindowWays, FloatArray]:
-    """Of paths from vertices (k,), source after source: the ends (k + 1,), how they run, and their lengths."""
+def _paths(tables: Tables, V: FloatArray, chosen: IntArray, radius: float) -> tuple[IntArray, Origin, FloatArray]:
+    """Paths from vertices (k,), source after source: vertices that they lead to, how they run, and their lengths."""
     limit = float(tables.scaled(radius))
     order, near = search_each(tables, chosen, V, lambda work, numbers, _: work.within(numbers, limit), directed=True)
     counts, vertex, distance, way, line, is_wrong = near
@@ -217,16 +217,14 @@ def _paths(tables: Tables, V: FloatArray, chosen: IntArray, radius: float) -> tu
     source = np.repeat(order, counts)
     key = source * tables.n + vertex
     sort = np.argsort(key, kind="stable")
-    key, vertex, way, line = key[sort], vertex[sort], way[sort], line[sort]
-    root = tables.old_vertex[way[:, 0]]
-    # Roots are nearer than the vertices, so they are there too.
-    ways = WindowWays(
-        vertex.astype(np.int64),
-        np.searchsorted(key, source[sort] * tables.n + root),
-        tables.old_half_edge(way[:, 1]),
-        line[:, :2],
+    source, key, way, line = source[sort], key[sort], way[sort], line[sort]
+    ways = Origin(
+        source,
+        # Roots are nearer than the vertices, so they are there too.
+        np.searchsorted(key, source * tables.n + tables.old_vertex[way[:, 0]]),
         tables.old_half_edge(way[:, 2]),
         tables.unscaled(line[:, 2]),
+        tables.old_half_edge(way[:, 1]),
+        line[:, :2],
     )
-    indptr = np.append(0, np.cumsum(np.bincount(source, minlength=len(chosen))))
-    return indptr, ways, distance[sort]
+    return vertex[sort].astype(np.int64), ways, distance[sort]

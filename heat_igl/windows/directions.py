@@ -25,7 +25,7 @@ from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet, source_set
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
-from heat_igl.windows.exact import ExactSolution, Leaving, Searched, search
+from heat_igl.windows.exact import ExactSolution, Leaving, Origin, Searched, search
 from heat_igl.windows.guards import Invariants
 from heat_igl.windows.tables import Tables, from_mesh
 
@@ -63,34 +63,6 @@ class PathAngles(NamedTuple):
     turning: FloatArray
 
 
-class WindowWays(NamedTuple):
-    """How n paths run that windows found.
-
-    Attributes
-    ----------
-    vertex : (n,) int64
-        The vertex that each leads to.
-    root : (n,) int64
-        The path that leads to its last bend or its source vertex; n + i for source point i, -1 for no path.
-    corner : (n,) int64
-        Corner ``3 f + c`` of the triangulation out of which the straight last part leaves the root; -1 for no path.
-    direction : (n, 2) float64
-        There, from the side to the next corner.
-    entered, crossing : (n,) int64, (n,) float64
-        As in `Origin`.
-    turn : (n,) float64, optional
-        As in `Leaving`, for source points.
-    """
-
-    vertex: IntArray
-    root: IntArray
-    corner: IntArray
-    direction: FloatArray
-    entered: IntArray
-    crossing: FloatArray
-    turn: FloatArray | None = None
-
-
 class PathDirections:
     """Angles in the triangles as polar angles of the mesh.
 
@@ -123,32 +95,19 @@ class PathDirections:
         A path from a place inside a face departs in that face, and from a corner around the vertex. Where no source is
         reached, the place is a corner of face 0.
         """
-        origin, leaving = found.origin, found.leaving
-        if leaving is None:
-            raise ValueError("of_windows needs a solution that was asked for with directed=True")
-        vertices = np.arange(len(found.distance))
-        ways = WindowWays(
-            vertices,
-            origin.root,
-            leaving.corner,
-            leaving.direction,
-            origin.entered,
-            origin.crossing,
-            leaving.turn,
-        )
-        if leaving.place is not None:
-            return self._of_curves(self.of_ways(ways), origin.root, leaving.corner, leaving.place)
+        origin, vertices = found.origin, np.arange(len(found.distance))
+        if origin.place is not None:
+            return self._of_curves(self.of_ways(vertices, origin), origin)
         # After vertices and points comes nothing, at which the index -1 looks.
         corner, points, nothing = self._first[sources.vertices], sources.points, np.zeros(1, np.int64)
         faces = np.concatenate([corner // 3, points.faces, nothing])
         barycentric = np.concatenate([np.eye(3)[corner % 3], points.barycentric, np.eye(3)[:1]])
         starts = unchecked_points(faces[origin.label], barycentric[origin.label])
-        return self.of_ways(ways, points), starts
+        return self.of_ways(vertices, origin, points), starts
 
-    def _of_curves(
-        self, angles: PathAngles, root: IntArray, corner: IntArray, place: FloatArray
-    ) -> tuple[PathAngles, SurfacePoints]:
-        """As `of_windows`, of paths from segments: with these roots (n,), corners (n,) and places (n, 3) there."""
+    def _of_curves(self, angles: PathAngles, origin: Origin) -> tuple[PathAngles, SurfacePoints]:
+        """As `of_windows`, of paths from segments."""
+        root, corner, place = origin.root, _known(origin.corner), _known(origin.place)
         n, first = len(root), first_parts(root)
         start = root[first]
         at_vertex = np.flatnonzero((start >= 0) & (start < n))
@@ -164,14 +123,16 @@ class PathDirections:
         barycentric[at_corner] = np.eye(3)[corner % 3]
         return angles, unchecked_points(faces, barycentric)
 
-    def of_ways(self, ways: WindowWays, points: SourcePoints | None = None) -> PathAngles:
-        """The angles of paths that are named one after the other, with p sources at `points` in faces.
+    def of_ways(self, vertex: IntArray, ways: Origin, points: SourcePoints | None = None) -> PathAngles:
+        """The angles of n paths to vertices (n,), with p sources at `points` in faces.
+
+        Roots in `ways` are the paths that lead to the last bends or source vertices; n + i for source point i.
 
         Without `points`, the departure of a path from a place inside a face counts in the triangle of that place.
         """
-        angles, n = self.angles, len(ways.vertex)
-        row = np.flatnonzero((ways.corner >= 0) & (ways.root >= 0))
-        corner, root, (x, y) = ways.corner[row], ways.root[row], ways.direction[row].T
+        angles, n, corner = self.angles, len(vertex), _known(ways.corner)
+        row = np.flatnonzero((corner >= 0) & (ways.root >= 0))
+        corner, root, (x, y) = corner[row], ways.root[row], _known(ways.direction)[row].T
         departure, back = np.full((2, n), np.nan)
         at_vertex = root < n
         seen = np.arctan2(y, x)
@@ -196,12 +157,12 @@ class PathDirections:
         back[row[over]] = self._at_corners(half_edge, seen)
         faces = corner[~over] // 3
         if len(faces):
-            at = (self._triangulation.F[faces] == ways.vertex[row[~over], None]).argmax(axis=1)
+            at = (self._triangulation.F[faces] == vertex[row[~over], None]).argmax(axis=1)
             k, places = np.arange(len(faces)), lay_out(self._triangulation.l[faces])
             ux, uy = (places[k, (at + 1) % 3] - places[k, at]).T
             seen = np.arctan2(uy * x[~over] - ux * y[~over], -ux * x[~over] - uy * y[~over])
             back[row[~over]] = self._at_corners(3 * faces + at, seen)
-        scale = np.where(angles.on_boundary, angles.scale, 1.0)[ways.vertex]
+        scale = np.where(angles.on_boundary, angles.scale, 1.0)[vertex]
         return PathAngles(*_handed_on(row, ways.root, departure, back, scale))
 
     def _at_corners(self, corner: IntArray, seen: FloatArray) -> FloatArray:
@@ -230,6 +191,12 @@ class PathDirections:
             turn += flips.turn(faces, after)
             faces = after
         return turn
+
+
+def _known(part: AnyArray | None) -> AnyArray:
+    if part is None:
+        raise ValueError("angles of paths need a solution that was asked for with directed=True")
+    return part
 
 
 def first_parts(root: IntArray) -> IntArray:

@@ -140,30 +140,13 @@ class Targets(NamedTuple):
 
 
 class Leaving(NamedTuple):
-    """Directions in which the straight last parts of the paths to n vertices leave their roots, on faces oriented
-    alike.
+    """How paths to n vertices leave their roots, as a search notes it: `corner` and `direction` of `Origin`.
 
-    Attributes
-    ----------
-    corner : (n,)
-        The corner of the root that the path leaves through; of a source point in face f, ``3 f``; -1 for none.
-    direction : (n, 2) float64
-        The direction in the plane of that corner, of any length. The first axis is the side to the next corner.
-    place : (n, 3) float64, optional
-        Barycentric coordinates of the place that the path leaves, in the triangle of the corner.
-    turn : (n,) float64, optional
-        The angle that leads from a direction in that triangle to the same in the first triangle of a source point.
-
-    Notes
-    -----
-    For paths from segments a search notes a length along the segment and a side, see `front.relax`;
-    `_with_places` turns both into a direction and a place.
+    For paths from segments it notes a length along the segment and a side in place of the direction, see `front.relax`.
     """
 
     corner: AnyArray
     direction: FloatArray
-    place: FloatArray | None = None
-    turn: FloatArray | None = None
 
     @classmethod
     def of(cls, n: int) -> Leaving:
@@ -217,12 +200,25 @@ class Origin(NamedTuple):
         the path starts in the place or runs inside one face.
     crossing : (k,) float64
         How far from the tail of that half-edge, in the mesh's unit.
+    corner : (k,) int64, optional
+        Corner ``3 f + c`` of the triangulation out of which the straight last part leaves the root, on faces oriented
+        alike; of a source point in face f, ``3 f``; -1 for none. This and what follows is there if it was asked for.
+    direction : (k, 2) float64, optional
+        The direction there, of any length. The first axis is the side to the next corner.
+    turn : (k,) float64, optional
+        The angle that leads from a direction in that triangle to the same in the first triangle of a source point.
+    place : (k, 3) float64, optional
+        Barycentric coordinates of the place that the path leaves, in that triangle; of paths from curves.
     """
 
     label: IntArray
     root: IntArray
     entered: IntArray
     crossing: FloatArray
+    corner: IntArray | None = None
+    direction: FloatArray | None = None
+    turn: FloatArray | None = None
+    place: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,8 +237,6 @@ class ExactSolution:
         Of the paths to the target points, (t,) each.
     n_windows : int
         Windows that were carried over an edge.
-    leaving : Leaving or None
-        How the paths to the vertices leave the roots, if that was asked for: corners ``3 f + c`` of the triangulation.
     """
 
     distance: FloatArray
@@ -250,7 +244,6 @@ class ExactSolution:
     target_distance: FloatArray
     target_origin: Origin
     n_windows: int
-    leaving: Leaving | None
 
 
 class ExactSurface:
@@ -303,7 +296,7 @@ class ExactSurface:
             If given, the search ends once the distances of these vertices and of the targets are known; those of other
             vertices may then be too large or ``inf``.
         directed : bool
-            Whether `ExactSolution.leaving` is asked for, on faces that are oriented alike.
+            Whether it is asked for how paths to the vertices leave, see `Origin`, on faces that are oriented alike.
         threads : int
             With more than one, two threads share the search for distances of all vertices, on large surfaces. The
             distances are the same; of paths that are equally long, another may be found.
@@ -330,12 +323,11 @@ class ExactSurface:
             threads=threads,
         )
         which = done.nearest_copy(0 if targets is None else len(targets))
-        return ExactSolution(
-            *self._result(done.found, done, self.tables.number, cutoff),
-            *self._result(done.targets.found, done, which, cutoff),
-            done.n_windows,
-            self._leaving(done),
-        )
+        distance, origin = self._result(done.found, done, self.tables.number, cutoff)
+        if done.leaving is not None:
+            origin = self._with_leaving(origin, done, done.leaving)
+        to_targets = self._result(done.targets.found, done, which, cutoff)
+        return ExactSolution(distance, origin, *to_targets, done.n_windows)
 
     def distance(
         self,
@@ -356,15 +348,18 @@ class ExactSurface:
             distance[distance > cutoff] = np.inf
         return distance
 
-    def _leaving(self, done: Searched) -> Leaving | None:
-        """How paths leave the roots, in the caller's numbers."""
-        if done.leaving is None:
-            return None
-        tables = self.tables
-        leaving = (_with_places if len(done.starts.segments.faces) else _with_turns)(tables, done, done.leaving)
-        corner, direction = leaving.corner[tables.number], leaving.direction[tables.number]
-        place, turn = (None if of is None else of[tables.number] for of in (leaving.place, leaving.turn))
-        return Leaving(tables.old_half_edge(corner), direction, place, turn)
+    def _with_leaving(self, origin: Origin, done: Searched, leaving: Leaving) -> Origin:
+        """The origin of paths to the vertices with how they leave, in the caller's numbers."""
+        number, root = self.tables.number, done.found.root.astype(np.int64)
+        origin = origin._replace(corner=self.tables.old_half_edge(leaving.corner[number]))
+        if len(done.starts.segments.faces):
+            place, direction = _from_curves(self.tables, done, leaving, root)
+            return origin._replace(direction=direction[number], place=place[number])
+        # Which triangle a path leaves through does not say by which side of it, if two of them are glued to each other.
+        row = np.flatnonzero((leaving.corner >= 0) & (root >= self.n))
+        turn = np.zeros(self.n)
+        turn[row] = done.starts.points.turn[root[row] - self.n]
+        return origin._replace(direction=leaving.direction[number], turn=turn[number])
 
     def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
         """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""
@@ -493,37 +488,12 @@ def _targets_at(tables: Tables, points: SurfacePoints | None) -> Targets:
     return Targets(place, *tables.by_face(place), tables.largest_circle(place), Found.of(len(place.faces), 0))
 
 
-def _with_turns(tables: Tables, done: Searched, leaving: Leaving) -> Leaving:
-    """How paths leave their roots, with the turns to the first triangles of source points.
+def _from_curves(tables: Tables, done: Searched, leaving: Leaving, root: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Where the straight last parts of paths leave their roots (n,), as places (n, 3), 0 for none; directions (n, 2).
 
-    Which triangle a path leaves through does not say by which side of it, if two of them are glued to each other.
+    All by the numbers of the tables.
     """
-    point = done.found.root.astype(np.int64) - tables.n
-    row = np.flatnonzero((leaving.corner >= 0) & (point >= 0))
-    turn = np.zeros(len(point))
-    turn[row] = done.starts.points.turn[point[row]]
-    return leaving._replace(turn=turn)
-
-
-def _with_places(tables: Tables, done: Searched, leaving: Leaving) -> Leaving:
-    """How the straight last parts of the paths leave their roots, with the places of these.
-
-    Parameters
-    ----------
-    tables : Tables
-        The surface.
-    done : Searched
-        A search on it.
-    leaving : Leaving
-        What the search noted.
-
-    Returns
-    -------
-    Leaving
-        By the numbers of the tables. Paths from segments have directions as well. Where there is no path, the place
-        is 0.
-    """
-    root, starts, n = done.found.root.astype(np.int64), done.starts, tables.n
+    starts, n = done.starts, tables.n
     first_segment = n + len(starts.points.faces)
     has_path, place = leaving.corner >= 0, np.zeros((n, 3))
     row = np.flatnonzero(has_path & (root < n))
@@ -533,7 +503,7 @@ def _with_places(tables: Tables, done: Searched, leaving: Leaving) -> Leaving:
     row = np.flatnonzero(has_path & (root >= first_segment))
     direction = leaving.direction.copy()
     place[row], direction[row] = _from_segments(tables, done, leaving, row, root[row] - first_segment)
-    return Leaving(leaving.corner, direction, place)
+    return place, direction
 
 
 def _from_segments(
