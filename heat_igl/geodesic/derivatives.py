@@ -240,10 +240,7 @@ class DistanceDerivative:
 def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Mesh | PointCloud | None) -> Surface:
     """The surface, if a distance from `sources` on it has a derivative.
 
-    Raises
-    ------
-    ValueError
-        If there is none, if it is that of a point cloud, or if a curve is among the sources.
+    A ValueError if there is none, if it is that of a point cloud, or if a curve is among the sources.
     """
     if surface is None or isinstance(mesh, PointCloud):
         raise ValueError(
@@ -261,19 +258,10 @@ def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Me
 
 
 class PathLengths:
-    """Distances as lengths of paths: one answer of exact windows from vertices and points.
+    """Distances as lengths of paths: one answer of exact windows from vertices and points in the faces of the mesh.
 
     A path is known by the last vertex or source point before each vertex, from which a straight line leads to it; up to
-    there it is the path of that vertex.
-
-    Parameters
-    ----------
-    surface : ExactSurface
-        The triangles that the paths run on.
-    triangulation : IntrinsicTriangulation
-        What the surface was made from: m triangles on n vertices.
-    sources : SourceSet
-        Vertices, and points in the faces of the mesh.
+    there it is the path of that vertex. The surface was made from the triangulation.
     """
 
     def __init__(self, surface: ExactSurface, triangulation: IntrinsicTriangulation, sources: SourceSet) -> None:

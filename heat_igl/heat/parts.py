@@ -161,18 +161,7 @@ class HeatSolution:
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """The options of `HeatMethodSolver`, with their meanings and defaults; checked when they are put together.
-
-    Attributes
-    ----------
-    t_coef, t, laplacian, boundary, magnitude, backend
-        As for `HeatMethodSolver`.
-
-    Raises
-    ------
-    ValueError
-        If an option has no meaning.
-    """
+    """The options of `HeatMethodSolver`, with their meanings and defaults; a ValueError where one has no meaning."""
 
     t_coef: float | None = None
     t: float | None = None

@@ -60,15 +60,7 @@ def corner_angles(l: FloatArray) -> FloatArray:
 
 
 class Merged(NamedTuple):
-    """Faces removed because another face has the same vertices.
-
-    Attributes
-    ----------
-    face : (m,) int64
-        New face of each old face.
-    corner : (m, 3) int64
-        Corner of the new face for each corner of the old.
-    """
+    """Faces removed because another has the same vertices: the new face of each, and the corners (m, 3) of that."""
 
     face: IntArray
     corner: IntArray
@@ -85,13 +77,7 @@ class Merged(NamedTuple):
 
 
 class Turned(NamedTuple):
-    """Faces turned over by reversing their rows: corner c became corner 2 - c.
-
-    Attributes
-    ----------
-    turned : (m,) bool
-        Mask of these faces.
-    """
+    """Faces turned over by reversing their rows, those of the mask (m,): corner c became corner 2 - c."""
 
     turned: BoolArray
 
@@ -101,13 +87,7 @@ class Turned(NamedTuple):
 
 
 class Covered(NamedTuple):
-    """Faces doubled: face f stays as the front, face m + f is the back, with corners 1 and 2 swapped.
-
-    Attributes
-    ----------
-    n_faces : int
-        Number m of faces before.
-    """
+    """Faces doubled: face f of m stays as the front, face m + f is the back, with corners 1 and 2 swapped."""
 
     n_faces: int
 

@@ -57,15 +57,9 @@ _solves = import_module(builds("linear.substitution")[0])
 class Dissection(NamedTuple):
     """Vertices in order of elimination, in blocks that are eliminated together.
 
-    Attributes
-    ----------
-    order : (n,) int32
-        ``order[i]`` is eliminated as the i-th.
-    start : (k + 1,) int64
-        Block b holds ``order[start[b]:start[b + 1]]``. Children come before their parents, subtrees in one piece.
-    parent : (k,) int64
-        The separator that cut a block off from the rest; -1 at roots. Neighbours of a block are in it, below it or in
-        its ancestors.
+    ``order[i]`` is eliminated as the i-th, and block b holds ``order[start[b]:start[b + 1]]``. Children come before
+    their parents, subtrees in one piece. `parent` is the separator that cut a block off from the rest, -1 at roots:
+    neighbours of a block are in it, below it or in its ancestors.
     """
 
     order: IntArray
@@ -76,15 +70,8 @@ class Dissection(NamedTuple):
 def dissect(ends: IntArray, neighbours: IntArray, workers: Executor | None = None) -> Dissection:
     """An order of elimination for symmetric matrices of a given pattern.
 
-    Parameters
-    ----------
-    ends : (n + 1,) int32
-        The neighbours of v are ``neighbours[ends[v]:ends[v + 1]]``: the pattern of a symmetric matrix as scipy stores
-        it, both triangles, with or without the diagonal.
-    neighbours : (nnz,) int32
-        Vertices.
-    workers : Executor, optional
-        Threads for large pieces. The result does not depend on them.
+    The neighbours of v are ``neighbours[ends[v]:ends[v + 1]]``: the pattern as scipy stores it, both triangles, with or
+    without the diagonal. Threads of `workers` take large pieces; the result does not depend on them.
     """
     n = len(ends) - 1
     # A vertex with very many neighbours belongs to every separator.
@@ -257,10 +244,7 @@ class MultifrontalAnalysis:
     def eliminate(self, A: sp.csc_matrix, free: BoolArray | None, entries: FloatArray) -> None:
         """Write the factor of `A` to `entries`; rows that are not free are those of the identity.
 
-        Raises
-        ------
-        FactorizationError
-            If A is not positive definite.
+        A FactorizationError if A is not positive definite.
         """
         data = A.data.astype(np.float64, copy=False)
         is_free = np.ones(A.shape[0], np.uint8) if free is None else free.astype(np.uint8)

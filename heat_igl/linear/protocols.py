@@ -69,10 +69,7 @@ def check_probe(
 ) -> None:
     """Solve for a known solution, of ones, to find a singular matrix, and for noise if A may be indefinite.
 
-    Raises
-    ------
-    FactorizationError
-        If A turns out not to be positive definite.
+    A FactorizationError if A turns out not to be positive definite.
     """
     n = A.shape[0]
     ones = np.ones(n) if free is None else free.astype(np.float64)

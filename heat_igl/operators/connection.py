@@ -118,12 +118,7 @@ def edge_rotations(domain: Operators) -> sp.csc_matrix:
 class FaceRotations(NamedTuple):
     """Factors (m, 3) that turn vectors at the corners of faces into vectors in the planes of the faces.
 
-    Attributes
-    ----------
-    of_faces : (m, 3) complex128
-        For the faces of the mesh.
-    of_triangulation : (m, 3) complex128
-        For the triangles that the operators belong to.
+    For the faces of the mesh, and for the triangles that the operators belong to.
     """
 
     of_faces: AnyArray

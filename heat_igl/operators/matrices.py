@@ -79,12 +79,7 @@ class EdgeLengths(NamedTuple):
 class TriangleElements:
     """Linear elements on m triangles: all that the operators and the steps take of a triangulation.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation
-        The triangles.
-    in_space : callable, optional
-        Makes the gradient in space (3 m, n).
+    `in_space` makes the gradient in space (3 m, n).
     """
 
     triangulation: IntrinsicTriangulation

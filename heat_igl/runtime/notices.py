@@ -51,12 +51,7 @@ def held_warnings() -> Iterator[list[tuple[str, type[Warning]]]]:
 def progress_bar(description: str, total: int, shown: bool = True) -> Iterator[Callable[[int], None]]:
     """A context with a progress bar on standard error; the value is a function that advances the bar by n rows.
 
-    With ``shown=False`` there is no bar, and the function does nothing.
-
-    Raises
-    ------
-    MissingExtraError
-        If rich is not installed.
+    With ``shown=False`` there is no bar, and the function does nothing. A `MissingExtraError` if rich is not installed.
     """
     if not shown:
         yield lambda _: None
@@ -69,12 +64,7 @@ def progress_bar(description: str, total: int, shown: bool = True) -> Iterator[C
 class TimeLeft:
     """Writes how long the rest of a long call takes, on standard error if that is a terminal.
 
-    Parameters
-    ----------
-    what : str
-        Ends the beginning "`done` of `total`".
-    total : int
-        Number of steps, of about the same cost.
+    Of `total` steps of about the same cost, `what` is done: it ends the beginning "`done` of `total`".
     """
 
     def __init__(self, what: str, total: int) -> None:
@@ -93,13 +83,7 @@ class TimeLeft:
 
 
 def rich_progress() -> Any:
-    """Progress bars of rich on standard error, without tasks yet; a context manager.
-
-    Raises
-    ------
-    MissingExtraError
-        If rich is not installed.
-    """
+    """Progress bars of rich on standard error, without tasks yet; a context manager. Errors of `progress_bar`."""
     with MissingExtraError.guard("progress=True", "rich", "cli"):
         from rich.console import Console
         from rich.progress import MofNCompleteColumn, Progress

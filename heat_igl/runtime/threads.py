@@ -37,12 +37,8 @@ WORKING_MEMORY = 2**31
 def n_threads() -> int:
     """Number of threads to use: the available processors, at most ``HEAT_IGL_NUM_THREADS`` if that is set.
 
-    In a thread of a `pool` this number is divided by the size of the pool; the result is at least 1.
-
-    Raises
-    ------
-    ValueError
-        If the environment variable is not a positive number.
+    In a thread of a `Pool` this number is divided by the size of the pool; the result is at least 1. A ValueError if
+    the environment variable is not a positive number.
     """
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     wanted = os.environ.get("HEAT_IGL_NUM_THREADS")

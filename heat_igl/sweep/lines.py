@@ -38,14 +38,7 @@ class LineEngine(SimplexEngine):
     """Distance through tetrahedra in space: straight lines from the sources, and lines that bend around edges.
 
     A body bends lines at edges with more than half a turn inside: once its ends know their distances, such an edge is a
-    source itself.
-
-    Parameters
-    ----------
-    simplices : MetricSimplices
-        Tetrahedra with positions `V`.
-    is_halved : bool
-        Whether they are not to be halved again.
+    source itself. Tetrahedra that `is_halved` says were halved are not halved again.
     """
 
     def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
@@ -187,23 +180,9 @@ class LineEngine(SimplexEngine):
 def reflex_edges(corners: AnyArray, behind: AnyArray, V: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Boundary edges at which the inside takes more than half a turn, and edges where more than two walls meet.
 
-    Parameters
-    ----------
-    corners : (m, 4) int
-        Tetrahedra.
-    behind : (m, 4) int
-        The tetrahedron behind the side opposite each corner, -1 on the boundary.
-    V : (n, 3) float64
-        Positions of the vertices.
-
-    Returns
-    -------
-    edges : (e, 2) int64
-        Vertices of each edge.
-    outward : (e, 3) float64
-        Unit vector out of the body, halfway between the two walls; zero where more than two meet.
-    wall : (e,) float64
-        Cosine of the angle between that vector and the walls.
+    Of tetrahedra (m, 4) with positions V (n, 3), and the tetrahedra (m, 4) behind the sides opposite their corners, -1
+    on the boundary. Returns the edges (e, 2); unit vectors (e, 3) out of the body, halfway between the two walls, zero
+    where more than two meet; and cosines (e,) of the angles between these vectors and the walls.
     """
     n = len(V)
     tetrahedron, corner = np.nonzero(behind < 0)
@@ -239,18 +218,9 @@ def _unit(vectors: FloatArray) -> FloatArray:
 
 
 class LineDerivative(SimplexDerivative):
-    """The derivative of lengths of ways, whose matrix is known.
+    """The derivative of lengths of ways (n,), with the offsets of their sources, by a matrix `slopes` (n, 3 n).
 
-    Parameters
-    ----------
-    simplices, sources, distance
-        The domain, the sources, and the answer (n,).
-    label : (n,) int
-        The number of the source vertex of each vertex.
-    length : (n,) float64
-        Of the ways, with the offset of the source.
-    slopes : (n, 3 n) csr_array
-        The derivative of `length` by positions.
+    `label` (n,) is the number of the source vertex of each vertex.
     """
 
     def __init__(
@@ -282,20 +252,11 @@ class LineDerivative(SimplexDerivative):
 def line_slopes(
     V: FloatArray, ends: IntArray, edges: IntArray, way: AnyArray, distance: FloatArray
 ) -> tuple[FloatArray, sp.csr_array]:
-    """The lengths (n,) of shortest ways around edges, and their derivatives (n, 3 n) by positions.
+    """The lengths (n,) of shortest ways around edges, and their derivatives (n, 3 n) by positions V (n, 3).
 
-    The places at which a way bends make it shortest, so that they count as fixed on their edges.
-
-    Parameters
-    ----------
-    V : (n, 3) float64
-        Positions.
-    ends : (n,) int
-        The vertex at which each way ends; the vertex itself if there is none.
-    edges, way : (e, 2) int, (n,) int
-        Edges around which ways bend, and the last one on the way to each vertex; negative for none.
-    distance : (n,) float64
-        Their lengths as found, from which the order of the vertices is taken.
+    The places at which a way bends make it shortest, so that they count as fixed on their edges. `ends` (n,) are the
+    vertices at which ways end, the vertex itself if there is none, and `way` (n,) the last of the `edges` (e, 2) that
+    each bends around; negative for none. The order of the vertices is that of their distances as found.
     """
     n = len(V)
     chains: dict[int, tuple[int, ...]] = {}

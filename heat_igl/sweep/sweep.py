@@ -97,12 +97,8 @@ class SweepEngine(TriangleEngine):
     """Distance by planar unfolding over the triangles at each vertex, for any number of queries.
 
     Paths end at the boundary and at edges of more than two faces: they run along such edges, not across. Around points,
-    curves and several vertices the sweep begins with exact distances.
-
-    Parameters
-    ----------
-    triangles : Triangles
-        The surface; an intrinsic Delaunay triangulation, since long thin triangles hide the way from their neighbours.
+    curves and several vertices the sweep begins with exact distances. Triangles are those of an intrinsic Delaunay
+    triangulation, since long thin ones hide the way from their neighbours.
     """
 
     def __init__(self, triangles: Triangles) -> None:

@@ -64,17 +64,9 @@ class PathAngles(NamedTuple):
 
 
 class PathDirections:
-    """Angles in the triangles as polar angles of the mesh.
+    """Angles in the triangles as polar angles of the mesh, on an oriented manifold of triangles whose faces are known.
 
-    Parameters
-    ----------
-    surface : Surface
-        An oriented manifold of triangles whose faces are known.
-
-    Raises
-    ------
-    MeshError
-        If the surface has no polar angles, see `polar_angles`.
+    A MeshError if the surface has no polar angles, see `polar_angles`.
     """
 
     def __init__(self, surface: Surface) -> None:
@@ -223,16 +215,9 @@ def _polar(begin: FloatArray, angles: FloatArray, scale: FloatArray, on_boundary
 def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: FloatArray, scale: FloatArray) -> FloatArray:
     """Departure, direction back and turning (3, n) of whole paths, from those of the straight last parts.
 
-    Parameters
-    ----------
-    row : (k,) int64
-        The vertices that have a path.
-    root : (n,) int64
-        The bend or the source where the last part begins; n and more for source points.
-    departure, back : (n,) float64
-        Polar angles of the last part, at the root and at the vertex.
-    scale : (n,) float64
-        Of polar angles over angles as turns count them.
+    `row` (k,) are the vertices that have a path, and `root` (n,) where its last part begins, n and more for source
+    points. Polar angles `departure` and `back` (n,) of that part are at the root and at the vertex; `scale` (n,) is
+    that of polar angles over angles as turns count them.
     """
     n = len(scale)
     has_path = np.zeros(n, bool)
@@ -372,21 +357,9 @@ class _Spokes(NamedTuple):
 def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
     """Vectors (n, 2) of the exact distance, in the direction in which the path to each vertex leaves the source.
 
-    For this, neither the polar angles of other vertices nor the history of the flips are needed.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Triangles.
-    source : int
-        A vertex.
-
-    Returns
-    -------
-    (n, 2) float64 or None
-        In the frame of the source; 0 at the source and where it does not reach. None if the faces are no oriented
-        manifold, if fewer than two edges of the mesh at the source are left in the Delaunay triangulation, or if the
-        distance contradicts itself.
+    They are in the frame of the source; 0 at the source and where it does not reach. Neither the polar angles of other
+    vertices nor the history of the flips are needed. None if the faces are no oriented manifold, if fewer than two
+    edges of the mesh at the source are left in the Delaunay triangulation, or if the distance contradicts itself.
     """
     given = _given_spokes(mesh, source)
     if given is None:

@@ -29,14 +29,7 @@ class Engine(ABC):
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) as the user counts them that it is measured from, -1 for none.
 
-        Parameters
-        ----------
-        sources : SourceSet
-            Where distance begins.
-        cutoff : float
-            A search may end there; what it has not found is ``inf``.
-        threads : int
-            That it may use.
+        A search may end at the cutoff, and what it has not found is ``inf``; it may use so many threads.
         """
 
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
@@ -83,17 +76,7 @@ class Triangles(ABC):
 
 
 class MeshTriangles(Triangles):
-    """The triangles of a mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Triangles.
-    margin : float, optional
-        Thinner ones are mollified, see `mollify`.
-    orients : bool
-        See `intrinsic_delaunay`.
-    """
+    """The triangles of a mesh; thin ones are mollified, see `mollify`. `orients`: see `intrinsic_delaunay`."""
 
     def __init__(self, mesh: Mesh, margin: float | None = MARGIN, *, orients: bool = True) -> None:
         self._mesh, self._margin, self._orients = mesh, margin, orients
@@ -121,18 +104,7 @@ class MeshTriangles(Triangles):
 
 
 class OperatorTriangles(Triangles):
-    """The triangles of a domain that has operators.
-
-    Parameters
-    ----------
-    domain : Operators
-        With a surface.
-
-    Raises
-    ------
-    ValueError
-        If it has none.
-    """
+    """The triangles of a domain that has operators; a ValueError if they have no surface."""
 
     def __init__(self, domain: Operators) -> None:
         surface = domain.surface
@@ -155,12 +127,7 @@ class OperatorTriangles(Triangles):
 class Query:
     """Sources whose offsets count from the earliest source of their component, since tolerances are relative.
 
-    Attributes
-    ----------
-    sources : SourceSet
-        With these offsets.
-    begin : (n,) float64 or None
-        The offset of the earliest source at each vertex; None if all are 0.
+    `begin` (n,) is the offset of that source at each vertex; None if all are 0.
     """
 
     sources: SourceSet
@@ -188,13 +155,7 @@ class Query:
 
 
 class TriangleEngine(Engine):
-    """An engine on triangles, with the exact surfaces that points and curves need.
-
-    Parameters
-    ----------
-    triangles : Triangles
-        The surface.
-    """
+    """An engine on triangles, with the exact surfaces that points and curves need."""
 
     def __init__(self, triangles: Triangles) -> None:
         self._triangles = triangles
@@ -270,10 +231,7 @@ class WindowEngine(TriangleEngine):
     def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
         """Distance (n,), labels (n,), and of each path the directions and the place at which it starts; all exact.
 
-        Raises
-        ------
-        MeshError
-            If vertices have no tangent plane, see `polar_angles`.
+        A MeshError if vertices have no tangent plane, see `polar_angles`.
         """
         query = Query.of(sources, self._triangles)
         directions = self._curve_directions if len(sources.segments.faces) else self._directions

@@ -33,20 +33,11 @@ _NO_VERTICES = np.empty(0, np.int64)
 
 
 class Starts(NamedTuple):
-    """k vertices, p points and q segments that distance starts from.
+    """k vertices, p points and q segments that distance starts from, each with the offset at which it does.
 
-    Attributes
-    ----------
-    vertices, offset : (k,)
-        Vertices, and when each starts.
-    points, point_offset : (p,)
-        Points inside faces; ends of segments are among them.
-    segments, segment_offset : (q,)
-        Segments inside faces.
-    place : (p + q + 1,) int64
-        The number of each point and segment, counted as the caller does: points, then segments; then -1 for nothing.
-    label : (k + p + q + 1,) int64
-        The same after those of the vertices.
+    Points and segments are inside faces, and ends of segments are among the points. `place` (p + q + 1,) is the number
+    of each point and segment, counted as the caller does: points, then segments; then -1 for nothing. `label` has the
+    same after those of the vertices.
     """
 
     vertices: AnyArray
@@ -118,18 +109,10 @@ class Found(NamedTuple):
 
 
 class Targets(NamedTuple):
-    """Points whose distance is asked for.
+    """Points whose distance is asked for: t places in the triangles, with the results there.
 
-    Attributes
-    ----------
-    place : Located
-        t places in the triangles, in contiguous arrays.
-    first, following : (m,), (t,) int32
-        The first place in each triangle, and the next place in the same triangle; -1 for none.
-    largest_circle : float
-        Diameter of the largest circle around a triangle with a place.
-    found : Found
-        At each place.
+    `first` (m,) is the first place in each triangle and `following` (t,) the next in the same one, -1 for none;
+    `largest_circle` is the diameter of the largest circle around a triangle with a place.
     """
 
     place: Located
@@ -155,21 +138,7 @@ class Leaving(NamedTuple):
 
 
 class Searched(NamedTuple):
-    """A search that is done.
-
-    Attributes
-    ----------
-    starts : Starts
-        The sources.
-    found : Found
-        At the vertices.
-    targets : Targets
-        The target points with their results.
-    n_windows : int
-        As in `ExactSolution`.
-    leaving : Leaving or None
-        At the vertices, if asked for.
-    """
+    """A search that is done: results at the vertices and at target points, and how paths leave if asked for."""
 
     starts: Starts
     found: Found
@@ -247,22 +216,11 @@ class ExactSolution:
 
 
 class ExactSurface:
-    """Exact distance on one triangulated surface, for any number of queries.
+    """Exact distance on one triangulated surface, for any number of queries; fastest on an intrinsic Delaunay one.
 
-    Parameters
-    ----------
-    triangulation : IntrinsicTriangulation or Tables
-        m triangles on n vertices; of an intrinsic Delaunay one fewest edges are crossed.
-
-    Raises
-    ------
-    MeshError
-        If there are too many triangles for 32-bit indices.
-
-    Notes
-    -----
     Boundaries, holes, edges of more than two faces, surfaces that cannot be oriented, vertices whose faces are several
     fans, and components are all allowed. Immutable; threads may share it, and a query releases the interpreter's lock.
+    A MeshError if there are too many triangles for 32-bit indices.
     """
 
     def __init__(self, triangulation: IntrinsicTriangulation | Tables) -> None:
@@ -381,30 +339,11 @@ class ExactSurface:
 
 
 def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, cutoff: float = np.inf) -> FloatArray:
-    """Exact geodesic distance on a polyhedral surface, in one call.
+    """Exact geodesic distance (n,) on triangles F (m, 3) with positions V (n, 3), in one call.
 
-    Parameters
-    ----------
-    V : (n, 3) array_like
-        Vertex positions.
-    F : (m, 3) array_like
-        Triangles.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
-    cutoff : float
-        What is farther is ``inf``, and the search ends there.
-
-    Returns
-    -------
-    (n,) float64
-        In the unit of V: 0 at the sources, ``inf`` at vertices that no source reaches.
-
-    Raises
-    ------
-    MeshError
-        If the mesh cannot be used, or is tetrahedral.
-    SourceError
-        If `sources` does not name vertices.
+    `sources` are a vertex, a sequence of them or a mask (n,) of bool. What is farther than `cutoff` is ``inf``, as are
+    vertices that no source reaches. A MeshError if the mesh cannot be used or is tetrahedral, and a SourceError if
+    `sources` does not name vertices.
     """
     mesh = Mesh(V, F)
     if mesh.is_tetrahedral:

@@ -40,22 +40,12 @@ _FEW = 32
 
 
 class Invariants:
-    """Bounds of a distance on triangles or tetrahedra that are known by the positions of their vertices.
+    """Bounds of a distance on triangles or tetrahedra F that are known by the positions V (n, 3) of their vertices.
 
     An answer keeps four of them: it is 0 (or the offset) at the sources, finite exactly on their components, differs
     along an edge by no more than the length of the edge, and is nowhere below the straight line to the nearest source.
-
-    Parameters
-    ----------
-    F : (m, 3) or (m, 4) int64
-        Triangles or tetrahedra, to which points and curves refer.
-    components : (n,) int64
-        Component label of each vertex.
-    V : (n, 3) float64, optional
-        Positions of the vertices.
-    lengths : (m, 3) float64, optional
-        Lengths of the sides of triangles, each opposite its corner, in place of positions; there are no straight lines
-        then.
+    In place of positions, triangles may have `lengths` (m, 3) of the sides opposite the corners; there are no lines
+    then.
     """
 
     def __init__(
@@ -73,18 +63,9 @@ class Invariants:
         cutoff: float = np.inf,
         than: FloatArray | None = None,
     ) -> str | None:
-        """How an answer contradicts the bounds, and where; None if it does not.
+        """How an answer (n,) contradicts the bounds, and where; None if it does not.
 
-        Parameters
-        ----------
-        distance : (n,) float64
-            The answer.
-        sources : SourceSet
-            What it is measured from.
-        cutoff : float
-            Beyond it distances may be ``inf``.
-        than : (n,) float64, optional
-            Distances from other sources; where these are not farther the answer may be ``inf``.
+        Beyond the cutoff distances may be ``inf``, and also where those `than` (n,) from other sources are not farther.
         """
         distance = np.ascontiguousarray(distance, np.float64)
         nearest = distance if than is None else np.minimum(distance, than)
@@ -182,24 +163,8 @@ def contradicted(problem: str) -> RuntimeError:
 class GuardedEngine(Engine):
     """Windows with a check of every answer. A contradiction never leaves it.
 
-    Parameters
-    ----------
-    windows : WindowEngine
-        Asked first.
-    invariants : Invariants
-        What its answers keep.
-    others : sequence of callables
-        Engines to ask instead, each made when it is needed.
-
-    Raises
-    ------
-    RuntimeError
-        On a query, if the answers of all engines contradict the invariants.
-
-    Warns
-    -----
-    AccuracyWarning
-        On a query that another engine answered.
+    Where an answer contradicts the invariants, `others` are asked instead, each made when it is needed, with an
+    `AccuracyWarning`; a RuntimeError if all contradict them.
     """
 
     def __init__(self, windows: WindowEngine, invariants: Invariants, others: tuple[Callable[[], Engine], ...]) -> None:
@@ -291,13 +256,7 @@ def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:
 
 
 class Bounds:
-    """The two bounds on a surface that take no search.
-
-    Parameters
-    ----------
-    surface : Surface
-        The triangles: along the edges of all of them there are paths.
-    """
+    """The two bounds on a surface that take no search: along the edges of all of its triangles there are paths."""
 
     def __init__(self, surface: Surface) -> None:
         self._surface = surface

@@ -92,17 +92,8 @@ def blocks_within(
 ) -> Iterator[sp.csr_array]:
     """The rows of `distances_within`, some after the other, so that not all need fit into memory.
 
-    Parameters
-    ----------
-    mesh, radius, sources
-        As for `distances_within`.
-    most_entries : int
-        About so many distances are in memory at a time: the first block has few rows, and says how many the next has.
-
-    Yields
-    ------
-    scipy.sparse.csr_array
-        Shape (rows, n).
+    About `most_entries` distances are in memory at a time: the first block has few rows, and says how many the next
+    has.
     """
     limit = positive("radius", radius, infinite=True)
     triangles, part = _triangles(mesh)

@@ -127,13 +127,7 @@ class Tables:
         return np.asarray(np.where(half_edge >= 0, old, -1))
 
     def located(self, points: SurfacePoints | SourcePoints | None) -> Located:
-        """Points of the mesh in the triangles.
-
-        Raises
-        ------
-        ValueError
-            If the tables come from `from_mesh`, which keeps no history of its flips.
-        """
+        """Points of the mesh in the triangles; a ValueError if the tables keep no history, as those of `from_mesh`."""
         if points is None or not len(points.faces):
             return NO_POINTS
         if self._triangulation is None:
@@ -145,10 +139,7 @@ class Tables:
     def located_segments(self, segments: SourceSegments) -> Located:
         """Segments in the triangles: as `located`, with coordinates (q, 2, 3) of both ends.
 
-        Raises
-        ------
-        ValueError
-            If the triangles are not those that the segments were given in.
+        A ValueError if the triangles are not those that the segments were given in.
         """
         if not len(segments.faces):
             return NO_SEGMENTS
@@ -214,13 +205,7 @@ class Tables:
 
 
 def from_triangulation(triangulation: IntrinsicTriangulation) -> Tables:
-    """The tables of a triangulation.
-
-    Raises
-    ------
-    MeshError
-        If there are too many triangles for 32-bit indices.
-    """
+    """The tables of a triangulation; a MeshError if there are too many triangles for 32-bit indices."""
     # Windows would go on in every copy of a face, and multiply.
     once, kept = each_face_once(triangulation)
     edges, number, face = HalfEdges.of(once).numbered(once.n)
