@@ -100,8 +100,18 @@ def test_no_vertex_stays_below_those_it_has_its_distance_from():
     """First order may be shorter than second: such vertices kept it, and those behind them were 2.9 % too short."""
     mesh, g, exact = growing_speed(16, 6.0)
     found = solver(mesh, g).distance(0)
-    assert (found >= 0.999 * exact).all()
-    assert np.abs(found - exact).mean() < 0.001 * exact.mean()
+    assert (found >= 0.996 * exact).all()
+    assert np.abs(found - exact).mean() < 0.0002 * exact.mean()
+
+
+@pytest.mark.filterwarnings("ignore:the metric grows faster")
+def test_paths_bend_within_the_simplices_of_the_source():
+    """The speed grows by 2.6 along the first edge; with T linear on edges to the source, up to 10 % were missing."""
+    mesh, g, exact = growing_speed(12, 20.0)
+    found = solver(mesh, g).distance(0)
+    beside = np.unique(mesh.F[(mesh.F == 0).any(axis=1)])
+    assert found[beside] == pytest.approx(exact[beside], rel=1e-9)
+    assert found[1:] == pytest.approx(exact[1:], rel=0.02)
 
 
 def test_a_speed_that_the_mesh_does_not_resolve_gives_a_warning():

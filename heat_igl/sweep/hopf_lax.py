@@ -37,15 +37,15 @@ class HopfLaxEngine(SimplexEngine):
     def __init__(self, simplices: MetricSimplices) -> None:
         super().__init__(simplices)
         place, (squares, mean, _, slack) = np.ascontiguousarray(simplices.place), simplices.measured
-        widest, gradient = measured(self._corners, place, squares, mean)
-        self._in_metric = (squares, simplices.velocity, mean, widest, slack, gradient, place)
-        turning, growth = self.resolution
+        widest, growth, gradient = measured(self._corners, place, squares, mean, simplices.velocity)
+        self._in_metric = (squares, simplices.velocity, mean, widest, slack, growth, gradient, place)
+        turning, growing = self.resolution
         if turning > MOST_TURNING:
             how, what = "turns farther", "the ratio of its lengths in two directions changes"
             much = f"by a factor of {turning:.2g} or more at a tenth of the faces"
-        elif growth > MOST_GROWTH:
+        elif growing > MOST_GROWTH:
             how, what = "grows faster", "its lengths change"
-            much = f"by a factor of {growth:.2g} or more at one of fifty faces"
+            much = f"by a factor of {growing:.2g} or more at one of fifty faces"
         else:
             return
         warn_caller(

@@ -137,12 +137,21 @@ class _FacetUpdate:
         w = np.einsum("kab,kjb,kj->ka", middle, e, x)
         near = np.sqrt((w**2).sum(axis=1))
         u = np.einsum("kab,kb->ka", middle, w) / near[:, None]
-        growth = 2 / 3 + (one + two) ** 2 / (12 * one * two)
-        longer, by = (near * (two**2 - one**2) / (12 * one * two))[:, None], np.einsum("ka,kjab,kb->kj", u, W, w) / 2
+        # The gradient of the mean velocity, in the metric of the centre.
+        centre = W.mean(axis=1)
+        steep = np.einsum("kab,kbc,kc->ka", centre, np.linalg.inv(e), mean[:, 1:] - mean[:, :1])
+        root, growth = np.sqrt(one * two), np.sqrt((steep**2).sum(axis=1)) / mean.mean(axis=1)
+        even = near * (one + two) / (2 * root)
+        half = growth * even / 2
+        is_even = np.abs(half) < _ROUNDING
+        length = even * np.where(is_even, 1 - half**2 / 6, np.arcsinh(half) / np.where(is_even, 1, half))
+        bent = 1 / np.sqrt(1 + half**2)
+        factor, longer = bent * (one + two) / (2 * root), bent * near * (two - one) / (4 * root)
+        by = np.einsum("ka,kjab,kb->kj", u, W, w) / 2
         along = np.einsum("ka,kja->kj", u, e)
-        g = growth[:, None] * (along - by[:, 1:]) + longer * mean[:, 1:] / two[:, None]
-        lean = growth[:, None] * (by[:, :1] - along - by[:, 1:]) - longer * (mean[:, 1:] / one[:, None] - 1)
-        return T, near * growth, to_T + g, lean
+        g = factor[:, None] * (along - by[:, 1:]) + (longer / two)[:, None] * mean[:, 1:]
+        lean = factor[:, None] * (by[:, :1] - along - by[:, 1:]) - longer[:, None] * (mean[:, 1:] / one[:, None] - 1)
+        return T, length, to_T + g, lean
 
     def _velocity(self, at: _Inputs, e: AnyArray) -> tuple[AnyArray, AnyArray]:
         """The inverse roots (k, q, p, p) of tensors, and vectors e (k, p, p), in the planes of triangles."""

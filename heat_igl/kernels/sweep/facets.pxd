@@ -39,10 +39,6 @@ cdef inline double mean_velocity(const double* W, int p) noexcept nogil:
     return (W[0] + W[3] + W[5] - (3 - p)) / p
 
 
-cdef inline double simpson(double a, double b) noexcept nogil:
-    # By how much longer a line takes at velocities that grow from a to b than at the one in the middle.
-    return 2.0 / 3.0 + (a + b) * (a + b) / (12.0 * a * b)
-
 
 cdef class Facet:
     cdef int p, q
@@ -57,8 +53,10 @@ cdef class Facet:
     cdef double E[3][3]
     cdef double W[4][6]
     cdef double s[4]
+    # The length of the gradient of the mean velocity, in the metric of the centre.
+    cdef double growth
     # Of the last value.
-    cdef double T, near, sx, factor, factor_1
+    cdef double T, near, sx, even, bent, factor, factor_1
     cdef double rise[3]
     cdef double own[3]
     cdef double w[3]

@@ -49,6 +49,7 @@ cdef class HopfLax(Facet):
     cdef double[:, ::1] place
     cdef double[::1] widest
     cdef double[::1] slack
+    cdef double[::1] growths
     # The corners of the facet in the simplex, and distance at these.
     cdef int side[3]
     cdef double level[3]

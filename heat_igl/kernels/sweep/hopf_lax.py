@@ -108,21 +108,26 @@ def measured(
     V: cython.const[cython.double][:, ::1],
     squares: cython.const[cython.double][:, :, ::1],
     mean: cython.const[cython.double][:, ::1],
+    velocity,
 ):
-    """What `HopfLax` takes of simplices beside their lengths.
+    """What `HopfLax` takes of simplices beside their lengths; velocity may be None.
 
     Returns
     -------
-    widest, gradient
+    widest, growth, gradient
         As there.
     """
     size: cython.int = corners.shape[1]
     m = corners.shape[0]
-    widths, gradients = np.zeros(m), np.zeros((m, size, 3))
+    widths, growths, gradients = np.zeros(m), np.zeros(m), np.zeros((m, size, 3))
     widest: cython.double[::1] = widths
+    growth: cython.double[::1] = growths
     gradient: cython.double[:, :, ::1] = gradients
     e: cython.double[3][3]
     P: cython.double[3][3]
+    W: cython.double[6]
+    at_corners: cython.const[cython.double][:, :, ::1] = velocity
+    is_linear: cython.bint = velocity is not None
     with cython.nogil:
         for s in range(corners.shape[0]):
             for k in range(squares.shape[1]):
@@ -150,7 +155,20 @@ def measured(
                     # A triangle without area has no gradient.
                     gradient[s, i, x] = gradient[s, i, x] / volume if volume != 0.0 else 0.0
                     gradient[s, 0, x] -= gradient[s, i, x]
-    return widths, gradients
+            if is_linear:
+                for k in range(6):
+                    W[k] = 0.0
+                for x in range(3):
+                    e[0][x] = 0.0
+                for i in range(size):
+                    for k in range(6):
+                        W[k] += at_corners[s, i, k] / size
+                    for x in range(3):
+                        e[0][x] += gradient[s, i, x] * mean_velocity(cython.address(at_corners[s, i, 0]), size - 1)
+                multiply(W, e[0], e[1])
+                growth[s] = sqrt(e[1][0] * e[1][0] + e[1][1] * e[1][1] + e[1][2] * e[1][2])
+                growth[s] /= mean_velocity(W, size - 1)
+    return widths, growths, gradients
 
 
 @cython.cfunc
@@ -184,16 +202,18 @@ class HopfLax(Facet):
         Squared distances in one metric for each simplex, in which T is found that is linear.
     widest, slack : (m,) float64
         The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
+    growth : (m,) float64
+        If q > 1, the length of the gradient of the mean velocity, in the metric of the centre.
     gradient : (m, p + 1, 3) float64
         Of the barycentric coordinates of each simplex.
     V : (n, 3) float64
         Positions.
     """
 
-    def __init__(self, corners, first, incident, squares, velocity, mean, widest, slack, gradient, V):
+    def __init__(self, corners, first, incident, squares, velocity, mean, widest, slack, growth, gradient, V):
         self.corners, self.first, self.incident, self.squares = corners, first, incident, squares
         self.velocity, self.mean, self.widest, self.slack = velocity, mean, widest, slack
-        self.gradient, self.V = gradient, V
+        self.growths, self.gradient, self.V = growth, gradient, V
         self.p, self.q = corners.shape[1] - 1, squares.shape[1]
         self.unit = sqrt(np.mean(widest))
 
@@ -571,6 +591,7 @@ class HopfLax(Facet):
                 between: cython.double = m[4 * i] + m[4 * j] - sq[_pair(self.side[i], self.side[j])]
                 m[3 * i + j] = m[3 * j + i] = 0.5 * between
         if self.q > 1:
+            self.growth = self.growths[s]
             for i in range(self.p + 1):
                 at = c if i == 0 else self.side[i - 1]
                 for k in range(6):
@@ -608,6 +629,9 @@ class HopfLax(Facet):
                 if not is_flat:
                     sag = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
                 self.sag[i][j] = self.sag[j][i] = sag
+        if is_source and self.q > 1:
+            # T is not linear on an edge to the source, and its square not quadratic.
+            return self.along_edges()
         best = self.newton(limit)
         if is_source:
             # Straight from the source, where the square of T may have no derivatives.
