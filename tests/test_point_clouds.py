@@ -25,7 +25,7 @@ from heat_igl.geodesic import SolverChoice
 from heat_igl.io import ply
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.local_fits import tangent_planes
-from heat_igl.mesh.cloud_orientation import oriented
+from heat_igl.mesh.cloud_orientation import is_oriented_manifold, oriented
 from heat_igl.mesh.cloud_triangles import (
     glued_sides,
     pinched_vertices,
@@ -629,6 +629,7 @@ def test_loops_of_outer_edges_are_filled_in_space(angle, width, n_loops):
     filled = with_loops_filled(P, F, np.full(len(P), 3.1 * spacing))
     assert heat_igl.Mesh(P, F).report().n_boundary_loops == 2
     assert heat_igl.Mesh(P, filled).report().n_boundary_loops == n_loops
+    assert is_oriented_manifold(heat_igl.Mesh(P, filled))
 
 
 def test_the_border_of_a_small_piece_is_no_gap():

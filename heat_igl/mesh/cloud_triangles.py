@@ -310,7 +310,8 @@ def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray) -> IntArray
     sides = outer_sides(F, n)
     if not len(sides):
         return F
-    ends = np.stack([F.ravel()[corner(sides, 1)], F.ravel()[corner(sides, 2)]], axis=1)
+    # Against the triangles there, so that those in the gap run like them.
+    ends = np.stack([F.ravel()[corner(sides, 2)], F.ravel()[corner(sides, 1)]], axis=1)
     is_outer = np.zeros(n, bool)
     is_outer[ends] = True
     edges = F[at_some_corner(is_outer, F)][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
