@@ -1,4 +1,4 @@
-"""What the tests share: meshes, and the scripts as modules.
+"""What the tests share: meshes, workers, and stores that a crash cuts off.
 
 Real meshes come from the pymeshlab wheel; all others are made by the shapes and the zoo of the package, from seeds.
 """
@@ -10,7 +10,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -46,14 +45,6 @@ def wheel_path(name: str) -> Path:
 def zoo(name: str) -> heat_igl.Mesh:
     """A shape of the zoo."""
     return next(shape.make() for shape in SHAPES if shape.name == name)
-
-
-def load_script(name: str) -> ModuleType:
-    """A script to be tested, as a module; it finds what it shares with others as ``python scripts/name.py`` does."""
-    folder = str(ROOT / "scripts")
-    if folder not in sys.path:
-        sys.path.append(folder)
-    return importlib.import_module(name)
 
 
 def perturbed(mesh: heat_igl.Mesh, amount: float = 0.15, seed: int = 0) -> heat_igl.Mesh:

@@ -18,28 +18,8 @@ PACKAGE = Path(heat_igl.__file__).parent
 ROOT = PACKAGE.parent
 
 EXTRAS = """
-colorspacious
-dask
-distributed
-ezdxf
-gdist
-jax
-matplotlib
-meshio
-nibabel
-numba
-polyscope
-potpourri3d
-psutil
-pygeodesic
-pymeshlab
-pytest
-rich
-selenium
-skfmm
-torch
-typer
-zarr
+colorspacious dask distributed ezdxf gdist jax matplotlib meshio nibabel numba polyscope potpourri3d
+psutil pygeodesic pymeshlab pytest rich selenium skfmm torch typer zarr
 """.split()
 
 

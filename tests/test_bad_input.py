@@ -25,7 +25,26 @@ from hypothesis import strategies as st
 from surfaces import moebius_strip, twice
 
 import heat_igl
-from heat_igl import AccuracyWarning, MeshError
+from heat_igl import (
+    AccuracyWarning,
+    GeodesicSolver,
+    HeatMethodSolver,
+    MeshError,
+    OffsetSources,
+    PolygonMesh,
+    SignedHeatSolver,
+    SurfaceCurve,
+    SurfacePoints,
+    curve_on,
+    edge_curve,
+    geodesic_distance,
+    geodesic_path,
+    karcher_mean,
+    shortest_paths,
+    straighten,
+    tangent_frames,
+    trace_geodesic,
+)
 from heat_igl.io.by_nibabel import FREESURFER_SUFFIXES
 from heat_igl.io.files import MESH_SUFFIXES
 
@@ -48,7 +67,7 @@ V4 = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 TRIANGLES = np.array([[0, 1, 2], [0, 1, 3]])
 TETRAHEDRA = np.array([[0, 1, 2, 3]])
 BALL = heat_igl.shapes.icosphere(1)
-SOLVER = heat_igl.HeatMethodSolver(BALL)
+SOLVER = HeatMethodSolver(BALL)
 
 
 def changed(array: np.ndarray, at: tuple[int, int], value: Any) -> np.ndarray:
@@ -116,7 +135,7 @@ def source_case(name: str, sources: Any, *patterns: str) -> Case:
 
     def run(_: Path) -> None:
         ways = (
-            lambda: heat_igl.geodesic_distance(BALL, sources, method="heat"),
+            lambda: geodesic_distance(BALL, sources, method="heat"),
             lambda: SOLVER.distance(sources),
             lambda: SOLVER.solve(sources),
             lambda: SOLVER.distances([0, sources]),
@@ -159,10 +178,10 @@ def argument_case(name: str, run: Callable[[heat_igl.Mesh], Any], *patterns: str
 def number_cases() -> Iterator[Case]:
     """Single numbers: other types, arrays, which are named by their shape, and numbers that make no sense."""
     ways: dict[str, Callable[[heat_igl.Mesh, Any], Any]] = {
-        "cutoff": lambda mesh, value: heat_igl.geodesic_distance(mesh, 0, cutoff=value),
-        "t": lambda mesh, value: heat_igl.HeatMethodSolver(mesh, t=value),
+        "cutoff": lambda mesh, value: geodesic_distance(mesh, 0, cutoff=value),
+        "t": lambda mesh, value: HeatMethodSolver(mesh, t=value),
         "radius": lambda mesh, value: heat_igl.distances_within(mesh, value),
-        "tolerance": lambda mesh, value: heat_igl.curve_on(mesh, mesh.V[mesh.F[0, :2]], tolerance=value),
+        "tolerance": lambda mesh, value: curve_on(mesh, mesh.V[mesh.F[0, :2]], tolerance=value),
     }
     for name, ask in ways.items():
         yield argument_case(f"{name}, neighbour", lambda mesh, ask=ask: ask(mesh, 1.0))
@@ -174,10 +193,10 @@ def number_cases() -> Iterator[Case]:
 
 def choice_cases() -> Iterator[Case]:
     ways: dict[str, Callable[[heat_igl.Mesh, Any], Any]] = {
-        name: lambda mesh, value, name=name: heat_igl.HeatMethodSolver(mesh, **{name: value})
+        name: lambda mesh, value, name=name: HeatMethodSolver(mesh, **{name: value})
         for name in ("laplacian", "boundary", "magnitude", "backend")
     }
-    ways["method"] = lambda mesh, value: heat_igl.geodesic_distance(mesh, 0, method=value)
+    ways["method"] = lambda mesh, value: geodesic_distance(mesh, 0, method=value)
     for name, ask in ways.items():
         for bad in ("guess", 1, np.ones(50), ["windows"]):
             refused = f"{name} must be one of .*, not "
@@ -188,8 +207,8 @@ def array_type_cases() -> Iterator[Case]:
     """Three numbers of other types, which numpy would cast without asking."""
     ways: dict[str, Callable[[Any], Any]] = {
         "positions": lambda value: heat_igl.closest_points(heat_igl.shapes.icosphere(1), value),
-        "barycentric": lambda value: heat_igl.SurfacePoints([0], value),
-        "offsets": lambda value: heat_igl.OffsetSources([0, 1, 2], value),
+        "barycentric": lambda value: SurfacePoints([0], value),
+        "offsets": lambda value: OffsetSources([0, 1, 2], value),
         "spacing": lambda value: heat_igl.image_domain(np.ones((2, 2, 2), bool), value),
     }
     wrong = {
@@ -216,108 +235,99 @@ def argument_cases() -> Iterator[Case]:
         yield argument_case(f"{name}, neighbour", ask)
 
 
-def segments(faces: list[int], closed: bool = False) -> heat_igl.SurfaceCurve:
+def segments(faces: list[int], closed: bool = False) -> SurfaceCurve:
     """The first side of each of some faces."""
-    return heat_igl.SurfaceCurve(faces, [[1, 0, 0]] * len(faces), [[0, 1, 0]] * len(faces), closed)
+    return SurfaceCurve(faces, [[1, 0, 0]] * len(faces), [[0, 1, 0]] * len(faces), closed)
 
 
 RAGGED = [[1.0, 2.0], [3.0]]
-CURVE = heat_igl.SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0], [0.2, 0.2, 0.6]])
+CURVE = SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0], [0.2, 0.2, 0.6]])
 CENTRE = [[1 / 3] * 3]
 GRID = heat_igl.shapes.grid(4)
 TRIANGLE, SQUARE = [[0, 1, 2]], V4[[0, 1, 3, 2]]
-BY_LENGTHS = heat_igl.GeodesicSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]])
+BY_LENGTHS = GeodesicSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]])
 SPHERE, BOX, BOOK = heat_igl.shapes.icosphere(4), heat_igl.shapes.box(1), heat_igl.shapes.book(3, 2)
 TWISTED, TWO = moebius_strip(8, 1), twice(BALL)
 TURNED = heat_igl.Mesh(GRID.V, np.where(np.arange(32)[:, None] == 5, GRID.F[:, ::-1], GRID.F))
 LOOSE = heat_igl.Mesh([*GRID.V, [5, 5, 5]], GRID.F)
 VECTORS = heat_igl.VectorHeatSolver(BALL)
 WEST, SOLID = GRID.V[:, 0] < 0.6, np.ones((2, 2, 2), bool)
-AT, INSIDE = [[1, 0, 0]], heat_igl.SurfacePoints([7], [[0.2, 0.3, 0.5]])
-PULL_BACK, CLOUD = heat_igl.GeodesicSolver(BALL).distance_vjp(INSIDE)[1], heat_igl.PointCloud(BALL.V)
+AT, INSIDE = [[1, 0, 0]], SurfacePoints([7], [[0.2, 0.3, 0.5]])
+PULL_BACK, CLOUD = GeodesicSolver(BALL).distance_vjp(INSIDE)[1], heat_igl.PointCloud(BALL.V)
 HIDDEN = np.ma.masked_array([1, 2], mask=[True, False])
 ERRORS = "ValueError|SourceError|MeshError|TypeError|ReferenceSolverError"
 # What is asked of a sphere of 42 vertices and 80 faces, and how it is refused.
 REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: heat_igl.closest_points(m, [[0, 0, 1], [0, 1e200, 0]]), r"positions\[1\] .* too far"),
-    (lambda m: heat_igl.trace_geodesic(m, 0, (1, 0), 1e300), r"length is too long: 1e\+300"),
+    (lambda m: trace_geodesic(m, 0, (1, 0), 1e300), r"length is too long: 1e\+300"),
     (lambda m: heat_igl.exp_map(m, 0, [[1, 0], [1e200, 0]]), r"vectors\[1\] is too long: 1e"),
     (lambda m: heat_igl.exp_map(m, 0, RAGGED), "^vectors must be real numbers.*, not "),
-    (lambda m: heat_igl.trace_geodesic(m, 0, RAGGED, 1.0), "^direction must be real numbers.*, not "),
+    (lambda m: trace_geodesic(m, 0, RAGGED, 1.0), "^direction must be real numbers.*, not "),
     (lambda m: heat_igl.isolines(m, RAGGED, [0.5]), "^values must be real numbers.*, not "),
-    (lambda m: heat_igl.HeatMethodSolver(m).distances([0], dtype="float16"), "dtype must be float64 or"),
-    (lambda m: heat_igl.HeatMethodSolver(m).distances([0], out=3), r"out must be an array .*, not "),
-    (lambda m: heat_igl.HeatMethodSolver(m).distances(3), "source_sets must be .*: try distance"),
+    (lambda m: HeatMethodSolver(m).distances([0], dtype="float16"), "dtype must be float64 or"),
+    (lambda m: HeatMethodSolver(m).distances([0], out=3), r"out must be an array .*, not "),
+    (lambda m: HeatMethodSolver(m).distances(3), "source_sets must be .*: try distance"),
     (lambda m: heat_igl.validate(m, 0, methods="heat"), "methods must be a sequence of methods"),
-    (lambda m: heat_igl.PolygonMesh(m.V, 3), "polygons must be .*, not "),
-    (lambda _: heat_igl.PolygonMesh(SQUARE, []), "polygons is empty"),
+    (lambda m: PolygonMesh(m.V, 3), "polygons must be .*, not "),
+    (lambda _: PolygonMesh(SQUARE, []), "polygons is empty"),
     (
-        lambda _: heat_igl.PolygonMesh(SQUARE, [[0, 1, 2, 3], [0, 1]]),
+        lambda _: PolygonMesh(SQUARE, [[0, 1, 2, 3], [0, 1]]),
         r"polygons\[1\] = \[0, 1\] needs three corners or more \(1 of 2",
     ),
-    (
-        lambda _: heat_igl.PolygonMesh(SQUARE, [[0, 1, 2, 4]]),
-        r"polygons\[0\] = \[0, 1, 2, 4\] holds 4, which is no vertex",
-    ),
-    (lambda _: heat_igl.PolygonMesh(SQUARE * 1e150, [[0, 1, 2, 3]]), "outside what areas in double precision allow"),
+    (lambda _: PolygonMesh(SQUARE, [[0, 1, 2, 4]]), r"polygons\[0\] = \[0, 1, 2, 4\] holds 4, which is no vertex"),
+    (lambda _: PolygonMesh(SQUARE * 1e150, [[0, 1, 2, 3]]), "outside what areas in double precision allow"),
     # Points and curves on faces.
-    (lambda _: heat_igl.SurfacePoints([0], [[0.5, 0.5, 0.1]]), r"barycentric\[0\] .* must sum to 1, not 1.1"),
-    (lambda _: heat_igl.SurfacePoints([0, 0], [[1, 0, 0], [0.5, 0.7, -0.2]]), r"barycentric\[1\] .* not negative"),
-    (lambda _: heat_igl.SurfacePoints([0], [[np.nan, 0.5, 0.5]]), r"barycentric\[0\] .* finite"),
-    (lambda _: heat_igl.SurfacePoints([0], [[1, 0]]), r"barycentric must have shape \(1, 3\)"),
-    (lambda _: heat_igl.SurfacePoints([0.5], [[1, 0, 0]]), "faces must be one face index or more, not float64"),
-    (lambda _: heat_igl.SurfacePoints([], np.zeros((0, 3))), "faces must be one face index"),
-    (lambda _: heat_igl.SurfacePoints([0], "x"), "barycentric must be real numbers"),
+    (lambda _: SurfacePoints([0], [[0.5, 0.5, 0.1]]), r"barycentric\[0\] .* must sum to 1, not 1.1"),
+    (lambda _: SurfacePoints([0, 0], [[1, 0, 0], [0.5, 0.7, -0.2]]), r"barycentric\[1\] .* not negative"),
+    (lambda _: SurfacePoints([0], [[np.nan, 0.5, 0.5]]), r"barycentric\[0\] .* finite"),
+    (lambda _: SurfacePoints([0], [[1, 0]]), r"barycentric must have shape \(1, 3\)"),
+    (lambda _: SurfacePoints([0.5], [[1, 0, 0]]), "faces must be one face index or more, not float64"),
+    (lambda _: SurfacePoints([], np.zeros((0, 3))), "faces must be one face index"),
+    (lambda _: SurfacePoints([0], "x"), "barycentric must be real numbers"),
     (
-        lambda m: heat_igl.SurfacePoints([0, 80], CENTRE * 2).positions(m),
+        lambda m: SurfacePoints([0, 80], CENTRE * 2).positions(m),
         r"^faces\[1\] = 80 is no face: indices run from 0 to 79",
     ),
-    (lambda _: heat_igl.curve_on(GRID, [[0, 0, 0]]), "two corners of a curve or more, not 1"),
+    (lambda _: curve_on(GRID, [[0, 0, 0]]), "two corners of a curve or more, not 1"),
     (
-        lambda _: heat_igl.curve_on(GRID, np.ones((2, 4))),
+        lambda _: curve_on(GRID, np.ones((2, 4))),
         r"positions must have shape \(k, 3\), a row for each, or .*, not \(2, 4\)",
     ),
+    (lambda _: curve_on(GRID, [[0, 0, 0], [1, np.nan, 0]]), r"positions\[1\] = \[1.0, nan, 0.0\] is not finite"),
+    (lambda _: curve_on(GRID, [["a", 0, 0], [1, 0, 0]]), "positions must be real numbers"),
+    (lambda _: curve_on(GRID, [[0.5, 0.5, 0], [0.5, 0.5, 0]]), "all in one place"),
     (
-        lambda _: heat_igl.curve_on(GRID, [[0, 0, 0], [1, np.nan, 0]]),
-        r"positions\[1\] = \[1.0, nan, 0.0\] is not finite",
-    ),
-    (lambda _: heat_igl.curve_on(GRID, [["a", 0, 0], [1, 0, 0]]), "positions must be real numbers"),
-    (lambda _: heat_igl.curve_on(GRID, [[0.5, 0.5, 0], [0.5, 0.5, 0]]), "all in one place"),
-    (
-        lambda _: heat_igl.curve_on(GRID, [[0.5, 0.5, 0], [0.5, 0.5, 2]]),
+        lambda _: curve_on(GRID, [[0.5, 0.5, 0], [0.5, 0.5, 2]]),
         r"leaves the surface by .* on the line from positions\[0\].*tolerance is",
     ),
-    (
-        lambda _: heat_igl.curve_on(GRID, [[0, 0, 0], [1, 0, 0], [1.2, 0.4, 0]], tolerance=0.1),
-        r"line from positions\[1\]",
-    ),
-    (lambda m: heat_igl.edge_curve(m, RAGGED), "^vertices must be an array, but rows"),
-    (lambda _: heat_igl.edge_curve(GRID, [0, 1, 3]), r"vertices\[1\] = 1 and the next, 3, are not joined by an edge"),
-    (lambda _: heat_igl.edge_curve(GRID, [0]), "vertices must be two vertex indices or more"),
-    (lambda _: heat_igl.edge_curve(GRID, [0, 99]), r"vertices\[0\] = 0 and the next, 99, are not"),
-    (lambda _: heat_igl.edge_curve(GRID, [0.0, 1.0]), "vertices must be two vertex indices or more, not float64"),
+    (lambda _: curve_on(GRID, [[0, 0, 0], [1, 0, 0], [1.2, 0.4, 0]], tolerance=0.1), r"line from positions\[1\]"),
+    (lambda m: edge_curve(m, RAGGED), "^vertices must be an array, but rows"),
+    (lambda _: edge_curve(GRID, [0, 1, 3]), r"vertices\[1\] = 1 and the next, 3, are not joined by an edge"),
+    (lambda _: edge_curve(GRID, [0]), "vertices must be two vertex indices or more"),
+    (lambda _: edge_curve(GRID, [0, 99]), r"vertices\[0\] = 0 and the next, 99, are not"),
+    (lambda _: edge_curve(GRID, [0.0, 1.0]), "vertices must be two vertex indices or more, not float64"),
     # Sources in faces, and with offsets.
-    (lambda _: heat_igl.OffsetSources([0, 1], [0.0, -1.0]), r"offsets\[1\] = -1.0 must be finite and not negative"),
-    (lambda _: heat_igl.OffsetSources([0, 1], [np.nan, 0.0]), r"offsets\[0\] = nan must be finite"),
-    (lambda _: heat_igl.OffsetSources([0, 1], np.inf), "offsets = inf must be finite"),
-    (lambda _: heat_igl.OffsetSources([0, 1], [[0.0, 1.0]]), r"one number or one for each .*, not of shape \(1, 2\)"),
-    (lambda _: heat_igl.OffsetSources([0, 1], "near"), "offsets must be real numbers, not 'near'"),
+    (lambda _: OffsetSources([0, 1], [0.0, -1.0]), r"offsets\[1\] = -1.0 must be finite and not negative"),
+    (lambda _: OffsetSources([0, 1], [np.nan, 0.0]), r"offsets\[0\] = nan must be finite"),
+    (lambda _: OffsetSources([0, 1], np.inf), "offsets = inf must be finite"),
+    (lambda _: OffsetSources([0, 1], [[0.0, 1.0]]), r"one number or one for each .*, not of shape \(1, 2\)"),
+    (lambda _: OffsetSources([0, 1], "near"), "offsets must be real numbers, not 'near'"),
     *(
-        (lambda m, sources=sources: heat_igl.geodesic_distance(m, sources), pattern)
+        (lambda m, sources=sources: geodesic_distance(m, sources), pattern)
         for sources, pattern in (
-            (heat_igl.OffsetSources([0, 1], [0.0, 1.0, 2.0]), "offsets has 3 entries for 2 sources: give one for each"),
-            (heat_igl.OffsetSources([CURVE, 0], [1.0]), "offsets has 1 entries for 2 sources"),
-            (heat_igl.SurfacePoints([0, 83], CENTRE * 2), r"^faces\[1\] = 83 is no face: indices run from 0 to 79"),
-            (heat_igl.SurfaceCurve([-1], [[1, 0, 0]], [[0, 1, 0]]), r"^faces\[0\] = -1 is no face"),
+            (OffsetSources([0, 1], [0.0, 1.0, 2.0]), "offsets has 3 entries for 2 sources: give one for each"),
+            (OffsetSources([CURVE, 0], [1.0]), "offsets has 1 entries for 2 sources"),
+            (SurfacePoints([0, 83], CENTRE * 2), r"^faces\[1\] = 83 is no face: indices run from 0 to 79"),
+            (SurfaceCurve([-1], [[1, 0, 0]], [[0, 1, 0]]), r"^faces\[0\] = -1 is no face"),
             ([CURVE, 42], r"sources\[1\]: sources\[0\] = 42 is no vertex"),
-            ([3, heat_igl.SurfacePoints([99], CENTRE)], r"sources\[1\]: faces\[0\] = 99 is no face"),
+            ([3, SurfacePoints([99], CENTRE)], r"sources\[1\]: faces\[0\] = 99 is no face"),
             ([CURVE, None], r"sources\[1\]: sources must be a vertex index"),
             ([CURVE, []], r"sources\[1\]: sources is empty"),
         )
     ),
     # Edge lengths and gluing.
     *(
-        (lambda _, given=given: heat_igl.HeatMethodSolver.from_edge_lengths(TRIANGLE, given), pattern)
+        (lambda _, given=given: HeatMethodSolver.from_edge_lengths(TRIANGLE, given), pattern)
         for given, pattern in (
             ([[1.0, 1.0]], r"one length per side of F, .* shape \(1, 2\)"),
             ([[1.0, np.nan, 1.0]], r"l\[0, 1\] = nan is not a length"),
@@ -326,7 +336,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     ),
     *(
         (
-            lambda _, twin=twin: heat_igl.HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=twin),
+            lambda _, twin=twin: HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=twin),
             pattern,
         )
         for twin, pattern in (
@@ -335,55 +345,49 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
             ([[1, 0, -1]], r"twin\[0, 0\] = 1 is no half-edge that ends at the same vertices"),
         )
     ),
-    (
-        lambda _: heat_igl.HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]], laplacian="graph"),
-        "laplacian must be",
-    ),
+    (lambda _: HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]], laplacian="graph"), "laplacian must be"),
     # Tangent vectors.
     (
-        lambda m: heat_igl.tangent_frames(m).to_world(np.ones((3, 2))),
+        lambda m: tangent_frames(m).to_world(np.ones((3, 2))),
         r"vectors must have shape \(42, 2\), but it has shape \(3, 2\)",
     ),
-    (
-        lambda m: heat_igl.tangent_frames(m).to_world([[0, 0], [np.nan, 0]], [0, 1]),
-        r"vectors\[1\] = \[nan, 0.0\] is not finite",
-    ),
-    (lambda m: heat_igl.tangent_frames(m).from_world(["a"], [0]), "vectors must be real numbers"),
-    (lambda _: heat_igl.tangent_frames(BOOK), "is one of more than two faces"),
-    (lambda _: heat_igl.tangent_frames(TWISTED), "has faces that are oriented differently"),
-    (lambda _: heat_igl.tangent_frames(BOX), "tetrahedral"),
+    (lambda m: tangent_frames(m).to_world([[0, 0], [np.nan, 0]], [0, 1]), r"vectors\[1\] = \[nan, 0.0\] is not finite"),
+    (lambda m: tangent_frames(m).from_world(["a"], [0]), "vectors must be real numbers"),
+    (lambda _: tangent_frames(BOOK), "is one of more than two faces"),
+    (lambda _: tangent_frames(TWISTED), "has faces that are oriented differently"),
+    (lambda _: tangent_frames(BOX), "tetrahedral"),
     (lambda _: VECTORS.transport([0, 1], np.ones((3, 2))), r"vectors must have shape \(2, 2\), but .* \(3, 2\)"),
     (lambda _: VECTORS.extend([0, 1], [1.0, np.nan]), r"values\[1\] = \[nan\] is not finite"),
     (lambda _: VECTORS.extend(0, [1.0, 2.0]), "values must be one number for each of the 1 sources"),
-    (lambda m: heat_igl.trace_geodesic(m, 3, [0, 0], 0.1), r"direction = \[0, 0\] is 0 in the tangent plane"),
-    (lambda m: heat_igl.trace_geodesic(m, 3, [1, 0], -1), "length must be a finite number of at least 0, not -1"),
-    (lambda m: heat_igl.trace_geodesic(m, 3, [1, 0], np.nan), "length must be .* not nan"),
+    (lambda m: trace_geodesic(m, 3, [0, 0], 0.1), r"direction = \[0, 0\] is 0 in the tangent plane"),
+    (lambda m: trace_geodesic(m, 3, [1, 0], -1), "length must be a finite number of at least 0, not -1"),
+    (lambda m: trace_geodesic(m, 3, [1, 0], np.nan), "length must be .* not nan"),
     # What a method or a domain does not give.
     *(
-        (lambda m, e=e: heat_igl.GeodesicSolver(m, tolerance=e), "tolerance must be at least 0 and less than 1, not")
+        (lambda m, e=e: GeodesicSolver(m, tolerance=e), "tolerance must be at least 0 and less than 1, not")
         for e in (-1e-9, 1, np.nan, "1e-5", True)
     ),
-    (lambda m: heat_igl.geodesic_distance(m, 0, tolerance=-1), "tolerance must be at least 0 and less than 1, not -1"),
-    (lambda m: heat_igl.HeatMethodSolver(m, t=1e300), r"t = 1e\+300 is too large: heat spreads over"),
-    (lambda m: heat_igl.HeatMethodSolver(m, t_coef=1e20), r"t_coef = 1e\+20 is too large: heat spreads over"),
-    (lambda _: heat_igl.geodesic_distance(SPHERE, 0, method="sweep", targets=INSIDE), "targets inside faces need"),
+    (lambda m: geodesic_distance(m, 0, tolerance=-1), "tolerance must be at least 0 and less than 1, not -1"),
+    (lambda m: HeatMethodSolver(m, t=1e300), r"t = 1e\+300 is too large: heat spreads over"),
+    (lambda m: HeatMethodSolver(m, t_coef=1e20), r"t_coef = 1e\+20 is too large: heat spreads over"),
+    (lambda _: geodesic_distance(SPHERE, 0, method="sweep", targets=INSIDE), "targets inside faces need"),
     (lambda _: BY_LENGTHS.directions(0), "directions need the positions of a mesh"),
-    (lambda _: heat_igl.GeodesicSolver(SPHERE, method="sweep").directions(0), "paths, which a sweep does not find"),
-    (lambda _: heat_igl.GeodesicSolver(BOX).directions(0), "directions follow paths on triangles that fit together"),
+    (lambda _: GeodesicSolver(SPHERE, method="sweep").directions(0), "paths, which a sweep does not find"),
+    (lambda _: GeodesicSolver(BOX).directions(0), "directions follow paths on triangles that fit together"),
     (lambda _: heat_igl.distances_within(BOX, 1.0), "exact distances need triangles"),
     (lambda _: heat_igl.log_maps_within(BOOK, 1), "more than two faces"),
-    (lambda _: heat_igl.shortest_paths(BOX, 1, 0), "paths need triangles"),
-    (lambda _: heat_igl.shortest_paths(LOOSE, 25, 0), r"targets\[0\] = 25 is a vertex that no face uses"),
-    (lambda _: heat_igl.shortest_paths(TWO, [1, 50], 0), r"from targets\[1\] no source can be reached \(1 of 2"),
-    (lambda _: heat_igl.karcher_mean(TWO, [0, 42], p=1), "points lie on different components"),
-    (lambda _: heat_igl.karcher_mean(TWO, [0, 42]), "points lie on different components"),
-    (lambda _: heat_igl.GeodesicSolver(GRID, region=WEST).distance([0, 4]), r"sources\[1\]: vertex 4 .* \(1 of 2 do\)"),
-    (lambda _: heat_igl.HeatMethodSolver(GRID, region=WEST).distance(4), r"sources\[0\]: vertex 4 lies outside"),
-    (lambda _: heat_igl.GeodesicSolver(GRID, region=WEST).distance(INSIDE), r"sources\[0\]: face 7 lies outside"),
-    (lambda _: heat_igl.SignedHeatSolver(TWISTED), "the surface cannot be oriented, as a Moebius strip cannot"),
-    (lambda _: heat_igl.SignedHeatSolver(TURNED), r"face \d+ and a neighbour are oriented differently.*bfs_orient"),
-    (lambda _: heat_igl.SignedHeatSolver(BOOK), r"more than two faces meet at .* \(\d+ edges.*cut\(mesh, curves\)"),
-    (lambda _: heat_igl.SignedHeatSolver(BOX), "the mesh is tetrahedral"),
+    (lambda _: shortest_paths(BOX, 1, 0), "paths need triangles"),
+    (lambda _: shortest_paths(LOOSE, 25, 0), r"targets\[0\] = 25 is a vertex that no face uses"),
+    (lambda _: shortest_paths(TWO, [1, 50], 0), r"from targets\[1\] no source can be reached \(1 of 2"),
+    (lambda _: karcher_mean(TWO, [0, 42], p=1), "points lie on different components"),
+    (lambda _: karcher_mean(TWO, [0, 42]), "points lie on different components"),
+    (lambda _: GeodesicSolver(GRID, region=WEST).distance([0, 4]), r"sources\[1\]: vertex 4 .* \(1 of 2 do\)"),
+    (lambda _: HeatMethodSolver(GRID, region=WEST).distance(4), r"sources\[0\]: vertex 4 lies outside"),
+    (lambda _: GeodesicSolver(GRID, region=WEST).distance(INSIDE), r"sources\[0\]: face 7 lies outside"),
+    (lambda _: SignedHeatSolver(TWISTED), "the surface cannot be oriented, as a Moebius strip cannot"),
+    (lambda _: SignedHeatSolver(TURNED), r"face \d+ and a neighbour are oriented differently.*bfs_orient"),
+    (lambda _: SignedHeatSolver(BOOK), r"more than two faces meet at .* \(\d+ edges.*cut\(mesh, curves\)"),
+    (lambda _: SignedHeatSolver(BOX), "the mesh is tetrahedral"),
     # Derivatives.
     *(
         (lambda _, g=g: PULL_BACK(g), pattern)
@@ -394,38 +398,38 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         )
     ),
     (lambda _: PULL_BACK.push_forward(np.ones(3)), r"dV must be \(42, 3\) finite numbers"),
-    (
-        lambda m: PULL_BACK.push_forward(m.V, [np.nan, 0, 0]),
-        r"points must be \(1, 3\) finite numbers, one velocity",
-    ),
+    (lambda m: PULL_BACK.push_forward(m.V, [np.nan, 0, 0]), r"points must be \(1, 3\) finite numbers, one velocity"),
     (lambda _: PULL_BACK.by_speed(np.ones(42)), "no metric to change: make it on speed_operators"),
     (lambda _: PULL_BACK.by_metric(np.ones(42)), "no metric to change: make it on metric_operators"),
-    (lambda m: heat_igl.GeodesicSolver(m).distance_vjp(CURVE), "a curve is among the sources: place points on it"),
-    (lambda _: heat_igl.GeodesicSolver(SPHERE, method="sweep").distance_vjp(0), "derivatives are those of paths"),
-    (lambda _: heat_igl.GeodesicSolver(CLOUD).distance_vjp(0), "derivatives need a surface of triangles"),
+    (lambda m: GeodesicSolver(m).distance_vjp(CURVE), "a curve is among the sources: place points on it"),
+    (lambda _: GeodesicSolver(SPHERE, method="sweep").distance_vjp(0), "derivatives are those of paths"),
+    (lambda _: GeodesicSolver(CLOUD).distance_vjp(0), "derivatives need a surface of triangles"),
     # Curves and waypoints.
-    (lambda m: heat_igl.SignedHeatSolver(m).distance([]), "curves is empty"),
-    (lambda m: heat_igl.SignedHeatSolver(m).distance(7), "curves must be a SurfaceCurve, OrientedPoints, a mask"),
-    (lambda m: heat_igl.SignedHeatSolver(m).distance([CURVE, 7]), r"curves\[1\] must be a SurfaceCurve"),
-    (lambda m: heat_igl.SignedHeatSolver(m).distance(CURVE, level="all"), "level must be one of 'zero', 'constant'"),
+    (lambda m: SignedHeatSolver(m).distance([]), "curves is empty"),
+    (lambda m: SignedHeatSolver(m).distance(7), "curves must be a SurfaceCurve, OrientedPoints, a mask"),
+    (lambda m: SignedHeatSolver(m).distance([CURVE, 7]), r"curves\[1\] must be a SurfaceCurve"),
+    (lambda m: SignedHeatSolver(m).distance(CURVE, level="all"), "level must be one of 'zero', 'constant'"),
     (lambda _: heat_igl.OrientedPoints(INSIDE, np.ones((2, 3))), r"normals must have shape \(1, 3\), not \(2, 3\)"),
     (lambda _: heat_igl.OrientedPoints(INSIDE, [[1, 0, 0, 0]]), r"shape \(k, 3\), .* or \(k, 2\) .*, not \(1, 4\)"),
-    (lambda m: heat_igl.straighten(m, segments([0, 40])), r"segment 0 ends in face 0 .* segment 1 starts in face 40"),
-    (lambda m: heat_igl.straighten(m, segments([0, 0])), r"segment 0 ends in face 0 .* segment 1 starts in face 0"),
-    (lambda m: heat_igl.straighten(m, segments([0], closed=True)), r"segment 0 ends .* and segment 0 starts"),
-    (lambda m: heat_igl.straighten(m, segments([80])), "indices run from 0"),
-    (lambda m: heat_igl.straighten(m, heat_igl.SurfaceCurve([0], AT, AT, is_closed=True)), "has no length"),
-    (lambda m: heat_igl.straighten(m, [0, 1, 2]), "must be a SurfaceCurve, not list"),
-    (lambda m: heat_igl.geodesic_path(m, [3]), "2 places or more for a path, not 1"),
-    (lambda m: heat_igl.geodesic_path(m, [3, 4], closed=True), "3 places or more for a loop, not 2"),
-    (lambda m: heat_igl.geodesic_path(m, [7, 7, 7], closed=True), "contracts to a point"),
-    (lambda m: heat_igl.geodesic_path(m, [3, 42]), r"waypoints\[1\] = 42 is no vertex"),
-    (lambda m: heat_igl.geodesic_path(m, [INSIDE, "x"]), r"waypoints\[1\] must be a vertex or SurfacePoints, not str"),
-    (lambda m: heat_igl.geodesic_path(m, [heat_igl.SurfacePoints([80], AT), 5]), r"waypoints\[0\]: faces\[0\] = 80"),
-    (lambda _: heat_igl.geodesic_path(TWO, [0, 5, 42]), r"waypoints\[1\] to waypoints\[2\]: .* different comp"),
+    (lambda m: straighten(m, segments([0, 40])), r"segment 0 ends in face 0 .* segment 1 starts in face 40"),
+    (lambda m: straighten(m, segments([0, 0])), r"segment 0 ends in face 0 .* segment 1 starts in face 0"),
+    (lambda m: straighten(m, segments([0], closed=True)), r"segment 0 ends .* and segment 0 starts"),
+    (lambda m: straighten(m, segments([80])), "indices run from 0"),
+    (lambda m: straighten(m, SurfaceCurve([0], AT, AT, is_closed=True)), "has no length"),
+    (lambda m: straighten(m, [0, 1, 2]), "must be a SurfaceCurve, not list"),
+    (lambda m: geodesic_path(m, [3]), "2 places or more for a path, not 1"),
+    (lambda m: geodesic_path(m, [3, 4], closed=True), "3 places or more for a loop, not 2"),
+    (lambda m: geodesic_path(m, [7, 7, 7], closed=True), "contracts to a point"),
+    (lambda m: geodesic_path(m, [3, 42]), r"waypoints\[1\] = 42 is no vertex"),
+    (lambda m: geodesic_path(m, [INSIDE, "x"]), r"waypoints\[1\] must be a vertex or SurfacePoints, not str"),
+    (lambda m: geodesic_path(m, [SurfacePoints([80], AT), 5]), r"waypoints\[0\]: faces\[0\] = 80"),
+    (lambda _: geodesic_path(TWO, [0, 5, 42]), r"waypoints\[1\] to waypoints\[2\]: .* different comp"),
     (lambda m: heat_igl.curve_through(m, [[0, 0, 1], [0, 0, 3.0]]), r"points\[1\] is \S+ away from .* \(1 of 2"),
     (lambda m: heat_igl.curve_through(m, [0, 1], closed=True), "points must be 3 places or more for a closed curve"),
     (lambda m: heat_igl.curve_through(m, [0, 99]), r"points\[1\] = 99 is no vertex"),
+    (lambda m: heat_igl.validate(m, 0, ["magic"]), "'magic' is unknown: choose from heat, sweep, meshlab"),
+    (lambda m: heat_igl.validate(m, 0, ["heat"], reference="magic"), "'magic' is unknown"),
+    (lambda m: heat_igl.validate(m, 0, []), "methods is empty: choose from heat, sweep"),
     # Values, labels and images.
     *(
         (lambda _, ask=ask, bad=bad: ask(GRID, bad, 0.5), said)
@@ -442,11 +446,11 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: heat_igl.parcel_distances(GRID, 1 - WEST, region=WEST), r"no vertex of parcel 1 lies in .* \(1 of 2"),
     (lambda m: heat_igl.geodesic_errors(m, [0, 1], [0]), "there are 2 matches and 1 entries of truth"),
     (lambda m: heat_igl.geodesic_errors(m, [0, 99], [0, 0]), r"matches\[1\] = 99 is no vertex"),
-    (lambda m: heat_igl.karcher_mean(m, [1, 2], [1, 2, 3]), r"weights must be 2 numbers, .* but the shape is \(3,\)"),
-    (lambda m: heat_igl.karcher_mean(m, [1, 2], [1, -1]), r"weights\[1\] = -1.0 must be finite and not negative"),
-    (lambda m: heat_igl.karcher_mean(m, [1, 2], [0, 0]), "weights are all 0"),
+    (lambda m: karcher_mean(m, [1, 2], [1, 2, 3]), r"weights must be 2 numbers, .* but the shape is \(3,\)"),
+    (lambda m: karcher_mean(m, [1, 2], [1, -1]), r"weights\[1\] = -1.0 must be finite and not negative"),
+    (lambda m: karcher_mean(m, [1, 2], [0, 0]), "weights are all 0"),
     *(
-        (lambda m, p=p: heat_igl.karcher_mean(m, [1, 2], p=p), "p must be a number from 1 to 64")
+        (lambda m, p=p: karcher_mean(m, [1, 2], p=p), "p must be a number from 1 to 64")
         for p in (0.5, 65, np.inf, np.nan, "2", True)
     ),
     *(
@@ -487,44 +491,41 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: heat_igl.validation.closed_forms.cone(m, 0, apex=(0, 0, 9)), "angle to the axis varies"),
     (lambda m: heat_igl.validation.closed_forms.convex_solid(m, 0), "holds no tetrahedra"),
     # Unknown arguments, and the argument that holds the offender.
-    (lambda m: heat_igl.geodesic_distance(m, 0, cut_off=1.0), r"geodesic_distance\(\) .* Did you mean 'cutoff'\?"),
-    (lambda m: heat_igl.geodesic_distance(m, source=0), r"'source'. Did you mean 'sources'\?"),
-    (lambda m: heat_igl.HeatMethodSolver(m, laplace=0), r"HeatMethodSolver.*'laplace'. Did you mean 'laplacian'\?"),
+    (lambda m: geodesic_distance(m, 0, cut_off=1.0), r"geodesic_distance\(\) .* Did you mean 'cutoff'\?"),
+    (lambda m: geodesic_distance(m, source=0), r"'source'. Did you mean 'sources'\?"),
+    (lambda m: HeatMethodSolver(m, laplace=0), r"HeatMethodSolver.*'laplace'. Did you mean 'laplacian'\?"),
     (lambda _: SOLVER.distances([[0]], radius=1.0), "It takes source_sets, out, progress, dtype, cutoff$"),
-    (lambda m: heat_igl.shortest_paths(m, target=3, sources=0), r"Did you mean 'targets'\?"),
-    (lambda m: heat_igl.geodesic_distance(m.V, m.F, 0), r"takes mesh, sources in .* \(method=.* one mesh, \(V, F\)$"),
+    (lambda m: shortest_paths(m, target=3, sources=0), r"Did you mean 'targets'\?"),
+    (lambda m: geodesic_distance(m.V, m.F, 0), r"takes mesh, sources in .* \(method=.* one mesh, \(V, F\)$"),
     (lambda _: SOLVER.distance(0, 40), r"distance\(\) takes sources; the others go by name \(cutoff=\)$"),
     (lambda m: heat_igl.write_mesh("a.ply", m, m.V), r"takes path, mesh in .* go by name \(distance=\)"),
-    (lambda m: heat_igl.shortest_paths(m, 42, 0), r"^targets\[0\] = 42 is no vertex"),
-    (lambda m: heat_igl.shortest_paths(m, [], 0), "^targets is empty"),
-    (
-        lambda m: heat_igl.shortest_paths(m, heat_igl.SurfacePoints([99], CENTRE), 0),
-        r"^targets: faces\[0\] = 99 is no face",
-    ),
+    (lambda m: shortest_paths(m, 42, 0), r"^targets\[0\] = 42 is no vertex"),
+    (lambda m: shortest_paths(m, [], 0), "^targets is empty"),
+    (lambda m: shortest_paths(m, SurfacePoints([99], CENTRE), 0), r"^targets: faces\[0\] = 99 is no face"),
     (lambda _: heat_igl.farthest_points(SOLVER, 3, start=42), r"^start\[0\] = 42 is no vertex"),
     (lambda m: heat_igl.farthest_points(m, 3, start=[0.5]), "^start must be a vertex index.* not floats such as 0.5"),
     (lambda _: heat_igl.voronoi_cells(SOLVER, [1, 42]), r"^sites\[1\] = 42 is no vertex"),
     # What numpy would take for something else.
-    (lambda m: heat_igl.geodesic_path(m, [0, 1], closed="no"), "^closed must be True or False, not 'no'"),
-    (lambda _: heat_igl.SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]], 2), "^is_closed must be True or False, not 2"),
+    (lambda m: geodesic_path(m, [0, 1], closed="no"), "^closed must be True or False, not 'no'"),
+    (lambda _: SurfaceCurve([0], [[1, 0, 0]], [[0, 1, 0]], 2), "^is_closed must be True or False, not 2"),
     (lambda _: SOLVER.distances([0], progress="bar"), "^progress must be True or False, not 'bar'"),
-    (lambda m: heat_igl.geodesic_distance(m, HIDDEN), "^sources has 1 masked entries: fill or remove them"),
-    (lambda _: heat_igl.SurfacePoints(HIDDEN, np.eye(3)[:2]), "^faces has 1 masked entries"),
-    (lambda m: heat_igl.karcher_mean(m, [0, 1], HIDDEN), "^weights has 1 masked entries"),
+    (lambda m: geodesic_distance(m, HIDDEN), "^sources has 1 masked entries: fill or remove them"),
+    (lambda _: SurfacePoints(HIDDEN, np.eye(3)[:2]), "^faces has 1 masked entries"),
+    (lambda m: karcher_mean(m, [0, 1], HIDDEN), "^weights has 1 masked entries"),
     (lambda _: heat_igl.shapes.grid(np.inf), "^n must be an integer of at least 1, not inf"),
     (lambda _: heat_igl.shapes.icosphere(162), "^subdivisions must be at most 12, not 162"),
     (lambda m: heat_igl.exp_map(m, 0, np.empty((0, 2))), r"^vectors must be one vector or more.* \(0, 2\)"),
-    (lambda m: heat_igl.tangent_frames(m).from_angles("1"), "^angles must be real numbers, not '?"),
+    (lambda m: tangent_frames(m).from_angles("1"), "^angles must be real numbers, not '?"),
 )
 ACCEPTED: dict[str, Callable[[heat_igl.Mesh], Any]] = {
     "far positions": lambda m: heat_igl.closest_points(m, [[0, 1e149, 0]]),
     "long line": lambda m: heat_igl.exp_map(m, 0, [[1e4, 0]]),
-    "polygons": lambda _: heat_igl.PolygonMesh(SQUARE, [[0, 1, 2, 3]]),
-    "last face": lambda m: heat_igl.SurfacePoints([0, 79], CENTRE * 2).positions(m),
-    "edge lengths": lambda _: heat_igl.HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]]),
-    "gluing": lambda _: heat_igl.HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]]),
-    "one tangent vector": lambda m: heat_igl.tangent_frames(m).to_world([1.0, 0], [0]),
-    "nested sources": lambda m: heat_igl.geodesic_distance(m, heat_igl.OffsetSources([CURVE, 41], [0.0, 1.0])),
+    "polygons": lambda _: PolygonMesh(SQUARE, [[0, 1, 2, 3]]),
+    "last face": lambda m: SurfacePoints([0, 79], CENTRE * 2).positions(m),
+    "edge lengths": lambda _: HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]]),
+    "gluing": lambda _: HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]]),
+    "one tangent vector": lambda m: tangent_frames(m).to_world([1.0, 0], [0]),
+    "nested sources": lambda m: geodesic_distance(m, OffsetSources([CURVE, 41], [0.0, 1.0])),
 }
 
 

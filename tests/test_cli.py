@@ -20,8 +20,6 @@ from heat_igl.cli import demo, distances, views
 from heat_igl.cli.program import EXAMPLES, application
 from heat_igl.io import read_attributes, read_mesh, read_polylines, write_curves, write_mesh
 
-# --- The command line: what it prints, what it leaves behind, and how it fails
-
 
 def command(*arguments: str | Path | float, cwd: Path) -> subprocess.CompletedProcess[str]:
     return run_python("-m", "heat_igl", *map(str, arguments), cwd=cwd)
@@ -437,3 +435,34 @@ def test_commands_for_curves_take_point_clouds(capsys):
     assert read_mesh("cut.ply").n_faces > cloud.n_faces
     assert cli.run(["info", "cloud.xyz"]) == 0
     assert "cloud.xyz: 642 points, 1280 triangles" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("display", ["", ":0"])
+def test_the_page_is_opened_where_there_is_a_display(display, ball, monkeypatch, capsys):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", lambda address: not opened.append(address))
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    if display:
+        monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.chdir(ball.parent)
+    assert cli.run(["view", "sphere.off", "--source", "7", "--source", "3", "--t-coef", "0.5"]) == 0
+    page = ball.with_name("sphere-view.html")
+    assert opened == ([page.as_uri()] if display else [])
+    assert ("open it in a browser" in capsys.readouterr().out) == (not display)
+    text = page.read_text(encoding="utf8")
+    assert "<title>sphere.off</title>" in text
+    assert '"sources": [3, 7]' in text
+    assert "with t = 0.5 h^2." in text
+
+
+@pytest.mark.usefixtures("folder")
+def test_view_shows_exact_and_signed_distance_and_points():
+    assert cli.run(["view", "sphere.ply", "--html", "a.html", "--exact", "--curves", "circle.obj"]) == 0
+    text = Path("a.html").read_text(encoding="utf8")
+    assert '"fields": [["exact", 1], ["signed distance", 1]]' in text
+    assert '"beside": "exact"' in text
+    heat_igl.write_point_cloud("scan.ply", heat_igl.PointCloud(shapes.icosphere(2).V))
+    assert cli.run(["view", "scan.ply", "--html", "b.html", "--points"]) == 0
+    assert '"points": true' in Path("b.html").read_text(encoding="utf8")

@@ -17,9 +17,6 @@ from heat_igl.compat import gdist, pygeodesic
 from heat_igl.compat import igl as drop_in
 from heat_igl.compat import potpourri3d as pp3d
 
-# --- The drop-in modules: the same calls as those of libigl and potpourri3d, and the same meaning of what they return
-
-
 needs_potpourri3d = pytest.mark.skipif(importlib.util.find_spec("potpourri3d") is None, reason="needs potpourri3d")
 
 

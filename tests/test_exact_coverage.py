@@ -1,10 +1,11 @@
 """Windows cover what they enter: no vertex of a nearly flat surface is missed, whatever rounding does to its angles."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import load_script, pygeodesic_distance
+from conftest import ROOT, pygeodesic_distance
 
 from heat_igl import Mesh, geodesic_distance, pair_distances, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
@@ -40,9 +41,10 @@ def test_pairs_on_a_cylinder_in_single_precision():
     np.testing.assert_allclose(found, truth[goals], rtol=1e-12)
 
 
-def test_random_surfaces_against_straight_lines():
+def test_random_surfaces_against_straight_lines(monkeypatch):
     """The script compares thousands."""
-    script = load_script("random_members")
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    script = importlib.import_module("random_members")
     found = [script.exact(seed) for seed in range(44)]
     assert {name for name, _, _ in found} == set(script.EXACT)
     assert sum("straight lines" in figures for _, figures, _ in found) > 20

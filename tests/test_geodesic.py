@@ -18,7 +18,6 @@ from heat_igl.plan import SurfaceMeasures, distance_plan, sweep_plan
 from heat_igl.windows import engine
 from heat_igl.windows.tables import from_mesh
 
-# --- `geodesic_distance`, and `as_mesh` in front of everything that takes a mesh
 TORUS = perturbed(shapes.torus(20, 30))
 
 
@@ -65,12 +64,6 @@ def test_a_mesh_that_everybody_has(monkeypatch):
     assert (report.n_components, report.euler_characteristic, report.n_boundary_loops) == (1, 2, 0)
     assert not len(report.nonmanifold_vertices)
     assert np.isfinite(geodesic_distance(blob, 1234)).all()
-
-
-# --- `GeodesicSolver`: one interface for all domains, the same bits alone, in batches, in threads and pickled
-
-
-RING = shapes.torus(60, 40)
 
 
 # --- The plan names the engine for each kind of domain, its tolerance and the reason; solvers do as it says

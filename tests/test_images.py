@@ -23,8 +23,6 @@ from heat_igl.compat import potpourri3d as potpourri3d_names
 from heat_igl.geodesic import SolverChoice
 from heat_igl.validation import relative_error
 
-# --- Masks as domains: every pixel there, connected as it should be, distances those of the plane around obstacles
-
 
 def test_every_pixel_has_its_area_and_its_place():
     mask = np.random.default_rng(0).random((12, 17)) < 0.6

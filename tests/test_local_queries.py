@@ -31,9 +31,6 @@ from heat_igl.windows import (
 from heat_igl.windows.exact import ExactSurface, Found, exact_distance
 from heat_igl.windows.tables import from_mesh
 
-# --- Local queries: equal to the full search, ended where asked, cleared after each; errors that name the remedy
-
-
 MESHES = {
     "bumpy": bumpy,
     "bends at a corner": lambda: two_arms(8),

@@ -25,9 +25,6 @@ from heat_igl import (
 from heat_igl.mesh import connectivity
 from heat_igl.validation.zoo import tetrahedra
 
-# --- Mesh, MeshReport and connectivity on small shapes whose every number can be worked out by hand
-
-
 TETRAHEDRON_V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 TETRAHEDRON_F = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
@@ -363,27 +360,28 @@ def test_scattered_tetrahedra(seed):
         assert Mesh(V, corners).is_tetrahedral
 
 
-def test_tetrahedra_without_neighbours():
-    corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
-    thin = corner * [1, 1, 1e-3]
-    for V in (corner, thin):
-        assert Mesh(V, [[0, 1, 2, 3]]).n_faces == 1
+CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 0, -1], [-1, 0, 0], [1, 1, 1]]
+
+
+@pytest.mark.parametrize(
+    ("F", "thickness"),
+    [
+        ([[0, 1, 2, 3]], 1e-3),
+        ([[0, 1, 2, 3], [0, 1, 4, 5]], 1),  # at an edge; thin ones may be quadrilaterals
+        ([[0, 1, 2, 3], [0, 6, 4, 5]], 1e-3),  # at a vertex
+        ([[0, 1, 2, 3], [1, 2, 3, 7], [0, 1, 4, 5]], 1e-2),
+    ],
+)
+def test_tetrahedra_with_few_neighbours(F, thickness):
+    for V in (np.array(CORNER), CORNER * np.array([1, 1, thickness])):
+        assert Mesh(V, F).is_tetrahedral
         apart = np.concatenate([V + 3 * i for i in range(50)])
-        assert Mesh(apart, np.arange(200).reshape(50, 4)).n_faces == 50
-    # Two that share an edge, or a vertex.
-    V = np.concatenate([corner, [[0, -1, 0], [0, 0, -1], [-1, 0, 0]]])
-    assert Mesh(V, [[0, 1, 2, 3], [0, 1, 4, 5]]).n_faces == 2
-    assert Mesh(V, [[0, 1, 2, 3], [0, 6, 4, 5]]).n_faces == 2
-    # A flat one beside others is for the report.
-    V = np.concatenate([corner, [[1, 1, 0]]])
-    assert Mesh(V, [[0, 1, 2, 3], [0, 1, 4, 2]]).report().degenerate_faces.tolist() == [1]
+        assert Mesh(apart, np.concatenate([np.add(F, 8 * i) for i in range(50)])).n_faces == 50 * len(F)
 
 
-def test_tetrahedra_of_which_one_hangs_on_an_edge():
-    V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [0, -1, 0], [0, 0, -1]]
-    F = [[0, 1, 2, 3], [1, 2, 3, 4], [0, 1, 5, 6]]
-    for thickness in (1, 1e-2):
-        assert Mesh(np.array(V) * [1, 1, thickness], F).n_faces == 3
+def test_a_flat_tetrahedron_beside_others_is_for_the_report():
+    mesh = Mesh([*CORNER[:4], [1, 1, 0]], [[0, 1, 2, 3], [0, 1, 4, 2]])
+    assert mesh.report().degenerate_faces.tolist() == [1]
 
 
 def test_half_a_million_quadrilaterals_are_told_from_tetrahedra():

@@ -40,19 +40,6 @@ def test_every_point_is_the_farthest_from_those_before(square):
         assert to_earlier[points[j]] == pytest.approx(to_earlier.max(), rel=1e-9)
 
 
-def test_farthest_points_by_heat_are_spread_and_repeatable(bunny):
-    solver = heat_igl.HeatMethodSolver(bunny)
-    points = heat_igl.farthest_points(solver, 60)
-    assert np.array_equal(points[:30], heat_igl.farthest_points(solver, 30))
-    distances = solver.distances([[int(p)] for p in points])
-    matrix = distances[:, points]
-    # The last point's distance from the others is no less than anybody's from all points.
-    covered = distances.min(axis=0).max()
-    np.fill_diagonal(matrix, np.inf)
-    assert matrix.min() > 0.95 * covered
-    assert matrix.min() > bunny.edge_lengths.mean() / 2
-
-
 def test_points_are_distinct_where_distances_are_zero():
     """As between vertices in one place: a solver that says 0 everywhere."""
 

@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 from conftest import flat_perturbed, mean_error, perturbed
-from surfaces import nearest_vertex, to_polyline
+from surfaces import nearest_vertex, to_polyline, with_point
 
 from heat_igl import (
     GeodesicSolver,
@@ -29,8 +29,6 @@ from heat_igl.geodesic import SolverChoice
 from heat_igl.heat.source_terms import SourceTerm
 from heat_igl.sources import Sources, source_set, vertex_sources
 from heat_igl.steps import fitted_laplacian
-
-# --- sources
 
 
 @pytest.mark.parametrize(
@@ -212,11 +210,7 @@ def test_a_point_in_a_face_is_as_good_a_source_as_a_vertex(name, method, request
     of_points, of_vertices = [], []
     for face in rng.choice(mesh.n_faces, 12, p=mesh.measures / mesh.measures.sum()):
         point = SurfacePoints([face], [0.9 * rng.dirichlet(np.ones(3)) + 0.1 / 3])
-        corners, n = mesh.F[face], mesh.n_vertices
-        fan = [np.where(np.arange(3) == c, n, corners) for c in range(3)]
-        inserted = Mesh(
-            np.concatenate([mesh.V, point.positions(mesh)]), np.concatenate([np.delete(mesh.F, face, 0), fan])
-        )
+        corners, n, inserted = mesh.F[face], mesh.n_vertices, with_point(mesh, face, point.barycentric[0])
         distance, truth = solver.distance(point), reference.exact(inserted, n)[:-1]
         straight = np.linalg.norm(mesh.V[corners] - point.positions(mesh), axis=1)
         np.testing.assert_allclose(distance[corners], straight, rtol=1e-9)

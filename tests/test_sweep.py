@@ -18,8 +18,6 @@ from heat_igl.windows import MeshTriangles
 from heat_igl.windows.exact import exact_distance
 from heat_igl.windows.guards import Bounds
 
-# --- Distance by sweeps over triangles, in an order of their own: exact on flat domains, near it on others
-
 
 def swept(mesh: Mesh, sources: object) -> np.ndarray:
     """A sweep, also on meshes on which the plan takes windows."""
@@ -103,9 +101,6 @@ def test_the_plan_takes_windows_where_these_cost_little(bumpy):
     fine = GeodesicSolver(shapes.icosphere(4), method="sweep")
     assert fine.plan.engine == "sweep"
     np.testing.assert_array_equal(fine.distance(9), swept(shapes.icosphere(4), 9))
-
-
-# --- What a refined distance promises: not below exact, not above paths along edges, near exact on every kind of shap
 
 
 ROUGH = ["noise 10 times", "beams", "voxel ball", "plate", "cube less one", "noisy sphere"]
