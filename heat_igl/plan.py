@@ -176,8 +176,6 @@ SMALL_BODY = 1000
 # By how much the ratio of two lengths at a tenth of the simplices may change over an edge, before the Hopf-Lax formula
 # warns. Over 30 fields on coarse and fine meshes, mean errors are at most 1.4 % below, and 1.4 to 14 % above.
 MOST_TURNING = 2.2
-# The same of the lengths themselves at one of fifty simplices, where the metric is linear in between.
-MOST_GROWTH = 1.6
 # What circumradii of coarse meshes are refined to, in square roots of the area per vertex.
 LARGEST_RADIUS = 1.4
 # Growth by refinement: at most so many times the vertices, and some thousands more.

@@ -70,7 +70,6 @@ def test_metrics_of_bent_bars_converge(a):
     assert per_vertex[1] < 0.01
 
 
-@pytest.mark.filterwarnings("ignore:the metric grows faster")
 def test_layers_and_smooth_speeds_of_tetrahedra():
     """Tensors that jump stay as they are given; those of a speed from 1 to 20 are carried to the corners."""
     mesh = shapes.box(12)
@@ -84,8 +83,8 @@ def test_layers_and_smooth_speeds_of_tetrahedra():
     apart = ((mesh.V - mesh.V[source]) ** 2).sum(axis=1)
     exact = np.arccosh(1 + 19**2 * apart / (2 * at_vertices * at_vertices[source])) / 19
     found = GeodesicSolver(speed_operators(mesh, speed)).distance(source)
-    assert np.abs(found - exact).mean() < 0.007 * exact.mean()
-    assert np.abs(found - exact).max() < 0.05 * exact.max()
+    assert np.abs(found - exact).mean() < 0.0015 * exact.mean()
+    assert np.abs(found - exact).max() < 0.01 * exact.max()
 
 
 def growing_speed(n: int, most: float) -> tuple[Mesh, FloatArray, FloatArray]:
@@ -104,7 +103,6 @@ def test_no_vertex_stays_below_those_it_has_its_distance_from():
     assert np.abs(found - exact).mean() < 0.0002 * exact.mean()
 
 
-@pytest.mark.filterwarnings("ignore:the metric grows faster")
 def test_paths_bend_within_the_simplices_of_the_source():
     """The speed grows by 2.6 along the first edge; with T linear on edges to the source, up to 10 % were missing."""
     mesh, g, exact = growing_speed(12, 20.0)
@@ -112,13 +110,6 @@ def test_paths_bend_within_the_simplices_of_the_source():
     beside = np.unique(mesh.F[(mesh.F == 0).any(axis=1)])
     assert found[beside] == pytest.approx(exact[beside], rel=1e-9)
     assert found[1:] == pytest.approx(exact[1:], rel=0.02)
-
-
-def test_a_speed_that_the_mesh_does_not_resolve_gives_a_warning():
-    mesh, g, _ = growing_speed(8, 20.0)
-    with pytest.warns(AccuracyWarning, match=r"lengths change by a factor of 3\.\d or more at one of fifty faces"):
-        solver(mesh, g)
-    solver(mesh, growing_speed(8, 5.0)[1])
 
 
 @pytest.mark.parametrize("mesh", [shapes.grid(6), shapes.box(3)], ids=["triangles", "tetrahedra"])
@@ -229,7 +220,7 @@ def test_planes_of_triangles_are_turned_into_each_other():
 
     def turning(directions):
         g = fibre_metric(directions, 1.0, 20.0)
-        return HopfLaxEngine(MetricSimplices.in_metric(folded, g, 1.0)).resolution[0]
+        return HopfLaxEngine(MetricSimplices.in_metric(folded, g, 1.0)).turning
 
     assert turning(fibres) == pytest.approx(1, rel=1e-6)
     with pytest.warns(AccuracyWarning, match="the metric turns farther"):
@@ -399,7 +390,6 @@ def test_a_wrong_metric_at_a_vertex_is_named():
         metric_operators(mesh, g)
 
 
-@pytest.mark.filterwarnings("ignore:the metric grows:heat_igl.AccuracyWarning")
 @pytest.mark.parametrize(
     ("mesh", "ratio"), [(shapes.box(8), 10), (shapes.grid(20), 1000)], ids=["tetrahedra", "triangles"]
 )

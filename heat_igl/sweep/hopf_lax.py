@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from heat_igl.kernels.sweep.hopf_lax import HopfLax, measured
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.operators.metric_derivatives import plane_axes
-from heat_igl.plan import MOST_GROWTH, MOST_TURNING
+from heat_igl.plan import MOST_TURNING
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
@@ -39,37 +40,30 @@ class HopfLaxEngine(SimplexEngine):
         place, (squares, mean, _, slack) = np.ascontiguousarray(simplices.place), simplices.measured
         widest, growth, gradient = measured(self._corners, place, squares, mean, simplices.velocity)
         self._in_metric = (squares, simplices.velocity, mean, widest, slack, growth, gradient, place)
-        turning, growing = self.resolution
-        if turning > MOST_TURNING:
-            how, what = "turns farther", "the ratio of its lengths in two directions changes"
-            much = f"by a factor of {turning:.2g} or more at a tenth of the faces"
-        elif growing > MOST_GROWTH:
-            how, what = "grows faster", "its lengths change"
-            much = f"by a factor of {growing:.2g} or more at one of fifty faces"
-        else:
-            return
-        warn_caller(
-            f"the metric {how} than the mesh resolves: over an edge, {what} {much}, and distance may be wrong by "
-            "several percent, and by tens at single vertices: take a finer mesh",
-            AccuracyWarning,
-        )
+        if self.turning > MOST_TURNING:
+            warn_caller(
+                "the metric turns farther than the mesh resolves: over an edge, the ratio of its lengths in two "
+                f"directions changes by a factor of {self.turning:.2g} or more at a tenth of the faces, and distance "
+                "may be wrong by several percent, and by tens at single vertices: take a finer mesh",
+                AccuracyWarning,
+            )
 
-    @property
-    def resolution(self) -> tuple[float, float]:
-        """By how much the metric changes over an edge: the ratio of lengths in two directions, and lengths.
+    @cached_property
+    def turning(self) -> float:
+        """By how much the ratio of lengths in two directions changes over an edge, at a tenth of the simplices.
 
-        The first at a tenth of the simplices, the second at one of fifty, and 1 unless the metric is linear in between.
-        From a sample of the simplices: between the corners of one, or between those that meet in a vertex, with planes
-        of triangles turned into each other. The first is 1 where tensors differ by a factor alone, as those of speeds.
+        From a sample of the simplices: between the corners of one if the metric is linear in between, else between
+        those that meet in a vertex, with planes of triangles turned into each other. It is 1 where tensors differ by a
+        factor alone, as those of speeds.
         """
         simplices = self._simplices
-        corners, place, is_linear = simplices.corners, simplices.place, simplices.velocity is not None
+        corners, place = simplices.corners, simplices.place
         if place is None:
-            return 1.0, 1.0
+            return 1.0
         size = corners.shape[1]
         chosen = np.arange(0, len(corners), len(corners) // _SAMPLE + 1)
         one = other = np.repeat(chosen, size)
-        if is_linear:
+        if simplices.velocity is not None:
             tensors = simplices.metric(chosen)
             first, two = np.repeat(tensors[:, 0], size, axis=0), tensors.reshape(-1, 3, 3)
         else:
@@ -84,11 +78,8 @@ class HopfLaxEngine(SimplexEngine):
             turned = x[one] + once + np.cross(w[:, None], once) / np.maximum(1 + cosine, _ROUNDING)[:, None, None]
             first, two = (axes @ g @ np.swapaxes(axes, 1, 2) for axes, g in ((x[one], first), (turned, two)))
         stretch = np.maximum(np.linalg.eigvals(np.linalg.solve(first, two)).real, _ROUNDING)
-        most, least = (np.sqrt(x.reshape(-1, size)) for x in (stretch.max(axis=1), stretch.min(axis=1)))
-        turning = float(np.quantile((most / least).max(axis=1), 0.9))
-        if not is_linear:
-            return turning, 1.0
-        return turning, float(np.quantile(np.maximum(most, 1 / least).max(axis=1), 0.98))
+        ratio = np.sqrt(stretch.max(axis=1) / stretch.min(axis=1))
+        return float(np.quantile(ratio.reshape(-1, size).max(axis=1), 0.9))
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:  # noqa: ARG002
         """Lower distance to that of second order."""
