@@ -1,7 +1,7 @@
 """Derivatives of exact distance by the positions of the vertices, by edge lengths, by the sources and by a metric.
 
 All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
-lengths lead paths (`heat_igl.kernels.windows.derivatives`), from there to the edges of the mesh the flips
+lengths lead paths (`heat_igl.kernels.windows.paths`), from there to the edges of the mesh the flips
 (`heat_igl.intrinsic.length_derivatives`), and on to the positions the edges. docs/derivatives_theory.md derives each
 step.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back
-from heat_igl.kernels.windows import derivatives as kernels
+from heat_igl.kernels.windows import paths as kernels
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import MetricSides, SideLengths, Surface
 from heat_igl.sources import SourceSet

@@ -26,4 +26,9 @@ cdef inline void release(Search* s, int place) noexcept nogil:
     s.lists[place].count = s.free_list
     s.lists[place].half_edge = -1
     s.free_list = place
+
 cdef void add(Search* s, int e, Window* run, int n, bint in_front) noexcept nogil
+cdef void start_at(Search* s, int v, double offset, int label) noexcept nogil
+cdef void emit_point(Search* s, int p) noexcept nogil
+cdef void emit_segment(Search* s, int i) noexcept nogil
+cdef void emit_vertex(Search* s, int v) noexcept nogil

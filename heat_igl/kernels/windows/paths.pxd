@@ -32,25 +32,9 @@ cdef enum Outcome:
     LOST = -2
     GO_ON = -3
 
-cdef extern from *:
-    """
-    // A vertex on the line makes up the distance to this fraction of it: more than rounding, and so little that a path
-    // through the vertex is as long.
-    #define ON_LINE 1e-13
-    // The same at the root, to which the line is known to lead.
-    #define AT_ROOT 1e-9
-    // A line is given up when it is too far from the source by this fraction of the distance.
-    #define ASTRAY 1e-6
-    // Lines that wait: more only where many edges of more than two faces follow one another.
-    #define MOST_LINES 256
-    // Faces that one path crosses at most.
-    #define MOST_STEPS 4000000
-    """
-    double ON_LINE
-    double AT_ROOT
-    double ASTRAY
-    enum: MOST_LINES
-    enum: MOST_STEPS
+cdef enum:
+    # Lines that wait: more only where many edges of more than two faces follow one another.
+    MOST_LINES = 256
 
 
 # A surface, what a search found on it, and the segments so far.

@@ -1,6 +1,7 @@
 """Shortest paths, followed back from where windows arrived to the sources: straight lines over triangles.
 
-Sources inside faces, points and segments, have the roots n + i for source i of a surface with n vertices.
+Sources inside faces, points and segments, have the roots n + i for source i of a surface with n vertices. The
+derivatives of distances by the lengths of the edges come from the segments of these lines.
 """
 
 import cython
@@ -9,6 +10,16 @@ from cython.cimports.heat_igl.kernels.mesh.straight import OVER_SIDE, Exit, Head
 from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
+
+# A vertex on the line makes up the distance to this fraction of it: more than rounding, and so little that a path
+# through the vertex is as long.
+_ON_LINE = cython.declare(cython.double, 1e-13)
+# The same at the root, to which the line is known to lead.
+_AT_ROOT = cython.declare(cython.double, 1e-9)
+# A line is given up when it is too far from the source by this fraction of the distance.
+_ASTRAY = cython.declare(cython.double, 1e-6)
+# Faces that one path crosses at most.
+_MOST_STEPS = cython.declare(cython.int, 4000000)
 
 
 @cython.final
@@ -199,7 +210,7 @@ class PathTracer:
 
     def leads(self, begin: cython.pointer[cython.const[LineEnd]], v: cython.int, left: cython.double) -> cython.bint:
         """Whether a path of length `left` from vertex v makes up the distance at `begin`."""
-        tolerance: cython.double = AT_ROOT if v == begin.root else ON_LINE
+        tolerance: cython.double = _AT_ROOT if v == begin.root else _ON_LINE
         d: cython.double = self.distance[v]
         return d < begin.distance and d + left - begin.distance <= tolerance * begin.distance
 
@@ -215,7 +226,7 @@ class PathTracer:
         share: cython.double = line.ray.x / self.length[t]
         self.segments.n = line.n_segments
         self.n_steps += 1
-        if self.n_steps > MOST_STEPS:
+        if self.n_steps > _MOST_STEPS:
             return LOST
         here[t % 3], here[next_half_edge(t) % 3], here[previous_half_edge(t) % 3] = 0.0, 1.0 - share, share
         at_corner(t % 3, corner)
@@ -242,7 +253,7 @@ class PathTracer:
     ) -> cython.bint:
         """Whether the ends of the half-edge that a line leaves over are farther from the source than it allows."""
         h: cython.int = line.ray.h
-        left: cython.double = begin.distance - line.walked + ASTRAY * begin.distance
+        left: cython.double = begin.distance - line.walked + _ASTRAY * begin.distance
         at_head: cython.double = self.distance[self.vertex[previous_half_edge(h)]]
         at_tail: cython.double = self.distance[self.vertex[next_half_edge(h)]]
         return at_head > left + line.ray.x or at_tail > left + self.length[h] - line.ray.x
@@ -279,7 +290,7 @@ class PathTracer:
         if self.sources.face(begin.root) != f:
             return False
         walked += self.sources.nearest(side, begin.root, here, there)
-        return fabs(walked + apart(side, here, there) - begin.distance) <= AT_ROOT * begin.distance
+        return fabs(walked + apart(side, here, there) - begin.distance) <= _AT_ROOT * begin.distance
 
     def add(self, f: cython.int, here: cython.p_double, h: cython.int, x: cython.double) -> cython.int:
         """Add a segment to the point of half-edge h that lies at x in its outward frame."""
@@ -296,3 +307,125 @@ class PathTracer:
         self.sources.nearest(cython.address(self.length[3 * f]), root, here, there)
         self.segments.append(f, here, there)
         return AT_SOURCE
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(-4)
+def _follow(tracer: PathTracer, v: cython.int) -> cython.int:
+    """Follow the straight last part of the path to vertex v: the row of its root, -1 at a source or if it is lost."""
+    if tracer.root[v] == v:
+        return -1
+    tracer.n_steps = tracer.segments.n = 0
+    end: cython.int = tracer.from_vertex(v)
+    return tracer.root[v] if end == AT_SOURCE else -1 if end == LOST else end
+
+
+@cython.cfunc
+@cython.nogil
+def _derivative(
+    tracer: PathTracer, j: cython.longlong, weight: cython.double, by_side: cython.p_double, by_end: cython.p_double
+) -> cython.int:
+    """The derivative, times `weight`, of the length of segment j of a line by the sides of its face, and by its end.
+
+    In a triangle with sides l, a segment between places whose barycentric coordinates differ by delta has the length s,
+    s^2 = - sum over pairs i < k of delta_i delta_k l_ik^2. By the envelope theorem the places on the edges count as
+    fixed, so the derivative by l_ik is - delta_i delta_k l_ik / s. Returns the first side of the face.
+    """
+    h: cython.int = 3 * tracer.segments.face[j]
+    d: cython.double[3]
+    side = cython.address(tracer.length[h])
+    one = cython.address(tracer.segments.place[j, 0, 0])
+    length: cython.double = apart(side, one, one + 3)
+    per_length: cython.double = 1.0 / length if length > 0.0 else 0.0
+    for c in range(3):
+        d[c] = one[3 + c] - one[c]
+    for c in range(3):
+        i: cython.int = (c + 1) % 3
+        k: cython.int = (c + 2) % 3
+        by_side[c] = weight * (-d[i] * d[k] * side[c] * per_length)
+        by_end[c] = -0.5 * weight * per_length * (d[i] * side[k] ** 2 + d[k] * side[i] ** 2)
+    return h
+
+
+def pull_back(
+    tables,
+    found,
+    starts,
+    order: cython.const[cython.longlong][::1],
+    weight: cython.double[::1],
+    by_side: cython.double[::1],
+    by_place: cython.double[:, ::1],
+) -> None:
+    """Add up the derivative of the weighted sum of distances by the sides (3 m,), and by the places of source points.
+
+    A path consists of straight lines from a vertex to the next one that it passes, or to a source point. What is behind
+    the end of its last line is added by visiting the vertices in the order of distance.
+
+    Parameters
+    ----------
+    tables, found, starts
+        As for `trace_back`; e source points.
+    order : (n,)
+        Vertices by ascending distance.
+    weight : (n + e,)
+        Of each vertex; it is handed on along the paths, in descending order of distance, and behind those of the
+        vertices it becomes the sum of the weights of all paths to each source point.
+    by_side, by_place : (3 m,), (e, 3)
+        Take the derivatives.
+    """
+    tracer: PathTracer = PathTracer(tables, found, starts)
+    n: cython.int = order.shape[0]
+    of_sides: cython.double[3]
+    of_end: cython.double[3]
+    with cython.nogil:
+        for i in range(n - 1, -1, -1):
+            v: cython.int = cython.cast(cython.int, order[i])
+            row: cython.int = _follow(tracer, v) if weight[v] != 0.0 else -1
+            if row < 0:
+                continue
+            for j in range(tracer.segments.n):
+                h: cython.int = _derivative(tracer, j, weight[v], of_sides, of_end)
+                for c in range(3):
+                    by_side[h + c] += of_sides[c]
+            if row >= n:
+                for c in range(3):
+                    by_place[row - n, c] += of_end[c]
+            weight[row] += weight[v]
+
+
+def push_forward(
+    tables,
+    found,
+    starts,
+    order: cython.const[cython.longlong][::1],
+    tangent: cython.const[cython.double][::1],
+    moves: cython.const[cython.double][:, ::1],
+    change: cython.double[::1],
+) -> None:
+    """The derivative of all distances, `change` (n + e,), for sides that change by `tangent` (3 m,).
+
+    The coordinates of source points change by `moves` (e, 3). On entry, `change` holds the changes of the offsets of
+    sources. Other arguments as for `pull_back`.
+    """
+    tracer: PathTracer = PathTracer(tables, found, starts)
+    n: cython.int = order.shape[0]
+    of_sides: cython.double[3]
+    of_end: cython.double[3]
+    with cython.nogil:
+        for i in range(n):
+            v: cython.int = cython.cast(cython.int, order[i])
+            row: cython.int = _follow(tracer, v)
+            if row < 0:
+                continue
+            change[v] = change[row]
+            total: cython.double = 0.0
+            for j in range(tracer.segments.n):
+                h: cython.int = _derivative(tracer, j, 1.0, of_sides, of_end)
+                of_segment: cython.double = 0.0
+                for c in range(3):
+                    of_segment += of_sides[c] * tangent[h + c]
+                    if row >= n and j == tracer.segments.n - 1:
+                        of_segment += of_end[c] * moves[row - n, c]
+                total += of_segment
+            change[v] += total

@@ -195,8 +195,6 @@ cdef extern from *:
     #define MARGIN 1e-12
     // A vertex is flat if its angles sum to 2 pi up to this: ten times what still lets halves of a window be joined.
     #define FLATNESS 1e-12
-    // Looks at the lock of another thread before it is waited for.
-    #define TRIES 2000
     // Overlaps of less than this fraction of a half-edge are left too: rays from bends are widened by so much.
     #define SLIVER 1e-5
     // What a list costs beside its windows, in windows.
@@ -211,7 +209,6 @@ cdef extern from *:
     double SLIVER
     double MARGIN
     double FLATNESS
-    int TRIES
     int PER_LIST
 
 
