@@ -404,9 +404,9 @@ def test_polylines_are_those_that_were_written(folder):
     ("text", "match"),
     [
         ("v 0 0 0\nv 1 0 0\n", "holds no curve"),
-        ("v 0 0 0\nl 1 2\n", "line 2: vertex 2 is not one of the 1 in the file"),
-        ("v 0 zero 0\nl 1 1\n", "line 1: 'v 0 zero 0' is no vertex or line"),
-        ("v 0 0 0\nl 1\n", "line 2: a curve needs two vertices or more"),
+        ("v 0 0 0\nl 1 2\n", r"line 2 \(l 1 2\): no such vertex is among the 1 in the file"),
+        ("v 0 zero 0\nl 1 1\n", r"line 1 \(v 0 zero 0\): 'zero' is not a number"),
+        ("v 0 0 0\nl 1\n", r"line 2 \(l 1\): a curve needs two vertices or more"),
     ],
 )
 def test_files_without_curves(tmp_path, text, match):

@@ -50,34 +50,24 @@ def geodesic_distance(
     """
     positions = jnp.asarray(V)
     check_positions(positions.shape, bool(jnp.issubdtype(positions.dtype, jnp.floating)), str(positions.dtype))
-    return _Host(F, sources, solver, options).distance()(positions)
+    faces = None if F is None else np.asarray(F)
 
-
-class _Host:
-    """The calls that run outside of JAX."""
-
-    def __init__(self, F: Any, sources: Any, solver: GeodesicSolver | None, options: dict[str, Any]) -> None:
-        self._F = None if F is None else np.asarray(F)
-        self._sources, self._solver, self._options = sources, solver, options
-
-    def distance(self) -> Any:
-        """The distance as a function of the positions, with its gradient."""
-        function = jax.custom_vjp(self._forward)
-        function.defvjp(lambda V: (self._forward(V), V), self._backward)
-        return function
-
-    def _forward(self, V: Any) -> Any:
-        shape = jax.ShapeDtypeStruct(V.shape[:1], V.dtype)
-        return jax.pure_callback(partial(self._on_host, g=None), shape, V, vmap_method="sequential")
-
-    def _backward(self, V: Any, g: Any) -> tuple[Any]:
-        shape = jax.ShapeDtypeStruct(V.shape, V.dtype)
-        return (jax.pure_callback(self._on_host, shape, V, g, vmap_method="sequential"),)
-
-    def _on_host(self, V: Any, g: Any) -> Any:
-        """The distance, or with `g` its derivative by the positions."""
-        solver = solver_on(V, self._F, self._solver, self._options)
+    def on_host(V: Any, g: Any) -> Any:
+        """The distance, or with `g` its derivative by the positions: outside of JAX."""
+        found = solver_on(V, faces, solver, options)
         if g is None:
-            return solver.distance(self._sources).astype(V.dtype)
-        _, pull_back = solver.distance_vjp(self._sources)
+            return found.distance(sources).astype(V.dtype)
+        _, pull_back = found.distance_vjp(sources)
         return pull_back(np.asarray(g, np.float64)).astype(V.dtype)
+
+    def forward(V: Any) -> Any:
+        shape = jax.ShapeDtypeStruct(V.shape[:1], V.dtype)
+        return jax.pure_callback(partial(on_host, g=None), shape, V, vmap_method="sequential")
+
+    def backward(V: Any, g: Any) -> tuple[Any]:
+        shape = jax.ShapeDtypeStruct(V.shape, V.dtype)
+        return (jax.pure_callback(on_host, shape, V, g, vmap_method="sequential"),)
+
+    distance = jax.custom_vjp(forward)
+    distance.defvjp(lambda V: (forward(V), V), backward)
+    return distance(positions)

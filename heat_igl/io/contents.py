@@ -92,6 +92,11 @@ class Text:
         """A `MeshError` with `message` that names the line."""
         return MeshError(f"{self.where(line)}: {message}")
 
+    def refuse(self, lines: IntArray, bad: AnyArray, message: str) -> None:
+        """Raise an `error` that names the first of some lines that are bad, if any is."""
+        if bad.any():
+            raise self.error(lines[np.argmax(bad)], message)
+
     def words(self, width: int) -> AnyArray:
         """The first token of each line, cut to `width` bytes, as byte strings."""
         start, length = self._start[self.first], self._end[self.first] - self._start[self.first]
@@ -135,6 +140,13 @@ class Text:
             if len(values) == count.sum():
                 return values.astype(np.float64, copy=False), start
         raise self._not_a_number(filled, skip, up_to_slash)
+
+    def positions(self, lines: IntArray, skip: int = 0) -> FloatArray:
+        """The first three numbers of each line (r, 3), after `skip` tokens."""
+        short = self.count[lines] < skip + 3
+        self.refuse(lines, short, f"a vertex needs three coordinates ({int(short.sum())} lines have fewer)")
+        values, start = self.numbers(lines, skip)
+        return np.asarray(values[start[:, None] + np.arange(3)])
 
     def all_numbers(self) -> FloatArray:
         """The numbers of all lines, for formats in which line breaks have no meaning."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError, MissingExtraError, real_numbers, shown
-from heat_igl.io.contents import format_rows
+from heat_igl.io.contents import Text, format_rows, integers
 from heat_igl.io.storage import replacing
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, as_simplices, flat_curves
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -267,30 +267,22 @@ def read_polylines(path: str | os.PathLike[str]) -> list[Polyline]:
     two vertices or one that is not in the file; or says that there is no line.
     """
     source = Path(os.fspath(path))
-    positions: list[list[float]] = []
-    lines: list[tuple[int, list[int]]] = []
-    for number, record in enumerate(source.read_text(encoding="utf8", errors="replace").splitlines(), 1):
-        words = record.split("#")[0].split()
-        try:
-            if words[:1] == ["v"]:
-                x, y, z = (float(word) for word in words[1:4])
-                positions.append([x, y, z])
-            elif words[:1] == ["l"]:
-                lines.append((number, [int(word.split("/")[0]) for word in words[1:]]))
-        except ValueError:
-            raise MeshError(f"{source}, line {number}: {' '.join(words)[:60]!r} is no vertex or line of OBJ") from None
-    if not lines:
+    text = Text(source, source.read_bytes(), comment="#", continued=True)
+    word = text.words(2)
+    lines = np.flatnonzero(word == b"l")
+    if not len(lines):
         raise MeshError(f"{source} holds no curve: a record that starts with l is expected, as write_curves writes it")
+    P = text.positions(np.flatnonzero(word == b"v"), skip=1)
+    numbers, first = text.numbers(lines, skip=1, up_to_slash=True)
+    owner = np.repeat(lines, text.count[lines] - 1)
+    indices = integers(numbers, lambda i: text.where(owner[i]))
+    wrong = (indices < 1) | (indices > len(P))
+    text.refuse(owner, wrong, f"no such vertex is among the {len(P)} in the file ({int(wrong.sum())} are missing)")
     found = []
-    for number, indices in lines:
-        wrong = [index for index in indices if not 1 <= index <= len(positions)]
-        if wrong:
-            raise MeshError(
-                f"{source}, line {number}: vertex {wrong[0]} is not one of the {len(positions)} in the file"
-            )
-        closed = len(indices) > 2 and indices[0] == indices[-1]
-        kept = indices[:-1] if closed else indices
+    for line, numbered in zip(lines.tolist(), np.split(indices, first[1:]), strict=True):
+        closed = len(numbered) > 2 and bool(numbered[0] == numbered[-1])
+        kept = numbered[: len(numbered) - closed]
         if len(kept) < 2:
-            raise MeshError(f"{source}, line {number}: a curve needs two vertices or more")
-        found.append(Polyline(np.array(positions)[np.array(kept) - 1], closed))
+            raise text.error(line, "a curve needs two vertices or more")
+        found.append(Polyline(P[kept - 1], closed))
     return found

@@ -485,32 +485,23 @@ def _from_ply(path: Path, data: bytes) -> _Points:
 def _from_obj(path: Path, data: bytes) -> _Points:
     text = Text(path, data, comment="#", continued=True)
     word = text.words(3)
-
-    def rows(record: bytes) -> FloatArray:
-        lines = np.flatnonzero(word == record)
-        short = text.count[lines] < 4
-        if short.any():
-            raise text.error(int(lines[np.argmax(short)]), f"three numbers must follow {record.decode()}")
-        values, start = text.numbers(lines, skip=1)
-        return np.asarray(values[start[:, None] + np.arange(3)])
-
-    if not (word == b"v").any():
+    points, normals = (np.flatnonzero(word == record) for record in (b"v", b"vn"))
+    if not len(points):
         raise MeshError(f"{path}: the file has no points (lines that start with v)")
-    P = rows(b"v")
-    return P, rows(b"vn") if int((word == b"vn").sum()) == len(P) else None
+    P = text.positions(points, skip=1)
+    return P, text.positions(normals, skip=1) if len(normals) == len(points) else None
 
 
 def _from_xyz(path: Path, data: bytes) -> _Points:
     text = Text(path, data.replace(b",", b" "), comment="#")
     width = int(text.count[0])
     wrong = text.count != (width if width in (2, 3, 6) else 3)
-    if wrong.any():
-        line = int(np.argmax(wrong))
-        raise text.error(
-            line,
-            "a point has 3 numbers, or 6 with a normal, or 2 in the plane, and all points as many "
-            f"({int(wrong.sum())} lines differ); PointCloud(numpy.loadtxt(path)[:, :3]) takes the first three of more",
-        )
+    text.refuse(
+        np.arange(len(text)),
+        wrong,
+        "a point has 3 numbers, or 6 with a normal, or 2 in the plane, and all points as many "
+        f"({int(wrong.sum())} lines differ); PointCloud(numpy.loadtxt(path)[:, :3]) takes the first three of more",
+    )
     values = text.all_numbers().reshape(-1, width)
     return values[:, :3], _normals_or_colours(values[:, 3:])
 

@@ -38,13 +38,9 @@ def read(path: Path, data: bytes) -> Contents:
                 f"{path}: the file has no {name}, so it is no mesh; it may be cut short, and read_point_cloud, or "
                 "--points on the command line, reads points"
             )
-    for lines, name in ((V_lines, "vertex needs three coordinates"), (F_lines, "face needs three corners or more")):
-        short = text.count[lines] < 4
-        if short.any():
-            raise text.error(lines[np.argmax(short)], f"a {name} ({int(short.sum())} lines have fewer)")
-    values, start = text.numbers(V_lines, skip=1)
-    V = values[start[:, None] + np.arange(3)]
-
+    V = text.positions(V_lines, skip=1)
+    short = text.count[F_lines] < 4
+    text.refuse(F_lines, short, f"a face needs three corners or more ({int(short.sum())} lines have fewer)")
     values, _ = text.numbers(F_lines, skip=1, up_to_slash=True)
     degree = text.count[F_lines] - 1
     end = np.cumsum(degree)

@@ -55,12 +55,7 @@ def read(path: Path, data: bytes) -> Contents:
         raise text.error(
             begin - 1, f"{n} vertices and {m} faces need {n + m} lines, but {follow} follow: the file is {why} wrong"
         )
-    V_lines = np.arange(begin, begin + n)
-    short = text.count[V_lines] < 3
-    if short.any():
-        raise text.error(begin + int(np.argmax(short)), "a vertex needs three coordinates")
-    values, start = text.numbers(V_lines)
-    V = values[start[:, None] + np.arange(3)]
+    V = text.positions(np.arange(begin, begin + n))
     begin += n
     cells = _polygons(text, np.arange(begin, begin + m))
     first = begin - n

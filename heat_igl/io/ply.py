@@ -116,15 +116,11 @@ def _binary(path: Path, data: bytes, header: Header) -> Iterator[tuple[Element, 
         smallest = sum(np.dtype(prop.count_dtype or prop.dtype).itemsize for prop in element.properties)
         if element.n * smallest > len(data) - at:
             raise short
-        rows = _equal_rows(data, at, element, header.order)
-        if rows is not None:
-            yield element, _columns_of_equal_rows(element, rows)
-            at += rows.nbytes
-            continue
         try:
-            at, columns = _unequal_rows(data, at, element, header.order)
+            read = _equal_rows(data, at, element, header.order) or _unequal_rows(data, at, element, header.order)
         except (struct.error, IndexError):
             raise short from None
+        at, columns = read
         yield element, columns
     if data[at:].strip():
         raise MeshError(
@@ -132,8 +128,8 @@ def _binary(path: Path, data: bytes, header: Header) -> Iterator[tuple[Element, 
         )
 
 
-def _equal_rows(data: bytes, at: int, element: Element, order: str) -> AnyArray | None:
-    """The rows of an element as a structured array, or None if lists differ in length."""
+def _equal_rows(data: bytes, at: int, element: Element, order: str) -> tuple[int, dict[str, Column]] | None:
+    """As `_unequal_rows`, and much faster; None if lists differ in length."""
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     lists = []
     place = at
@@ -158,16 +154,14 @@ def _equal_rows(data: bytes, at: int, element: Element, order: str) -> AnyArray 
     if element.n * dtype.itemsize > len(data) - at:
         return None
     rows = np.frombuffer(data, dtype, element.n, at)
-    return rows if all((rows[name] == length).all() for name, length in lists) else None
-
-
-def _columns_of_equal_rows(element: Element, rows: AnyArray) -> dict[str, Column]:
+    if not all((rows[name] == length).all() for name, length in lists):
+        return None
     columns = {}
     for i, prop in enumerate(element.properties):
         values = rows[f"p{i}"]
-        length = np.full(len(rows) if prop.count_dtype else 0, values.shape[-1], np.int64)
-        columns[prop.name] = Column(values.astype(prop.dtype).ravel(), length)
-    return columns
+        per_row = np.full(len(rows) if prop.count_dtype else 0, values.shape[-1], np.int64)
+        columns[prop.name] = Column(values.astype(prop.dtype).ravel(), per_row)
+    return at + rows.nbytes, columns
 
 
 def _unequal_rows(data: bytes, at: int, element: Element, order: str) -> tuple[int, dict[str, Column]]:
@@ -214,19 +208,14 @@ def _ascii(text: Text, header: Header) -> Iterator[tuple[Element, dict[str, Colu
         for prop in element.properties:
             length: IntArray = np.ones(element.n, np.int64)
             if prop.count_dtype:
-                _check(text, lines, at >= end, "too few numbers for the properties in the header")
+                text.refuse(lines, at >= end, "too few numbers for the properties in the header")
                 length = integers(values[at], lambda i, lines=lines: text.where(lines[i]), "length of a list")  # type: ignore[misc]
                 at = at + 1
-            _check(text, lines, (length < 0) | (at + length > end), "too few numbers for the properties in the header")
+            text.refuse(lines, (length < 0) | (at + length > end), "too few numbers for the properties in the header")
             columns[prop.name] = Column(values[ragged(at, length)], length if prop.count_dtype else length[:0])
             at = at + length
-        _check(text, lines, at < end, "more numbers than the header has properties")
+        text.refuse(lines, at < end, "more numbers than the header has properties")
         yield element, columns
-
-
-def _check(text: Text, lines: IntArray, bad: AnyArray, message: str) -> None:
-    if bad.any():
-        raise text.error(lines[np.argmax(bad)], message)
 
 
 def parse(path: Path, data: bytes, needed: tuple[str, ...]) -> tuple[Header, Tables]:
