@@ -139,10 +139,7 @@ def check_writable(path: Path) -> None:
 def check_file(option: str, path: Path, what: str, suffixes: Sequence[str], library: str = "") -> None:
     """Check that the value of an option is a file of a format for `what`, whose library is there, and can be written.
 
-    Raises
-    ------
-    ValueError, MissingExtraError, OSError
-        If it is not. `library` is its name and that of the extra that brings it.
+    `library` is its name and that of the extra that brings it. A ValueError, MissingExtraError or OSError if not.
     """
     if path.suffix.lower() not in suffixes:
         raise ValueError(f"{option} {path}: {what} go to {', '.join(suffixes[:-1])} or {suffixes[-1]} files")

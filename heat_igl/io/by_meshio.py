@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.io.contents import Cells, Contents, check, select
+from heat_igl.io.contents import Cells, Contents, check, numbered, select
 from heat_igl.io.storage import form_suffix
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray
@@ -236,13 +236,7 @@ def read(path: Path, data: bytes) -> Contents:
     if suffix == ".stl":
         V, cells = _without_collapsed(path, V, cells)
     kind = "tetrahedron" if cells.tetrahedra else "face"
-    check(
-        V,
-        cells,
-        lambda i: f"{path}, vertex {i + form.base} (counted from {form.base})",
-        lambda i: f"{path}, {kind} {i + form.base} (counted from {form.base})",
-        form.base,
-    )
+    check(V, cells, numbered(path, "vertex", form.base), numbered(path, kind, form.base), form.base)
     return Contents(V, cells, attributes if suffix == ".vtu" else {})
 
 

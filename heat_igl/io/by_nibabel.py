@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.io.contents import Contents, check, select
+from heat_igl.io.contents import Contents, check, numbered, select
 from heat_igl.io.storage import form_suffix
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray
@@ -61,7 +61,7 @@ def read(path: Path, data: bytes) -> Contents:
             f"{path}: nibabel cannot read this surface ({error}): it is damaged, cut short, or another file"
         ) from error
     cells = select(path, [("triangle", F)])
-    check(V, cells, lambda i: f"{path}, vertex {i} (counted from 0)", lambda i: f"{path}, face {i} (counted from 0)", 0)
+    check(V, cells, numbered(path, "vertex", 0), numbered(path, "face", 0))
     return Contents(V, cells, {name: values for name, values in attributes.items() if len(values) == len(V)})
 
 

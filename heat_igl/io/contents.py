@@ -189,7 +189,7 @@ class Contents(NamedTuple):
         try:
             if tetrahedra:
                 return Mesh(self.V, corners.reshape(-1, 4))
-            return Mesh.of_polygons(self.V, corners, degree, lambda i: f"{path}, face {i} (counted from 0)")
+            return Mesh.of_polygons(self.V, corners, degree, numbered(path, "face", 0))
         except MeshError as error:
             raise MeshError(f"{path}: {error}") from None
 
@@ -203,8 +203,13 @@ def integers(values: FloatArray, where: Callable[[int], str], what: str = "index
     return values.astype(np.int64)
 
 
+def numbered(path: Path, kind: str, base: int) -> Callable[[int], str]:
+    """Where the i-th vertex or cell stands in a file, for errors."""
+    return lambda i: f"{path}, {kind} {i + base} (counted from {base})"
+
+
 def check(
-    V: FloatArray, cells: Cells, vertex_at: Callable[[int], str], cell_at: Callable[[int], str], base: int
+    V: FloatArray, cells: Cells, vertex_at: Callable[[int], str], cell_at: Callable[[int], str], base: int = 0
 ) -> None:
     """Check positions (n, 3) and indices from 0; `base` is the first index in the file format.
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, Text, check, integers, ragged, warn_if_cut
+from heat_igl.io.contents import Cells, Contents, Text, check, integers, numbered, ragged, warn_if_cut
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -249,10 +249,7 @@ def read(path: Path, data: bytes) -> Contents:
     if name not in faces or len(faces[name].length) != n_faces:
         raise MeshError(f"{path}: element face needs the list property vertex_indices (or vertex_index)")
     degree = faces[name].length
-
-    def face_at(i: int) -> str:
-        return f"{path}, face {i} (counted from 0)"
-
+    face_at = numbered(path, "face", 0)
     if (degree < 3).any():
         i = int(np.argmax(degree < 3))
         raise MeshError(f"{face_at(i)}: {degree[i]} corners; a face needs three ({int((degree < 3).sum())} have fewer)")
@@ -261,7 +258,7 @@ def read(path: Path, data: bytes) -> Contents:
         faces[name].values.astype(np.float64), lambda i: face_at(int(np.searchsorted(end, i, side="right")))
     )
     cells = Cells(corners, degree)
-    check(V, cells, lambda i: f"{path}, vertex {i} (counted from 0)", face_at, base=0)
+    check(V, cells, numbered(path, "vertex", 0), face_at)
     if not header.order:
         warn_if_cut(path, data, int(cells.corners[-1]) or len(V), len(V))
     return Contents(V, cells, _gathered(others, header.vectors))

@@ -46,13 +46,7 @@ def _frozen(array: ArrayT) -> ArrayT:
 
 
 def checked_positions(V: ArrayLike) -> FloatArray:
-    """`V`, of shape (n, 3), or (n, 2) in the plane z = 0, as a new (n, 3) float64 array.
-
-    Raises
-    ------
-    MeshError
-        As for `Mesh`; the message names the first bad position.
-    """
+    """`V`, of shape (n, 3), or (n, 2) in the plane z = 0, as a new (n, 3) float64 array; errors are those of `Mesh`."""
     refuse_masked("V", V, MeshError)
     try:
         array = np.asarray(V)
@@ -80,12 +74,7 @@ def checked_positions(V: ArrayLike) -> FloatArray:
 def checked_faces(F: ArrayLike, n: int | None, *, may_repeat: bool = False) -> IntArray:
     """`F` as a new (m, 3) or (m, 4) int64 array of indices below `n`; without `n`, of any indices.
 
-    With `may_repeat`, a face may have the same vertex at two corners.
-
-    Raises
-    ------
-    MeshError
-        As for `Mesh`.
+    With `may_repeat`, a face may have the same vertex at two corners. Errors are those of `Mesh`.
     """
     try:
         array = np.asarray(F)

@@ -222,10 +222,7 @@ def tangent_surface(mesh: MeshLike) -> Mesh:
 def one_sided(mesh: MeshLike, what: str) -> Mesh:
     """`as_simplices`, of a domain whose triangles have a common orientation.
 
-    Raises
-    ------
-    MeshError
-        If it is a `PointCloud` without one; `what` needs it.
+    A MeshError if it is a `PointCloud` without one; `what` needs it.
     """
     found = as_mesh(mesh)
     surface = as_simplices(found)

@@ -207,13 +207,7 @@ def named_entries(nested: object, name: str) -> list[tuple[str, Any]]:
 
 
 def flat_curves(curves: NestedCurves, place: str = "curves") -> list[SurfaceCurve]:
-    """The curves of nested lists, one after another; `place` names the list for errors.
-
-    Raises
-    ------
-    TypeError
-        If an entry is no curve; the message names the first such.
-    """
+    """The curves of nested lists at `place`, one after another; a TypeError names the first entry that is none."""
     entries = named_entries(curves, place)
     for name, entry in entries:
         if not isinstance(entry, SurfaceCurve):
@@ -329,11 +323,8 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
 def points_beside(mesh: Mesh, positions: ArrayLike, name: str = "positions") -> SurfacePoints:
     """The closest points of a triangle mesh to positions (k, 3) or (3,) that lie beside it, such as clicked ones.
 
-    Raises
-    ------
-    SourceError
-        As for `closest_points`, or if one of the positions, called `name`, is farther from the surface than the mean
-        length of an edge.
+    Errors are those of `closest_points`, and a SourceError if one of the positions, called `name`, is farther from the
+    surface than the mean length of an edge.
     """
     found, nearness = closest_points(mesh, positions), float(mesh.edge_lengths.mean())
     far = np.flatnonzero(found.gap > nearness)
@@ -367,10 +358,7 @@ def checked_points(positions: ArrayLike) -> FloatArray:
 def rows_in_space(name: str, rows: ArrayLike) -> FloatArray:
     """Positions or vectors as a new (k, 3) float64 array: of shape (k, 3), (k, 2) in the plane z = 0, or one row.
 
-    Raises
-    ------
-    SourceError
-        If `rows`, called `name`, are no real numbers, or have another shape.
+    A SourceError if `rows`, called `name`, are no real numbers, or have another shape.
     """
     array = np.atleast_2d(real_numbers(name, rows, SourceError))
     if array.ndim != 2 or array.shape[1] not in (2, 3):

@@ -261,10 +261,7 @@ def validate(
 def draw_sources(mesh: MeshLike, count: int, seed: int = 0) -> list[list[int]]:
     """Single sources for `validate`: `count` random vertices of the component with the most faces, all different.
 
-    Raises
-    ------
-    SourceError
-        If that component has fewer vertices than `count`, or `count` is not positive.
+    A SourceError if that component has fewer vertices than `count`, or `count` is not positive.
     """
     mesh = as_simplices(mesh)
     label = np.bincount(mesh.components[mesh.F[:, 0]]).argmax()
