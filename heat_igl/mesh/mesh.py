@@ -31,8 +31,9 @@ _OF_THE_FACES = {"facets", "edges", "components", "referenced", "boundary", "cro
 
 ArrayT = TypeVar("ArrayT", bound=AnyArray)
 
-# Elements whose neighbours are looked at.
+# Elements whose neighbours are looked at, and the corners of the sides and diagonals of a quadrilateral.
 _SAMPLE = 32
+_SIDES_AND_DIAGONALS = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]])
 # Volume over that of a regular tetrahedron with the same longest edge. A square that is folded along its diagonal, by
 # any angle, has at most 0.354, the corner of a cube 0.5.
 _THIN = 0.4
@@ -358,9 +359,9 @@ class Mesh:
 def first_quadrilateral(V: FloatArray, F: IntArray) -> int | None:
     """The first of the elements (m, 4) that look like quadrilaterals with their corners in order; None if they do not.
 
-    Neighbours in a mesh of tetrahedra have three vertices in common. Quadrilaterals have two in common, which follow
-    one another in both, and are thin as tetrahedra. Elements without neighbours are quadrilaterals if all are planar.
-    Linear time: the neighbours of some elements are looked up, evenly spaced.
+    Quadrilaterals have sides in common and no diagonals, and are thin as tetrahedra. A triangle between two tetrahedra
+    is a diagonal of both: of three corners out of four, two are opposite. Elements without neighbours are
+    quadrilaterals if all are planar. Linear time: the neighbours of some elements are looked up, evenly spaced.
     """
     chosen = np.unique(np.linspace(0, len(F) - 1, _SAMPLE).astype(np.int64))
     thickness = _thickness(V, F[chosen])
@@ -371,33 +372,16 @@ def first_quadrilateral(V: FloatArray, F: IntArray) -> int | None:
     is_near = np.zeros(len(V), bool)
     is_near[F[chosen]] = True
     near = np.flatnonzero(is_near[F].any(axis=1))
-    n_beside = n_stacked = 0
-    first = None
-    for e in chosen.tolist():
-        shared = np.isin(F[near], F[e])
-        count = shared.sum(axis=1)
-        count[near == e] = 0
-        n_stacked += bool((count >= 3).any())
-        beside = near[count == 2]
-        if len(beside) and _follow_one_another(F, e, beside):
-            n_beside += 1
-            first = e if first is None else first
-        elif len(beside):
-            return None
+    pairs = np.sort(F[near][:, _SIDES_AND_DIAGONALS].reshape(-1, 2), axis=1)
+    _, pair, count = connectivity.unique_rows(pairs, len(V))
+    shared = (count[pair] > 1).reshape(-1, 6)[np.searchsorted(near, chosen)]
+    across, beside = shared[:, 4:].any(axis=1), shared[:, :4].any(axis=1)
     # A few quadrilaterals may share two sides, or lie there twice.
-    return first if n_beside > 4 * n_stacked else None
+    is_quadrilateral = beside & ~across
+    return int(chosen[np.argmax(is_quadrilateral)]) if is_quadrilateral.sum() > 4 * across.sum() else None
 
 
 def _thickness(V: FloatArray, F: IntArray) -> FloatArray:
     longest = igl.edge_lengths(V, F).max(axis=1)
     regular = longest**3 / np.sqrt(72)
     return np.asarray(np.abs(igl.volume(V, F)) / np.where(regular > 0, regular, 1))
-
-
-def _follow_one_another(F: IntArray, e: int, others: IntArray) -> bool:
-    """Whether the two vertices that element `e` shares with each of the others follow one another in both."""
-    for g in others.tolist():
-        here, there = np.flatnonzero(np.isin(F[e], F[g])), np.flatnonzero(np.isin(F[g], F[e]))
-        if np.diff(here)[0] == 2 or np.diff(there)[0] == 2:
-            return False
-    return True
