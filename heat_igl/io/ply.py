@@ -130,31 +130,22 @@ def _binary(path: Path, data: bytes, header: Header) -> Iterator[tuple[Element, 
 
 def _equal_rows(data: bytes, at: int, element: Element, order: str) -> tuple[int, dict[str, Column]] | None:
     """As `_unequal_rows`, and much faster; None if lists differ in length."""
+    if not element.n:
+        return None
+    _, first = _unequal_rows(data, at, element._replace(n=1), order)
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-    lists = []
-    place = at
+    lengths = {}
     for i, prop in enumerate(element.properties):
         if prop.count_dtype:
-            count = np.dtype(order + prop.count_dtype)
-            if not element.n or place + count.itemsize > len(data):
-                return None
-            length = int(np.frombuffer(data, count, 1, place)[0])
-            if not 0 <= length <= len(data):
-                return None
-            fields.append((f"n{i}", count.str))
-            lists.append((f"n{i}", length))
-            fields.append((f"p{i}", order + prop.dtype, (length,)))
-            place += count.itemsize + length * np.dtype(prop.dtype).itemsize
+            lengths[f"n{i}"] = int(first[prop.name].length[0])
+            fields += [(f"n{i}", order + prop.count_dtype), (f"p{i}", order + prop.dtype, (lengths[f"n{i}"],))]
         else:
             fields.append((f"p{i}", order + prop.dtype))
-            place += np.dtype(prop.dtype).itemsize
-    if place > len(data):
-        return None
     dtype = np.dtype(fields)
     if element.n * dtype.itemsize > len(data) - at:
         return None
     rows = np.frombuffer(data, dtype, element.n, at)
-    if not all((rows[name] == length).all() for name, length in lists):
+    if not all((rows[name] == length).all() for name, length in lengths.items()):
         return None
     columns = {}
     for i, prop in enumerate(element.properties):

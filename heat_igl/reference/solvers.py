@@ -186,26 +186,18 @@ def _require_manifold(mesh: Mesh, seeds: IntArray) -> None:
     faces = mesh.F[around[mesh.F[:, 0]]]
     if not len(faces):
         return
-    remedy = "repair the mesh (mesh.report() lists the places), or compare with reference.meshlab"
-    found = connectivity.facets(faces, mesh.n_vertices)
-    crowded = found.vertices[found.n_faces > 2]
-    if len(crowded):
-        raise ReferenceSolverError(
-            f"{len(crowded)} edges connected with the sources belong to more than two triangles (first: "
-            f"{crowded[0].tolist()}), and exact solvers crash on such meshes: {remedy}"
-        )
-    pinched = connectivity.nonmanifold_vertices(faces, found, mesh.n_vertices)
-    if len(pinched):
-        raise ReferenceSolverError(
-            f"at {len(pinched)} vertices connected with the sources two surfaces touch in a point (first: "
-            f"{pinched[0]}), and exact solvers find no path through it: {remedy}"
-        )
+    report = Mesh(mesh.V, faces).report()
     collapsed = mesh.edges[(mesh.edge_lengths == 0) & around[mesh.edges[:, 0]]]
-    if len(collapsed):
-        raise ReferenceSolverError(
-            f"{len(collapsed)} edges connected with the sources have length zero (first: {collapsed[0].tolist()}), "
-            "by which exact solvers divide: merge vertices that lie in one place"
-        )
+    for places, problem in (
+        (report.nonmanifold_edges, "{} edges connected with the sources belong to more than two triangles"),
+        (report.nonmanifold_vertices, "at {} vertices connected with the sources two surfaces touch in a point"),
+        (collapsed, "{} edges connected with the sources have length zero"),
+    ):
+        if len(places):
+            raise ReferenceSolverError(
+                f"{problem.format(len(places))} (first: {places[0].tolist()}), and exact solvers crash on such "
+                "meshes or find no path: repair the mesh (mesh.report() lists the places), or take reference.meshlab"
+            )
 
 
 def _require_finite(name: str, mesh: Mesh, seeds: IntArray, distance: FloatArray) -> None:
