@@ -14,7 +14,6 @@ import scipy.sparse as sp
 
 from heat_igl.kernels.cloud.agreeing import agreement
 from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
-from heat_igl.kernels.cloud.joining_fans import joining_triangles
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles
 from heat_igl.kernels.mesh.gluing import glue
@@ -89,8 +88,8 @@ def with_gaps_closed(
         Points that neither the stars nor the gaps join to the largest part.
     """
     P, n = tree.P, len(tree.P)
-    is_gap, _ = _around_gaps(F, n)
-    F = with_loops_filled(P, with_fans_joined(P, F), near.reach)
+    is_gap = points_at_gaps(F, n)
+    F = with_gaps_filled(P, F, near.reach, is_gap)
     part = connected_components(F, n)
     size = np.bincount(part)
     is_apart, is_part = part != np.argmax(size), (size > K)[part]
@@ -254,89 +253,116 @@ def corner(sides: IntArray, turn: int | IntArray) -> IntArray:
     return sides - sides % 3 + (sides + turn) % 3
 
 
-def with_fans_joined(P: FloatArray, F: IntArray) -> IntArray:
-    """The triangles F (m, 3) int32, and others between the fans of vertices that have several with an end.
+def with_gaps_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_gap: BoolArray) -> IntArray:
+    """The triangles F (m, 3) int32, and others between fans of a point and in the loops of outer edges.
 
     Two parts of a surface that meet in one vertex alone are connected for distance, but not for vectors, which need a
-    tangent plane along the way. Between two fans goes the triangle with the shortest third side that runs along its
-    sides against the neighbours. Where there is none, the largest fan stays, unless parts or points would be cut off.
-    """
-    is_outer, around = _around_gaps(F, len(P))
-    pinched = pinched_vertices(around, len(P), glued_sides(around, len(P)))
-    pinched = pinched[is_outer[pinched]]
-    if not len(pinched):
-        return F
-    is_near = np.zeros(len(P), bool)
-    is_near[pinched] = True
-    is_near[F[at_some_corner(is_near, F)]] = True
-    return _with_largest_fans(np.concatenate([F, joining_triangles(P, F[at_some_corner(is_near, F)], pinched)]), len(P))
-
-
-def _around_gaps(F: IntArray, n: int) -> tuple[BoolArray, IntArray]:
-    """Which of n points lie on outer edges, and those of the triangles F (m, 3) that have such a corner."""
-    sides = outer_sides(F, n)
-    is_outer = np.zeros(n, bool)
-    is_outer[F.ravel()[corner(sides, 1)]] = is_outer[F.ravel()[corner(sides, 2)]] = True
-    return is_outer, F[at_some_corner(is_outer, F)]
-
-
-def _with_largest_fans(F: IntArray, n: int) -> IntArray:
-    """The triangles F (m, 3) in the largest fan of each corner, and others that are between parts of these."""
-    fan, vertex = _fans(F, glued_sides(F, n)), F.ravel()
-    order = np.lexsort((-fan, np.bincount(fan)[fan], vertex))
-    largest = np.empty(n, np.int64)
-    # Of several values written to one place, the last stays.
-    largest[vertex[order]] = fan[order]
-    stays = (fan == largest[vertex]).reshape(-1, 3).all(axis=1)
-    part = connected_components(F[stays], n)[F]
-    stays |= (part != part[:, :1]).any(axis=1)
-    found: IntArray = F[stays]
-    return found
-
-
-def with_loops_filled(P: FloatArray, F: IntArray, reach: FloatArray) -> IntArray:
-    """The triangles F (m, 3) int32, and others in gaps all around which points have two outer edges.
+    tangent plane along the way. Loops of outer edges go from fan to fan there, to the nearest end of another one. Where
+    no triangle fits between two fans, the largest stays, unless parts or points would be cut off.
 
     Parameters
     ----------
     P : (n, 3) float64
         The points.
     F : (m, 3) int32
-        Triangles that are a surface.
+        Triangles that are a surface, oriented alike if it has two sides.
     reach : (n,) float64
         See `Neighbourhoods`.
+    is_gap : (n,) bool
+        The points at gaps, see `points_at_gaps`.
     """
     n = len(P)
-    sides = outer_sides(F, n)
-    if not len(sides):
-        return F
-    # Against the triangles there, so that those in the gap run like them.
-    ends = np.stack([F.ravel()[corner(sides, 2)], F.ravel()[corner(sides, 1)]], axis=1)
-    is_outer = np.zeros(n, bool)
-    is_outer[ends] = True
-    edges = F[at_some_corner(is_outer, F)][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
-    filled, is_closed = filling_triangles(
+    is_around = at_some_corner(is_gap, F)
+    around, inside = F[is_around], F[~is_around]
+    sides, ends, partner, joints = _loops(P, around, is_gap)
+    edges = around[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    filled, is_whole = filling_triangles(
         P,
         ends,
-        F.ravel()[sides],
-        _two_edges_at(ends, n),
+        around.ravel()[sides],
+        partner,
+        joints,
         _LARGEST_GAP * reach,
-        np.sort(edges.min(axis=1) * n + edges.max(axis=1)),
+        edges[is_gap[edges].all(axis=1)],
         _RIGHT_ANGLE,
         _MOST_FOLDED,
     )
-    if not len(filled):
-        return F
     part = connected_components(F, n)
-    sizes, gains = (np.bincount(part[of[:, 0]], minlength=n) for of in (F, filled[is_closed]))
-    return np.concatenate([F, filled[~is_closed | (sizes >= _PER_FILLED * gains)[part[filled[:, 0]]]]])
+    sizes, gains = (np.bincount(part[of[:, 0]], minlength=n) for of in (F, filled[is_whole]))
+    filled = filled[~is_whole | (sizes >= _PER_FILLED * gains)[part[filled[:, 0]]]]
+    return _with_largest_fans(inside, np.concatenate([around, filled]), is_gap)
 
 
-def _two_edges_at(ends: AnyArray, n: int) -> AnyArray:
-    """The edges (n, 2) int32 at points that have two of the edges (k, 2), and -1 at others."""
-    order = np.argsort(ends.ravel(), kind="stable")
-    point = ends.ravel()[order]
-    has_two = np.bincount(point, minlength=n) == 2
-    at = np.full((n, 2), -1, np.int32)
-    at[has_two] = order[has_two[point]].reshape(-1, 2) // 2
-    return at
+def points_at_gaps(F: IntArray, n: int) -> BoolArray:
+    """Which of n points lie on outer edges of the triangles F (m, 3)."""
+    vertex, twin, *_ = glue(F.astype(np.int64), np.zeros((n, 3)), 1.0)
+    sides = np.flatnonzero(twin < 0)
+    is_gap = np.zeros(n, bool)
+    is_gap[vertex[corner(sides, 1)]] = is_gap[vertex[corner(sides, 2)]] = True
+    return is_gap
+
+
+def _loops(P: FloatArray, F: IntArray, is_gap: BoolArray) -> tuple[IntArray, IntArray, IntArray, AnyArray]:
+    """Outer sides (k,) of the triangles F (m, 3) around gaps, and what `filling_triangles` takes of their loops.
+
+    These are the points (k, 2) at their ends, the partner (2 k,) of each end, and the number of further fans (n,).
+    """
+    first, second, _ = glued = glued_sides(F, len(P))
+    is_outer = np.ones(F.size, bool)
+    is_outer[first] = is_outer[second] = False
+    corners = F.ravel()
+    sides = np.flatnonzero(is_outer)
+    sides = sides[is_gap[corners[corner(sides, 1)]] & is_gap[corners[corner(sides, 2)]]]
+    at = np.stack([corner(sides, 1), corner(sides, 2)], axis=1)
+    ends, partner = corners[at], np.full(2 * len(sides), -1)
+    # A fan with an end has two: the side that begins at the point, which is even, and the one that ends there.
+    fans = np.argsort(_fans(F, glued)[at].ravel(), kind="stable").reshape(-1, 2)
+    fans = np.where(fans[:, :1] % 2 == 1, fans[:, ::-1], fans)
+    partner[fans] = fans[:, ::-1]
+    fans = fans[(fans % 2 == [0, 1]).all(axis=1)]
+    vertex = ends.ravel()[fans[:, 0]]
+    joints = np.maximum(np.bincount(vertex, minlength=len(P)) - 1, 0).astype(np.int32)
+    order = np.flatnonzero(joints[vertex])
+    order = order[np.argsort(vertex[order], kind="stable")]
+    for group in np.split(fans[order], np.flatnonzero(np.diff(vertex[order])) + 1) if len(order) else ():
+        begins, stops = (P[ends.ravel()[group[:, c] ^ 1]] for c in (0, 1))
+        following = group[_one_round(np.square(begins[:, None] - stops).sum(axis=2)), 1]
+        partner[group[:, 0]], partner[following] = following, group[:, 0]
+    return sides, ends, partner, joints
+
+
+def _one_round(cost: FloatArray) -> IntArray:
+    """What follows on each of k elements in a single round of all, the step (k, k) of lowest cost first."""
+    k = len(cost)
+    if k == 2:
+        return np.array([1, 0])
+    following, chain, is_followed = np.full(k, -1), np.arange(k), np.zeros(k, bool)
+    for step in np.argsort(cost, axis=None).tolist():
+        i, j = divmod(step, k)
+        is_last = np.count_nonzero(is_followed) == k - 1
+        if following[i] < 0 and not is_followed[j] and (chain[i] != chain[j] or is_last):
+            following[i], is_followed[j] = j, True
+            chain[chain == chain[j]] = chain[i]
+    return following
+
+
+def _with_largest_fans(inside: IntArray, around: IntArray, is_gap: BoolArray) -> IntArray:
+    """The triangles (m, 3), those around gaps last, but in the smaller ones of several fans at points (n,) of gaps.
+
+    A triangle stays if parts or points would be cut off.
+    """
+    n = len(is_gap)
+    while True:
+        fan, vertex = _fans(around, glued_sides(around, n)), around.ravel()
+        order = np.lexsort((-fan, np.bincount(fan)[fan], vertex))
+        largest = np.empty(n, np.int64)
+        # Of several values written to one place, the last stays.
+        largest[vertex[order]] = fan[order]
+        stays = ((fan == largest[vertex]) | ~is_gap[vertex]).reshape(-1, 3).all(axis=1)
+        if not stays.all():
+            part = connected_components(np.concatenate([inside, around[stays]]), n)[around]
+            stays |= (part != part[:, :1]).any(axis=1)
+        if stays.all():
+            return np.concatenate([inside, around])
+        # What is left of a fan may be several.
+        around = around[stays]

@@ -6,8 +6,8 @@ neighbours are near in memory. All kernels take rows, or a range of them, and sh
 `nearest_points`
     The k nearest points of each place, by boxes around points that follow each other.
 `local_fits`
-    The tangent plane of each neighbourhood by principal components, on fewer points where these are flatter; and the
-    quadric through it, onto which noisy points are moved.
+    The tangent plane of each neighbourhood by principal components, and the quadric through it, onto which noisy points
+    are moved.
 `empty_balls`
     Where a neighbourhood is far from flat, the neighbours on the same sheet: those that share an empty ball.
 `local_delaunay`
@@ -17,8 +17,7 @@ neighbours are near in memory. All kernels take rows, or a range of them, and sh
     In how many stars of its corners a triangle is. Those in all three never overlap.
 `fitting_triangles`
     Of the other triangles, one after the other, those that overlap none before them at a corner.
-`joining_fans`
-    Triangles between the fans of a vertex in which parts meet.
 `loop_filling`
-    Ears cut from small loops of outer edges, in space, where no tangent plane shows a gap.
+    Ears cut from loops of outer edges, in space, where no tangent plane shows a gap; first those between the fans of a
+    point.
 """

@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.cloud.loop_filling import BEYOND, POINT
 from cython.cimports.libc.math import INFINITY, sqrt
 
 
@@ -9,16 +10,18 @@ def filling_triangles(
     P: cython.const[cython.double][:, ::1],
     ends: cython.const[cython.int][:, ::1],
     opposite: cython.const[cython.int][::1],
-    at: cython.const[cython.int][:, ::1],
+    partner: cython.const[cython.longlong][::1],
+    joints: cython.int[::1],
     largest: cython.const[cython.double][::1],
-    edges: cython.const[cython.longlong][::1],
-    folded_back: cython.double,
+    edges: cython.const[cython.int][:, ::1],
+    most_bent: cython.double,
     most_folded: cython.double,
 ):
     """Triangles in the loops of outer edges.
 
     Of each loop, the ear with the smallest circumscribed circle is cut off again and again, as long as one may be: a
-    small gap is filled, and of a hole or of the border the notches. Ears that fold back are cut last, and only where
+    small gap is filled, and of a hole or of the border the notches. Before these come ears that join two fans of a
+    point, however large, that with the shortest third side first. Ears that fold back are cut last, and only where
     nothing is left of the loop then, as in creases.
 
     Parameters
@@ -29,40 +32,59 @@ def filling_triangles(
         Outer edges: sides of one triangle alone.
     opposite : (k,) int32
         The third corner of this triangle.
-    at : (n, 2) int32
-        The outer edges at points that have two, -1 at others: no loop goes through these.
+    partner : (2 k,) int64
+        The end ``2 f + d`` of edge f at which a loop goes on that comes to the end ``2 e + c`` of edge e; -1 if none.
+    joints : (n,) int32
+        How many fans there are at each point beside the first. Triangles between them are counted down.
     largest : (n,) float64
         Largest radius of circles through each point.
-    edges : (e,) int64
-        All edges of the surface, the numbers ``lower * n + upper`` in ascending order: none gets another triangle.
-    folded_back, most_folded : float
+    edges : (e, 2) int32
+        All edges between the points of loops: none gets another triangle.
+    most_bent, most_folded : float
         Cosines of the angle to the neighbour at an edge, 1 where the two lie on each other: the largest of triangles
         that are cut first, and of those in loops of which nothing is left.
 
     Returns
     -------
     triangles : (t, 3) int32
-    is_closed : (t,) bool
-        Whether nothing is left of the loop.
+    is_whole : (t,) bool
+        Whether they are in a loop of which nothing is left, and join no fans.
     """
     k: cython.Py_ssize_t = ends.shape[0]
     found, whole = np.empty((k, 3), np.int32), np.empty(k, np.bool_)
-    is_closed: cython.uchar[::1] = whole.view(np.uint8)
+    is_whole: cython.uchar[::1] = whole.view(np.uint8)
     triangles: cython.int[:, ::1] = found
     seen: cython.uchar[::1] = np.zeros(k, np.uint8)
-    ring: cython.int[::1] = np.empty(k, np.int32)
-    beyond: cython.int[::1] = np.empty(k, np.int32)
-    radius: cython.double[::1] = np.empty(k)
+    ring: cython.int[:, ::1] = np.empty((2, k), np.int32)
+    cost: cython.double[::1] = np.empty(k)
+    # The edges at each lower end, one after the other.
+    head: cython.int[::1] = np.full(P.shape[0], -1, np.int32)
+    link: cython.int[:, ::1] = np.empty((edges.shape[0] + k, 2), np.int32)
     count: cython.Py_ssize_t = 0
     with cython.nogil:
+        for e in range(edges.shape[0]):
+            _enter(head, link, e, edges[e, 0], edges[e, 1])
         for e in range(k):
             if not seen[e]:
-                size: cython.Py_ssize_t = _loop(e, ends, opposite, at, seen, ring, beyond)
+                size: cython.Py_ssize_t = _loop(e, ends, opposite, partner, seen, ring)
                 if size >= 3:
                     cut: cython.Py_ssize_t = _fill(
-                        P, ring, beyond, radius, size, largest, edges, folded_back, most_folded, triangles[count:]
+                        P,
+                        ring,
+                        cost,
+                        size,
+                        joints,
+                        largest,
+                        head,
+                        link,
+                        edges.shape[0] + count,
+                        most_bent,
+                        most_folded,
+                        triangles[count:],
+                        is_whole[count:],
                     )
-                    is_closed[count : count + cut] = cut == size - 2
+                    if cut < size - 2:
+                        is_whole[count : count + cut] = 0
                     count += cut
     return found[:count], whole[:count]
 
@@ -73,72 +95,85 @@ def _loop(
     start: cython.Py_ssize_t,
     ends: cython.const[cython.int][:, ::1],
     opposite: cython.const[cython.int][::1],
-    at: cython.const[cython.int][:, ::1],
+    partner: cython.const[cython.longlong][::1],
     seen: cython.uchar[::1],
-    ring: cython.int[::1],
-    beyond: cython.int[::1],
+    ring: cython.int[:, ::1],
 ) -> cython.Py_ssize_t:
-    """The points of the loop from an edge on, and the corners opposite to the edges; their number, 0 if it ends."""
+    """The points of the loop from an edge on, and the corners opposite to the edges; their number, 0 if it ends.
+
+    It goes against the triangle of the first edge, so that triangles in the loop run like those around it.
+    """
     size: cython.Py_ssize_t = 0
-    e: cython.Py_ssize_t = start
-    point: cython.int = ends[e, 0]
-    while not seen[e]:
+    at: cython.Py_ssize_t = 2 * start + 1
+    while not seen[at // 2]:
+        e: cython.Py_ssize_t = at // 2
         seen[e] = 1
-        ring[size], beyond[size] = point, opposite[e]
+        ring[POINT, size], ring[BEYOND, size] = ends[e, at % 2], opposite[e]
         size += 1
-        point = ends[e, 1] if ends[e, 0] == point else ends[e, 0]
-        if at[point, 0] < 0:
+        at = partner[at ^ 1]
+        if at < 0:
             return 0
-        e = at[point, 1] if at[point, 0] == e else at[point, 0]
-    return size if e == start else 0
+    return size if at == 2 * start + 1 else 0
 
 
 @cython.cfunc
 @cython.nogil
 def _fill(
     P: cython.const[cython.double][:, ::1],
-    ring: cython.int[::1],
-    beyond: cython.int[::1],
-    radius: cython.double[::1],
+    ring: cython.int[:, ::1],
+    cost: cython.double[::1],
     size: cython.Py_ssize_t,
+    joints: cython.int[::1],
     largest: cython.const[cython.double][::1],
-    edges: cython.const[cython.longlong][::1],
-    folded_back: cython.double,
+    head: cython.int[::1],
+    link: cython.int[:, ::1],
+    n_edges: cython.Py_ssize_t,
+    most_bent: cython.double,
     most_folded: cython.double,
     triangles: cython.int[:, ::1],
+    is_whole: cython.uchar[::1],
 ) -> cython.Py_ssize_t:
-    """Cut ears from a ring of points while there are any; how many."""
+    """Cut ears from a ring of points while there are any; how many. Each enters its third side as an edge."""
     count: cython.Py_ssize_t = 0
     flat: cython.Py_ssize_t = -1
-    limit: cython.double = folded_back
+    limit: cython.double = most_bent
     for i in range(size):
-        radius[i] = _ear(P, ring, beyond, size, i, largest, edges, limit)
+        cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit)
     while size > 2:
         best: cython.Py_ssize_t = 0
         for i in range(1, size):
-            if radius[i] < radius[best]:
+            if cost[i] < cost[best]:
                 best = i
-        if radius[best] == INFINITY:
+        if cost[best] == INFINITY:
             if flat >= 0:
                 return flat
             flat, limit = count, most_folded
             for i in range(size):
-                radius[i] = _ear(P, ring, beyond, size, i, largest, edges, limit)
+                cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit)
             continue
+        # In the meantime its third side may have become an edge, or all fans there are joined.
+        current: cython.double = _ear(P, ring, size, best, joints, largest, head, link, limit)
+        if current != cost[best]:
+            cost[best] = current
+            continue
+        is_whole[count] = cost[best] >= 0.0
+        joints[ring[POINT, best]] -= joints[ring[POINT, best]] > 0
         before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
-        triangles[count, 0], triangles[count, 1] = ring[before], ring[best]
-        triangles[count, 2] = ring[0 if best == size - 1 else best + 1]
+        after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
+        triangles[count, 0], triangles[count, 1] = ring[POINT, before], ring[POINT, best]
+        triangles[count, 2] = ring[POINT, after]
+        _enter(head, link, n_edges + count, ring[POINT, before], ring[POINT, after])
         count += 1
-        beyond[before] = ring[best]
+        ring[BEYOND, before] = ring[POINT, best]
         size -= 1
         for i in range(best, size):
-            ring[i], beyond[i], radius[i] = ring[i + 1], beyond[i + 1], radius[i + 1]
+            ring[POINT, i], ring[BEYOND, i], cost[i] = ring[POINT, i + 1], ring[BEYOND, i + 1], cost[i + 1]
         # The two neighbours have other ears now.
         for i in range(best - 1, best + 1):
             j: cython.Py_ssize_t = (i + size) % size
-            radius[j] = _ear(P, ring, beyond, size, j, largest, edges, limit)
+            cost[j] = _ear(P, ring, size, j, joints, largest, head, link, limit)
         if size == 3:  # one triangle is left
-            radius[0] = radius[1] = radius[2] = _ear(P, ring, beyond, size, 0, largest, edges, limit)
+            cost[0] = cost[1] = cost[2] = _ear(P, ring, size, 0, joints, largest, head, link, limit)
     return count
 
 
@@ -146,47 +181,57 @@ def _fill(
 @cython.nogil
 def _ear(
     P: cython.const[cython.double][:, ::1],
-    ring: cython.int[::1],
-    beyond: cython.int[::1],
+    ring: cython.int[:, ::1],
     size: cython.Py_ssize_t,
     i: cython.Py_ssize_t,
+    joints: cython.int[::1],
     largest: cython.const[cython.double][::1],
-    edges: cython.const[cython.longlong][::1],
+    head: cython.int[::1],
+    link: cython.int[:, ::1],
     most_folded: cython.double,
 ) -> cython.double:
-    """Radius of the circle through point i of a ring and its neighbours; infinite if it may not be cut."""
+    """Radius of the circle through point i of a ring and its neighbours; infinite if it may not be cut.
+
+    Negative if it joins two fans, and the smaller the shorter the third side is.
+    """
     before: cython.Py_ssize_t = size - 1 if i == 0 else i - 1
     after: cython.Py_ssize_t = 0 if i == size - 1 else i + 1
-    a: cython.int = ring[before]
-    b: cython.int = ring[i]
-    c: cython.int = ring[after]
-    if size > 3 and _is_edge(edges, min(a, c), max(a, c), P.shape[0]):
+    a: cython.int = ring[POINT, before]
+    b: cython.int = ring[POINT, i]
+    c: cython.int = ring[POINT, after]
+    if a in (b, c) or b == c or (size > 3 and _is_edge(head, link, a, c)):
         return INFINITY
+    if joints[b] > 0:
+        square: cython.double = 0.0
+        for x in range(3):
+            square += (P[c, x] - P[a, x]) * (P[c, x] - P[a, x])
+        return -1.0 / square if square > 0.0 else -INFINITY
     radius: cython.double = _circumradius(P, a, b, c)
     # The last triangle has no edge of its own, and closes the gap even if its corners lie on a line.
     if size > 3 and radius >= min(largest[a], min(largest[b], largest[c])):
         return INFINITY
-    folded: cython.double = max(_fold(P, a, b, c, beyond[before]), _fold(P, b, c, a, beyond[i]))
+    folded: cython.double = max(_fold(P, a, b, c, ring[BEYOND, before]), _fold(P, b, c, a, ring[BEYOND, i]))
     if size == 3:
-        folded = max(folded, _fold(P, c, a, b, beyond[after]))
+        folded = max(folded, _fold(P, c, a, b, ring[BEYOND, after]))
     return INFINITY if folded > most_folded else radius
 
 
 @cython.cfunc
 @cython.nogil
-def _is_edge(
-    edges: cython.const[cython.longlong][::1], lower: cython.longlong, upper: cython.longlong, n: cython.longlong
-) -> cython.bint:
-    code: cython.longlong = lower * n + upper
-    low: cython.Py_ssize_t = 0
-    high: cython.Py_ssize_t = edges.shape[0]
-    while low < high:
-        middle: cython.Py_ssize_t = (low + high) // 2
-        if edges[middle] < code:
-            low = middle + 1
-        else:
-            high = middle
-    return low < edges.shape[0] and edges[low] == code
+def _enter(
+    head: cython.int[::1], link: cython.int[:, ::1], e: cython.Py_ssize_t, a: cython.int, b: cython.int
+) -> cython.void:
+    link[e, 0], link[e, 1] = max(a, b), head[min(a, b)]
+    head[min(a, b)] = cython.cast(cython.int, e)
+
+
+@cython.cfunc
+@cython.nogil
+def _is_edge(head: cython.int[::1], link: cython.int[:, ::1], a: cython.int, b: cython.int) -> cython.bint:
+    e: cython.int = head[min(a, b)]
+    while e >= 0 and link[e, 0] != max(a, b):
+        e = link[e, 1]
+    return e >= 0
 
 
 @cython.cfunc
