@@ -312,9 +312,8 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     solver = SignedHeatSolver(mesh)
     domain, integration = solver.operators, solver._integration
     pieces = integration._pieces(oriented_set(curves, mesh))
-    on_curves = signed_heat._OnCurves(domain, mesh.F, pieces)
     values = np.sin(5 * pieces.barycentric[:, 0] + pieces.faces)
-    h = domain.mean_edge_lengths[on_curves.component]
+    h = domain.mean_edge_lengths[pieces.component]
     rows = np.repeat(np.arange(len(values)), 3)
     B = sp.csr_array((pieces.barycentric.ravel(), (rows, mesh.F[pieces.faces].ravel())), shape=(len(values), len(V)))
     weighted = B.T @ sp.diags_array(pieces.weight / h)
@@ -322,7 +321,7 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
     off = []
     for steps in (3, 200):
         monkeypatch.setattr(signed_heat, "_SMOOTH_STEPS", steps)
-        found = integration._levels._smooth(values, on_curves)
+        found = integration._smooth(values, pieces)
         off.append(np.abs(found - truth).max() / np.abs(truth).max())
     assert off[1] < 1e-9
     assert off[0] < 0.2

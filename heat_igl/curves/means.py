@@ -13,6 +13,7 @@ from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import AccuracyWarning, SourceError, is_number, names_guessed, real_numbers, shown
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh, as_simplices
+from heat_igl.plan import ROUGH_FOR_MEANS
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
@@ -21,10 +22,9 @@ _INSIDE = 1e-7
 # The search ends with a step below this share of the largest distance from the mean.
 _CONVERGED = 1e-9
 _MOST_STEPS = 500
-# With more radians of curvature at a vertex in the mean, log maps are those of exact paths: locally shortest ones often
-# pass a hill on the longer side. The sum has local minima within an edge or two of each other, so there are three
-# starts: of 60 means of two points on rough squares one was not in the middle from one vertex, and none from three.
-_ROUGH, _STARTS = 0.1, 3
+# On rough surfaces, the sum has local minima within an edge or two of each other, so there are three starts: of 60
+# means of two points on rough squares one was not in the middle from one vertex, and none from three.
+_STARTS = 3
 # Distances in a weight d^(p - 2) are at least this share of the largest one.
 _NEAREST = 1e-12
 # With higher powers, distances far from 1 overflow or vanish.
@@ -120,7 +120,7 @@ class _Mean:
         self._weight, self._power = weight / weight.sum(), power
         self._solver = GeodesicPathSolver(mesh)
         self._tracer = tracer
-        self._is_rough = tracer.curvature > _ROUGH
+        self._is_rough = tracer.curvature > ROUGH_FOR_MEANS
 
     def found(self) -> SurfacePoints:
         """The point with the least sum."""

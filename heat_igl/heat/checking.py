@@ -121,11 +121,6 @@ class AnswerCheck(NamedTuple):
     raised: bool = False
     compared: Comparison | None = None
 
-    @property
-    def is_short(self) -> bool:
-        """Whether the answer is so far below straight lines that it should be raised to them."""
-        return self.shortfall > _RAISED
-
     def complaint(self, is_surface: bool) -> str | None:
         """The text of a warning, None if none is due: the size of the error or violation, the place, and a remedy."""
         if self.compared is not None:
@@ -174,7 +169,8 @@ class Comparisons:
         # By kind and component: how many answers were near; -1 after one that was not.
         self._near: dict[Kind, IntArray] = {}
         self._engine: Engine | None = None
-        self._worst: Comparison | None = None
+        #: Of all comparisons, the one that is farthest off on average; None before the first.
+        self.worst: Comparison | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_engine": None}
@@ -188,7 +184,7 @@ class Comparisons:
         engine = self._engine or self._made()
         other = engine.distance(sources)[: len(distance)]
         found = Comparison.of(distance, other, float(sources.offsets.min()))
-        self._worst = found if self._worst is None else max(found, self._worst)
+        self.worst = found if self.worst is None else max(found, self.worst)
         if not found.is_near:
             near[components] = -1
         elif found.largest > _ROUNDING:
@@ -216,11 +212,6 @@ class Comparisons:
         if surface is not None and surface.given_faces is not None:
             vertices += [surface.given_faces[places.faces, 0] for places in (sources.points, sources.segments)]
         return np.unique(self._domain.components[np.concatenate(vertices)])
-
-    @property
-    def worst(self) -> Comparison | None:
-        """Of all comparisons, the one that is farthest off on average; None before the first."""
-        return self._worst
 
 
 def _kind(sources: SourceSet) -> Kind:
@@ -292,7 +283,11 @@ class Checker:
         if self._bounds is not None:
             self._bounds.shorten(distance, share=_STEEP)
         places = source_places(self._V, self._F, sources)
-        if places is None or self._V is None or not (check.is_short or len(sources.offsets) <= _VERY_FEW_SOURCES):
+        if (
+            places is None
+            or self._V is None
+            or not (check.shortfall > _RAISED or len(sources.offsets) <= _VERY_FEW_SOURCES)
+        ):
             return check
         return check._replace(raised=raise_to_lines(distance, self._V, *places))
 

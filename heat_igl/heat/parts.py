@@ -363,8 +363,8 @@ def prepare(
         t_damping=t_damping,
         fitted=fitted,
         checker=Checker(domain, V),
-        comparisons=Comparisons(domain) if is_comparable and options.holds_to_bounds else None,
         is_default=options.holds_to_bounds,
+        comparisons=Comparisons(domain) if is_comparable and options.holds_to_bounds else None,
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,
     )

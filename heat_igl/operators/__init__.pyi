@@ -1,9 +1,7 @@
-from heat_igl.operators.connection import FaceRotations as FaceRotations
 from heat_igl.operators.connection import connection_laplacian as connection_laplacian
 from heat_igl.operators.connection import edge_rotations as edge_rotations
 from heat_igl.operators.connection import face_rotations as face_rotations
 from heat_igl.operators.connection import with_rotations as with_rotations
-from heat_igl.operators.matrices import EdgeLengths as EdgeLengths
 from heat_igl.operators.matrices import Laplacian as Laplacian
 from heat_igl.operators.matrices import OnLaplacian as OnLaplacian
 from heat_igl.operators.matrices import Operators as Operators

@@ -6,8 +6,6 @@ exp(i rho) (Knoeppel, Crane, Pinkall, Schroeder 2013; Sharp, Soliman, Crane 2019
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import igl
 import numpy as np
 import scipy.sparse as sp
@@ -115,17 +113,7 @@ def edge_rotations(domain: Operators) -> sp.csc_matrix:
     return sp.csc_matrix(turned + sp.diags_array(1 + extra))
 
 
-class FaceRotations(NamedTuple):
-    """Factors (m, 3) that turn vectors at the corners of faces into vectors in the planes of the faces.
-
-    For the faces of the mesh, and for the triangles that the operators belong to.
-    """
-
-    of_faces: AnyArray
-    of_triangulation: AnyArray
-
-
-def face_rotations(domain: Operators) -> FaceRotations:
+def face_rotations(domain: Operators) -> tuple[AnyArray, AnyArray]:
     """By what the numbers a + i b of vectors at corners are multiplied to give those of vectors in faces.
 
     A vector in a face has its components along the side from corner 0 to corner 1, and across it, towards corner 2.
@@ -141,9 +129,9 @@ def face_rotations(domain: Operators) -> FaceRotations:
     surface = domain.surface
     if surface is None or surface.faces is None or surface.faces is triangulation:
         both = _corner_rotations(triangulation, angles)
-        return FaceRotations(both, both)
+        return both, both
     of_faces = _corner_rotations(surface.faces, polar_angles(surface.faces))
-    return FaceRotations(of_faces, _corner_rotations(triangulation, angles))
+    return of_faces, _corner_rotations(triangulation, angles)
 
 
 def _corner_rotations(triangulation: IntrinsicTriangulation, angles: PolarAngles) -> AnyArray:

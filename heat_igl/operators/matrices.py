@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -64,17 +64,6 @@ class Surface:
         return F
 
 
-class EdgeLengths(NamedTuple):
-    """Edges, each with the vertices `i`, `j` (k,) at the ends and the `length` (k,).
-
-    Several edges may join the same two vertices, and one may join a vertex to itself.
-    """
-
-    i: IntArray
-    j: IntArray
-    length: FloatArray
-
-
 @dataclass(frozen=True, eq=False)
 class TriangleElements:
     """Linear elements on m triangles: all that the operators and the steps take of a triangulation.
@@ -127,11 +116,11 @@ class TriangleElements:
         with np.errstate(divide="ignore"):
             return 1 / base, x / base, 1 / y
 
-    def edge_lengths(self) -> EdgeLengths:
-        """The edges of the triangles."""
+    def edge_lengths(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """The edges (k,) of the triangles: the vertices at their ends, which may be the same, and the lengths."""
         triangulation = self.triangulation
         edges = triangulation.edges
-        return EdgeLengths(triangulation.tail(edges), triangulation.head(edges), triangulation.l.ravel()[edges])
+        return triangulation.tail(edges), triangulation.head(edges), triangulation.l.ravel()[edges]
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,9 +278,10 @@ class Operators:
         if edges is None:
             scale = np.asarray(self.mean_masses / self.mean_mass) ** (1 / (2 if self.is_surface else 3))
             return np.asarray(self.mean_edge_length * scale)
-        component = self.components[edges.i]
+        ends, _, length = edges
+        component = self.components[ends]
         count = np.bincount(component, minlength=self.n_components)
-        total = np.bincount(component, edges.length, self.n_components)
+        total = np.bincount(component, length, self.n_components)
         return np.where(count > 0, total / np.maximum(count, 1), self.mean_edge_length)
 
     @cached_property
@@ -329,14 +319,14 @@ class Operators:
             return np.flatnonzero(self.boundary[self.gradient.corners].any(axis=1))
         return np.asarray(np.unique(self.G[:, self.boundary].indices % len(self.weights)))
 
-    def edge_lengths(self) -> EdgeLengths | None:
+    def edge_lengths(self) -> tuple[IntArray, IntArray, FloatArray] | None:
         """Pairs of vertices that L couples and their distance, each edge once; None if `lengths` is."""
         if isinstance(self.lengths, TriangleElements):
             return self.lengths.edge_lengths()
         if self.lengths is None:
             return None
         above = sp.triu(self.lengths, 1, format="coo")
-        return EdgeLengths(above.row, above.col, above.data)
+        return above.row, above.col, above.data
 
 
 def check_laplacian(laplacian: str) -> None:
