@@ -150,9 +150,6 @@ def test_points_in_faces_as_sources():
     mesh, rng = moved(shapes.torus(50, 25), 0.3), np.random.default_rng(8)
     faces, barycentric = rng.integers(mesh.n_faces, size=4), rng.dirichlet([2, 2, 2], 4)
     solver = GeodesicSolver(mesh, method="exact")
-    triangulation = solver.distance_vjp(0)[1]._paths.triangulation
-    carried = triangulation.locate(faces, barycentric)[1]
-    assert (carried != barycentric).any(), "no point lies beside a flipped edge"
 
     def at(coordinates):
         return SurfacePoints(faces, coordinates)

@@ -1,8 +1,7 @@
 """Derivatives of exact distance by the positions of the vertices, by edge lengths, by the sources and by a metric.
 
-All of them go by the lengths of the sides of the triangles that the answer was found on. From the answer to these
-lengths lead paths (`heat_igl.kernels.windows.paths`), from there to the edges of the mesh the flips
-(`heat_igl.intrinsic.length_derivatives`), and on to the positions the edges. docs/derivatives_theory.md derives each
+All of them go by the lengths of the sides of the faces. From the answer to these lengths lead paths on the faces
+(`heat_igl.kernels.windows.paths`), and on to the positions the edges. docs/derivatives_theory.md derives each
 step.
 """
 
@@ -14,7 +13,6 @@ import numpy as np
 
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
-from heat_igl.intrinsic.length_derivatives import PlaceSlopes, carry_lengths, carry_lengths_back
 from heat_igl.kernels.windows import paths as kernels
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.operators import MetricSides, SideLengths, Surface
@@ -34,8 +32,7 @@ class DistanceDerivative:
 
     Where the shortest path is not unique (at the cut locus, and between two sources) the path that was found decides,
     and the derivative is one of several one-sided ones. So it is at a vertex next to a source vertex, whose distance
-    has no gradient in the source. Which edges were flipped counts as fixed, which is right almost everywhere: a flip
-    changes neither the surface nor a path on it.
+    has no gradient in the source.
 
     Attributes
     ----------
@@ -54,10 +51,9 @@ class DistanceDerivative:
         windows: ExactSurface,
     ) -> None:
         self.distance, self._sources, self._sides = distance, sources, sides
-        self._paths = PathLengths(windows, surface.unfolding, sources)
         if surface.faces is None:
             raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
-        self._faces = surface.faces
+        self._faces, self._paths = surface.faces, PathLengths(windows, surface.faces, sources)
         self.unreachable: IntArray = np.flatnonzero(np.isinf(distance))
 
     def __call__(self, g: ArrayLike) -> FloatArray:
@@ -169,14 +165,15 @@ class DistanceDerivative:
         sides, places = self._positions(), self._sources.points
         moved = velocities("dV", dV, sides.mesh.V.shape, "vertex")
         by_side = self._on_faces(sides.push_positions(moved))
-        given = None
-        if len(places.faces):
-            by_place = np.zeros((len(places.faces), 3))
-            if points is not None:
-                velocity = velocities("points", points, by_place.shape, "source point")
-                by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
-            given = PlaceSlopes(places.faces, places.barycentric, by_place)
-        result = self._paths.push_forward(*carry_lengths(self._paths.triangulation, by_side, given))
+        by_place = np.zeros((len(places.faces), 3))
+        if points is not None and len(places.faces):
+            velocity = velocities("points", points, by_place.shape, "source point")
+            by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
+        if self._merged is not None:
+            on_faces = np.empty_like(by_place)
+            np.put_along_axis(on_faces, self._merged.corner[places.faces], by_place, axis=1)
+            by_place = on_faces
+        result = self._paths.push_forward(by_side, by_place)
         result[self.unreachable] = 0.0
         return result
 
@@ -207,10 +204,11 @@ class DistanceDerivative:
         return self._sides
 
     def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-        """The derivative (m, 3) by the sides of the faces before any flip, and (p, 3) by the points in given faces."""
-        (by_side, by_place), points = self._paths.pull_back(row), self._sources.points
-        places = None if by_place is None else PlaceSlopes(points.faces, points.barycentric, by_place)
-        return carry_lengths_back(self._paths.triangulation, by_side, places)
+        """The derivative (m, 3) by the sides of the faces, each once, and (p, 3) by the points in given faces."""
+        by_side, by_place = self._paths.pull_back(row)
+        if by_place is not None and self._merged is not None:
+            by_place = np.take_along_axis(by_place, self._merged.corner[self._sources.points.faces], axis=1)
+        return by_side, by_place
 
     @cached_property
     def _merged(self) -> Merged | None:
@@ -314,9 +312,9 @@ class PathLengths:
         known = [at.any(axis=1) for at in same]
         return [(k, places.point[k], at.argmax(axis=1)[k]) for at, k in zip(same, known, strict=True)]
 
-    def push_forward(self, by_side: FloatArray, by_place: FloatArray | None) -> FloatArray:
+    def push_forward(self, by_side: FloatArray, by_place: FloatArray) -> FloatArray:
         """How the distances (n,) change with sides (m, 3) and places (p, 3) of points in the triangulation."""
-        moves = np.zeros((len(self._places.faces), 3)) if by_place is None else self._at_places(by_place)
+        moves = self._at_places(by_place)
         return self._summed(by_side, moves, np.zeros(self._tables.n + len(moves)))
 
     def lengths(self) -> FloatArray:

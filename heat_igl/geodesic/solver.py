@@ -464,7 +464,7 @@ class GeodesicSolver(BatchedSolver):
         if isinstance(domain, Operators):
             sides = domain.metric
         distance = engine.distance(chosen, np.inf, n_threads())
-        return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_delaunay)
+        return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_faces)
 
     def _windows(self, what: str) -> GuardedEngine:
         """The engine, if it finds paths."""

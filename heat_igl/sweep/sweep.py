@@ -173,7 +173,7 @@ class SweepEngine(TriangleEngine):
             return None
         edges = _KNOWN_RADIUS if sources.on_vertices_alone else NEAR_RADIUS
         cutoff = edges * self._triangles.mean_edge_length + float(sources.offsets.max())
-        surface = self._on_faces if len(sources.segments.faces) else self.on_delaunay
+        surface = self.on_faces if len(sources.segments.faces) else self.on_delaunay
         return surface.solve(sources, cutoff=cutoff)
 
     def _swept(self, query: Query, points: SourcePoints, near: ExactSolution | None) -> tuple[FloatArray, IntArray]:

@@ -166,7 +166,7 @@ class TriangleEngine(Engine):
         return ExactSurface(self._triangles.surface.unfolding)
 
     @cached_property
-    def _on_faces(self) -> ExactSurface:
+    def on_faces(self) -> ExactSurface:
         """The faces before any flip, in which curves lie."""
         return ExactSurface(self._triangles.faces)
 
@@ -212,7 +212,7 @@ class WindowEngine(TriangleEngine):
     def _surface(self, sources: SourceSet, *, locates: bool = False) -> ExactSurface:
         """The triangles to search in; `locates` asks for ones that know where points are."""
         if len(sources.segments.faces):
-            return self._on_faces
+            return self.on_faces
         return self.on_delaunay if locates or not sources.on_vertices_alone else self._from_vertices
 
     def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
