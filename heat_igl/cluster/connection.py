@@ -100,7 +100,5 @@ def _restored_environment() -> Iterator[None]:
 
 def dask_modules() -> tuple[Any, Any]:
     """The modules `dask` and `distributed`; a MissingExtraError if they are not installed."""
-    try:
+    with MissingExtraError.guard("a batch", "distributed", "cluster"):
         return importlib.import_module("dask"), importlib.import_module("distributed")
-    except ImportError:
-        raise MissingExtraError.of("a batch", "distributed", "cluster") from None

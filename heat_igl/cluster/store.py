@@ -277,10 +277,8 @@ def locked(path: Path) -> Iterator[None]:
     """
     lock = Path(os.path.realpath(path.with_name(f"{path.name}.lock")))
     with contextlib.ExitStack() as stack:
-        try:
+        with MissingExtraError.guard("a batch", "distributed", "cluster"):
             import locket
-        except ImportError:
-            raise MissingExtraError.of("a batch", "distributed", "cluster") from None
         with _writing(path):
             lock.parent.mkdir(parents=True, exist_ok=True)
             try:

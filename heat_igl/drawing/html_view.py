@@ -22,16 +22,8 @@ from typing import Any, get_args
 import numpy as np
 
 from heat_igl.drawing.figure import PAGE_SUFFIXES
-from heat_igl.drawing.scene import (
-    DISTANCE_COLOURS,
-    DISTANCE_LABEL,
-    LINE_INK,
-    STRIPE_INK,
-    Style,
-    check_style,
-    colours,
-    scene,
-)
+from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, colours, scene
+from heat_igl.errors import require_choice
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.io import complete_file
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
@@ -137,7 +129,7 @@ def page(
     """
     is_cloud = isinstance(given := as_mesh(mesh), PointCloud)
     mesh = as_simplices(given)
-    check_style(style)
+    require_choice("style", style, get_args(Style))
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
     table = colours(colormap)(np.linspace(0, 1, 256))
     middle, extent = seen.box

@@ -27,8 +27,8 @@ import numpy as np
 from heat_igl.drawing.figure import Picture, fitted, lay_out
 from heat_igl.drawing.html_view import Page, page
 from heat_igl.drawing.raster import rasterize, to_pixels, visible_runs
-from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, check_style, colours, scene, slopes
-from heat_igl.errors import as_array, real_numbers, require_choice
+from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, colours, scene, slopes, vertex_values
+from heat_igl.errors import as_array, require_choice
 from heat_igl.io import complete_file, write_svg
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_mesh, as_simplices, flat_curves
 from heat_igl.sources import Sources
@@ -106,7 +106,7 @@ def plot(
         If matplotlib is not installed.
     """
     mesh = _drawn(mesh)
-    check_style(style)
+    require_choice("style", style, get_args(Style))
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
     return lay_out(seen, [seen.line(curve, mesh) for curve in curves], style, colours(colormap), label, "unreachable")
 
@@ -216,9 +216,7 @@ def plot_labels(
         mesh, values, name="labels", sources=sources, limits=(0, _N_COLOURS), view=view, up=up, is_categorical=True
     )  # fmt: skip
     if distance is not None:
-        measured = real_numbers("distance", distance)
-        if measured.shape != given.shape:
-            raise ValueError(f"distance must have shape {given.shape}, one per vertex, but it has {measured.shape}")
+        measured = vertex_values("distance", distance, mesh.n_vertices)
         if not isinstance(mesh, PointCloud):  # whose discs have one label each
             # Without a label there is no site to be far from.
             seen = replace(seen, borders=_borders(seen, given, np.where(given < 0, 0.0, measured / seen.unit)))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import igl
 import numpy as np
 
 from heat_igl.drawing.raster import default_rotation, rotation
-from heat_igl.errors import MissingExtraError, real_numbers, require_choice
+from heat_igl.errors import MissingExtraError, real_numbers
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_simplices
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
@@ -86,7 +86,7 @@ def scene(
     A ValueError if `values` (called `name` in the message) do not have shape (n,), contain NaN or no finite value, or
     an option is invalid; a SourceError if `sources` are.
     """
-    checked = _checked(name, values, mesh.n_vertices)
+    checked = vertex_values(name, values, mesh.n_vertices)
     vertices, dots, lines = _places(as_simplices(mesh), sources)
     if up not in _PERMUTATION:
         raise ValueError(f"up must be 'x', 'y' or 'z', not {up!r}")
@@ -163,12 +163,8 @@ def colours(colormap: str, is_trimmed: bool = True) -> Any:
     return ListedColormap(table[table[:, :3] @ [0.2126, 0.7152, 0.0722] > 0.2] if is_trimmed else table)
 
 
-def check_style(style: str) -> None:
-    """Raise ValueError if `style` is not a `Style`."""
-    require_choice("style", style, get_args(Style))
-
-
-def _checked(name: str, values: ArrayLike, n: int) -> FloatArray:
+def vertex_values(name: str, values: ArrayLike, n: int) -> FloatArray:
+    """`values` (n,) as an array; a ValueError that calls them `name` if they are not such, or if none can be drawn."""
     checked = real_numbers(name, values)
     if checked.shape != (n,):
         raise ValueError(f"{name} must have shape ({n},), one per vertex, but it has {checked.shape}")

@@ -258,12 +258,10 @@ def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[s
     `truth` (n,) is what each of the `distances` (n,) is compared with. The surface is seen as `heat_igl.plots.plot`
     shows it. A MissingExtraError without matplotlib.
     """
-    try:
+    with MissingExtraError.guard("a figure", "matplotlib", "view"):
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import LogNorm
         from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtraError.of("a figure", "matplotlib", "view") from None
     across = min(_ACROSS, len(distances))
     down = -(-len(distances) // across)
     figure = Figure(figsize=(0.6 + 2.8 * across, _ROW_INCHES * down + 0.4), layout="constrained")
