@@ -22,7 +22,7 @@ import heat_igl
 from heat_igl import Mesh, cluster
 from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.store import Store, rows_per_block
-from heat_igl.cluster.worker import Task, begin
+from heat_igl.cluster.worker import Task, work
 from heat_igl.errors import BatchError
 
 pytest.importorskip("distributed")
@@ -218,7 +218,7 @@ def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
     (item,) = items({"fan": FAN})
     task = Task(item, tmp_path / "elsewhere", SourcePlan.of("all"), "float32", False, {})
     with pytest.raises(BatchError, match=r"a worker cannot open store .*elsewhere.* Name a folder that .* share"):
-        begin([task])
+        work([task])
 
 
 WORKERS = """
@@ -458,8 +458,8 @@ def test_a_bundle_that_kills_its_workers_is_handed_out_again_mesh_by_mesh():
     future.result.side_effect = KilledWorker("task", None, 3)
     run = batch._Run(Mock(), Mock(), Mock())
     tasks = [Mock(), Mock(), Mock()]
-    left = run._collect(future, batch.TaskBundle(batch.begin, tasks))
-    assert left == [(batch.begin, [task]) for task in tasks]
+    left = run._collect(future, tasks)
+    assert left == [[task] for task in tasks]
     assert not run._collect(future, left[1])
     assert run._reason == {tasks[1].item.name: "the workers that tried it died: out of memory, or a crash in a library"}
 

@@ -9,17 +9,17 @@ import contextlib
 import logging
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.connection import connected, dask_modules
 from heat_igl.cluster.report import BatchReport, rows
 from heat_igl.cluster.store import Store, locked
-from heat_igl.cluster.worker import TOPIC, Outcome, Task, begin, release, resume
+from heat_igl.cluster.worker import TOPIC, Outcome, Task, release, work
 from heat_igl.errors import BatchError
 from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.mesh import MeshLike
@@ -170,11 +170,8 @@ def watched(client: Any, n_meshes: int, progress: bool) -> Iterator[Watch]:
                 client.unsubscribe_topic(TOPIC)
 
 
-class TaskBundle(NamedTuple):
-    """Tasks that a worker does one after the other, by one call of a function."""
-
-    function: Callable[[Sequence[Task]], list[Outcome]]
-    tasks: Sequence[Task]
+# Tasks that a worker does one after the other, by one call.
+TaskBundle = Sequence[Task]
 
 
 def _bundles(tasks: Sequence[Task], at_once: int) -> Iterator[TaskBundle]:
@@ -182,7 +179,7 @@ def _bundles(tasks: Sequence[Task], at_once: int) -> Iterator[TaskBundle]:
     start = 0
     while start < len(tasks):
         k = max(1, min(_BUNDLE_SIZE, (len(tasks) - start) // (2 * at_once)))
-        yield TaskBundle(begin, tasks[start : start + k])
+        yield tasks[start : start + k]
         start += k
 
 
@@ -228,7 +225,7 @@ class _Run:
     def _submit(self, bundle: TaskBundle) -> Any:
         self._priority -= 1
         # Not pure: a task writes to the store, which the arguments do not show.
-        return self._client.submit(bundle.function, bundle.tasks, pure=False, priority=self._priority)
+        return self._client.submit(work, bundle, pure=False, priority=self._priority)
 
     def _collect(self, future: Any, bundle: TaskBundle) -> list[TaskBundle]:
         """Record the outcomes of a bundle; returns the bundles that it leaves.
@@ -236,22 +233,18 @@ class _Run:
         Blocks of meshes that were begun come first, since a worker has the solver.
         """
         _, distributed = dask_modules()
-        function, tasks = bundle
         try:
             outcomes: list[Outcome] = future.result()
         except distributed.KilledWorker:
-            if len(tasks) > 1:
+            if len(bundle) > 1:
                 # One of the tasks kills workers. Alone it will do so again, and the others succeed.
-                return [TaskBundle(function, [task]) for task in tasks]
+                return [[task] for task in bundle]
             reason = "the workers that tried it died: out of memory, or a crash in a library"
-            outcomes = [Outcome(tasks[0].item.name, reason=reason)]
-        left = [
-            TaskBundle(resume, [rest])
-            for task, outcome in zip(tasks, outcomes, strict=False)
-            for rest in self._record(task, outcome)
-        ]
-        n_begun = len(outcomes)
-        return left + ([TaskBundle(function, tasks[n_begun:])] if tasks[n_begun:] else [])
+            outcomes = [Outcome(bundle[0].item.name, reason=reason)]
+        done = zip(bundle, outcomes, strict=False)
+        left: list[TaskBundle] = [[rest] for task, outcome in done for rest in self._record(task, outcome)]
+        others = bundle[len(outcomes) :]
+        return [*left, others] if others else left
 
     def _record(self, task: Task, outcome: Outcome) -> list[Task]:
         """Record the outcome of a task; returns the tasks that it leaves."""

@@ -11,7 +11,7 @@ import os
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cache
@@ -183,22 +183,19 @@ class Outcome:
     reason: str | None = None
 
 
-def begin(tasks: Sequence[Task]) -> list[Outcome]:
-    """Begin meshes one after the other, and stop after the first that leaves blocks: this worker has the solver."""
+def work(tasks: Sequence[Task]) -> list[Outcome]:
+    """Do tasks one after the other, and stop after the first of a mesh with other blocks: this worker has the solver.
+
+    A task without blocks begins a mesh.
+    """
     store = _opened(tasks[0].store)
     outcomes = []
     for task in tasks:
-        outcomes.append(_guarded(_begin, task, store))
-        if outcomes[-1].remaining:
+        outcomes.append(_guarded(task, store))
+        if task.blocks or outcomes[-1].remaining:
             break
         _SOLVERS.drop_idle()
     return outcomes
-
-
-def resume(tasks: Sequence[Task]) -> list[Outcome]:
-    """Solve the blocks of tasks in groups that `begin` has made."""
-    store = _opened(tasks[0].store)
-    return [_guarded(_resume, task, store) for task in tasks]
 
 
 def release() -> None:
@@ -215,10 +212,10 @@ def _opened(path: Path) -> Store:
         ) from None
 
 
-def _guarded(work: Callable[[Task, Store], Outcome], task: Task, store: Store) -> Outcome:
+def _guarded(task: Task, store: Store) -> Outcome:
     """The outcome of a task. An error of its mesh becomes the reason; only a lost store ends the batch."""
     try:
-        return work(task, store)
+        return _resume(task, store) if task.blocks else _begin(task, store)
     except BatchError:
         raise
     except Exception as error:
@@ -255,7 +252,7 @@ def _begin(task: Task, store: Store) -> Outcome:
 
 
 def _resume(task: Task, store: Store) -> Outcome:
-    """Solve the blocks of a task."""
+    """Solve the blocks of a task, in a group that `_begin` has made."""
     mesh = _loaded(task.item)
     fingerprint = _fingerprint(mesh)
     if store.attributes(task.item.name)["fingerprint"] != fingerprint:
