@@ -323,7 +323,7 @@ class Substitution:
     few = 4
 
     def __init__(self, fronts: Fronts, L: FloatArray) -> None:
-        self._kernel = _solves.Substitution(fronts, L)
+        self._kernel = _solves.TriangularSolves(fronts, L)
         self._end_entry = fronts.end_entry
         self._above = np.flatnonzero(fronts.above >= 0)
 

@@ -26,50 +26,50 @@ def front_rows(
     child: cython.longlong[::1] = np.full(k, -1, np.int64)
     sibling: cython.longlong[::1] = np.full(k, -1, np.int64)
     seen_by: cython.longlong[::1] = np.full(n, -1, np.int64)
+    c: cython.Py_ssize_t
     for b in range(k):
         if first_row[b] + n > room.shape[0]:
             found = np.concatenate([found, np.empty(len(found) + n, np.int32)])
             room = found
         with cython.nogil:
-            first_row[b + 1] = _rows_of_front(
-                b, ends, neighbours, order, place, start, first_row, room, child, sibling, seen_by
-            )
+            count: cython.Py_ssize_t = first_row[b]
+            end: cython.Py_ssize_t = start[b + 1]
+            for i in range(start[b], end):
+                v: cython.Py_ssize_t = order[i]
+                for p in range(ends[v], ends[v + 1]):
+                    count = _append(room, count, place[neighbours[p]], end, seen_by, b)
+            c = child[b]
+            while c >= 0:
+                for p in range(first_row[c], first_row[c + 1]):
+                    count = _append(room, count, room[p], end, seen_by, b)
+                c = sibling[c]
+            first_row[b + 1] = count
             if parent[b] >= 0:
                 sibling[b] = child[parent[b]]
                 child[parent[b]] = b
+    # Sorted by listing the fronts of each row, and dealing the rows out to them in ascending order.
     ordered = np.empty(first_row[k], np.int32)
-    _sort_rows(first_row, room, np.zeros(n + 1, np.int64), np.empty_like(ordered), first[:k].copy(), ordered)
+    row_of: cython.int[::1] = ordered
+    fronts: cython.int[::1] = np.empty_like(ordered)
+    first_front: cython.longlong[::1] = np.zeros(n + 1, np.int64)
+    filled: cython.longlong[::1] = first[:k].copy()
+    at: cython.Py_ssize_t = 0
+    with cython.nogil:
+        for p in range(first_row[k]):
+            first_front[room[p] + 1] += 1
+        for row in range(n):
+            first_front[row + 1] += first_front[row]
+        for b in range(k):
+            for p in range(first_row[b], first_row[b + 1]):
+                fronts[first_front[room[p]]] = b
+                first_front[room[p]] += 1
+        # Each entry now holds the start of the next row's fronts.
+        for row in range(n):
+            while at < first_front[row]:
+                row_of[filled[fronts[at]]] = row
+                filled[fronts[at]] += 1
+                at += 1
     return first, ordered
-
-
-@cython.cfunc
-@cython.nogil
-def _rows_of_front(
-    b: cython.Py_ssize_t,
-    ends: cython.const[cython.int][::1],
-    neighbours: cython.const[cython.int][::1],
-    order: cython.const[cython.int][::1],
-    place: cython.const[cython.int][::1],
-    start: cython.const[cython.longlong][::1],
-    first_row: cython.longlong[::1],
-    rows: cython.int[::1],
-    child: cython.longlong[::1],
-    sibling: cython.longlong[::1],
-    seen_by: cython.longlong[::1],
-) -> cython.Py_ssize_t:
-    """Append the rows of front b, in no order, after those of the fronts before it; return the end."""
-    count: cython.Py_ssize_t = first_row[b]
-    end: cython.Py_ssize_t = start[b + 1]
-    for i in range(start[b], end):
-        v: cython.Py_ssize_t = order[i]
-        for p in range(ends[v], ends[v + 1]):
-            count = _append(rows, count, place[neighbours[p]], end, seen_by, b)
-    c: cython.Py_ssize_t = child[b]
-    while c >= 0:
-        for p in range(first_row[c], first_row[c + 1]):
-            count = _append(rows, count, rows[p], end, seen_by, b)
-        c = sibling[c]
-    return count
 
 
 @cython.cfunc
@@ -89,37 +89,6 @@ def _append(
         rows[count] = row
         count += 1
     return count
-
-
-@cython.cfunc
-def _sort_rows(
-    first_row: cython.const[cython.longlong][::1],
-    rows: cython.const[cython.int][::1],
-    first_front: cython.longlong[::1],
-    fronts: cython.int[::1],
-    filled: cython.longlong[::1],
-    ordered: cython.int[::1],
-) -> cython.void:
-    """Sort the rows of each front: list the fronts of each row, then deal the rows out to them in ascending order."""
-    p: cython.Py_ssize_t
-    k: cython.Py_ssize_t = first_row.shape[0] - 1
-    n: cython.Py_ssize_t = first_front.shape[0] - 1
-    with cython.nogil:
-        for p in range(first_row[k]):
-            first_front[rows[p] + 1] += 1
-        for row in range(n):
-            first_front[row + 1] += first_front[row]
-        for b in range(k):
-            for p in range(first_row[b], first_row[b + 1]):
-                fronts[first_front[rows[p]]] = b
-                first_front[rows[p]] += 1
-        # Each entry now holds the start of the next row's fronts.
-        p = 0
-        for row in range(n):
-            while p < first_front[row]:
-                ordered[filled[fronts[p]]] = row
-                filled[fronts[p]] += 1
-                p += 1
 
 
 def tree_pieces(

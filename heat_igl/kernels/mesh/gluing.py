@@ -27,97 +27,64 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
     sides: cython.int[:, ::1] = np.empty((3 * m, 2), np.int32)
     begin: cython.int[::1] = np.zeros(n + 1, np.int32)
     seen: cython.int[::1] = np.zeros(n, np.int32)
-    with cython.nogil:
-        _by_lower_end(F, vertex, sides, begin)
-        _glue_sides(V, scale, sides, begin, seen, vertex, twin, ring, aligned, length)
-    return vertices, twins, rings, alignment, lengths
-
-
-@cython.cfunc
-@cython.nogil
-def _by_lower_end(
-    F: cython.const[cython.longlong][:, ::1],
-    vertex: cython.int[::1],
-    sides: cython.int[:, ::1],
-    begin: cython.int[::1],
-) -> cython.void:
-    """Copy the faces, and sort their half-edges by the lower end; `sides` takes each with the upper end.
-
-    `begin` (n + 1,), which must come full of 0, takes where the half-edges with lower end v end, at ``begin[v]``.
-    """
-    for f in range(F.shape[0]):
-        a, b, c = cython.cast(cython.int, F[f, 0]), cython.cast(cython.int, F[f, 1]), cython.cast(cython.int, F[f, 2])
-        vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2] = a, b, c
-        begin[min(b, c) + 1] += 1
-        begin[min(c, a) + 1] += 1
-        begin[min(a, b) + 1] += 1
-    for i in range(begin.shape[0] - 1):
-        begin[i + 1] += begin[i]
-    for f in range(F.shape[0]):
-        a, b, c = vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2]
-        at: cython.int = begin[min(b, c)]
-        begin[min(b, c)] = at + 1
-        sides[at, 0], sides[at, 1] = 3 * f, max(b, c)
-        at = begin[min(c, a)]
-        begin[min(c, a)] = at + 1
-        sides[at, 0], sides[at, 1] = 3 * f + 1, max(c, a)
-        at = begin[min(a, b)]
-        begin[min(a, b)] = at + 1
-        sides[at, 0], sides[at, 1] = 3 * f + 2, max(a, b)
-
-
-@cython.cfunc
-@cython.nogil
-def _glue_sides(
-    V: cython.const[cython.double][:, ::1],
-    scale: cython.double,
-    sides: cython.int[:, ::1],
-    end: cython.int[::1],
-    seen: cython.int[::1],
-    vertex: cython.int[::1],
-    twin: cython.int[::1],
-    ring: cython.int[::1],
-    aligned: cython.uchar[::1],
-    length: cython.double[::1],
-) -> cython.void:
-    """Glue half-edges that have both ends in common, and measure them. `seen` (n,) is working space, full of 0."""
     upper: cython.int
     i: cython.int = 0
     h: cython.int
-    x: cython.double
-    y: cython.double
-    z: cython.double
-    for lower in range(V.shape[0]):
-        first: cython.int = i
-        while i < end[lower]:
-            h, upper = sides[i, 0], sides[i, 1]
-            p: cython.int = seen[upper]
-            if not (first <= p < i and sides[p, 1] == upper):
-                # The first half-edge of this edge.
-                seen[upper] = i
+    with cython.nogil:
+        # Half-edges sorted by the lower end, each with the upper one; in the end, ``begin[v]`` is where those of v end.
+        for f in range(m):
+            vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2] = F[f, 0], F[f, 1], F[f, 2]
+            a, b, c = vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2]
+            begin[min(b, c) + 1] += 1
+            begin[min(c, a) + 1] += 1
+            begin[min(a, b) + 1] += 1
+        for v in range(n):
+            begin[v + 1] += begin[v]
+        for f in range(m):
+            a, b, c = vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2]
+            at: cython.int = begin[min(b, c)]
+            begin[min(b, c)] = at + 1
+            sides[at, 0], sides[at, 1] = 3 * f, max(b, c)
+            at = begin[min(c, a)]
+            begin[min(c, a)] = at + 1
+            sides[at, 0], sides[at, 1] = 3 * f + 1, max(c, a)
+            at = begin[min(a, b)]
+            begin[min(a, b)] = at + 1
+            sides[at, 0], sides[at, 1] = 3 * f + 2, max(a, b)
+        # Those that have both ends in common are glued.
+        for lower in range(n):
+            first: cython.int = i
+            while i < begin[lower]:
+                h, upper = sides[i, 0], sides[i, 1]
+                p: cython.int = seen[upper]
+                if not (first <= p < i and sides[p, 1] == upper):
+                    # The first half-edge of this edge.
+                    seen[upper] = i
+                    i += 1
+                    x: cython.double = scale * (V[upper, 0] - V[lower, 0])
+                    y: cython.double = scale * (V[upper, 1] - V[lower, 1])
+                    z: cython.double = scale * (V[upper, 2] - V[lower, 2])
+                    length[h] = sqrt(x * x + y * y + z * z)
+                    twin[h], ring[h] = -1, h
+                    continue
                 i += 1
-                x, y, z = V[upper, 0] - V[lower, 0], V[upper, 1] - V[lower, 1], V[upper, 2] - V[lower, 2]
-                x, y, z = scale * x, scale * y, scale * z
-                length[h] = sqrt(x * x + y * y + z * z)
-                twin[h], ring[h] = -1, h
-                continue
-            i += 1
-            p = sides[p, 0]
-            length[h] = length[p]
-            ring[h] = h
-            if twin[p] == -1:
-                twin[p], twin[h] = h, p
-                if vertex[next_half_edge(p)] == vertex[next_half_edge(h)]:
-                    aligned[p] = aligned[h] = False
-                continue
-            if twin[p] >= 0:
-                q: cython.int = twin[p]
-                aligned[p] = aligned[q] = True
-                twin[p] = twin[q] = -2
-                ring[p], ring[q] = q, p
-            twin[h] = -2
-            ring[h] = ring[p]
-            ring[p] = h
+                p = sides[p, 0]
+                length[h] = length[p]
+                ring[h] = h
+                if twin[p] == -1:
+                    twin[p], twin[h] = h, p
+                    if vertex[next_half_edge(p)] == vertex[next_half_edge(h)]:
+                        aligned[p] = aligned[h] = False
+                    continue
+                if twin[p] >= 0:
+                    q: cython.int = twin[p]
+                    aligned[p] = aligned[q] = True
+                    twin[p] = twin[q] = -2
+                    ring[p], ring[q] = q, p
+                twin[h] = -2
+                ring[h] = ring[p]
+                ring[p] = h
+    return vertices, twins, rings, alignment, lengths
 
 
 def has_needles(length: cython.const[cython.double][::1], margin: cython.double) -> bool:
