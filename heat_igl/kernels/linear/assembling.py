@@ -45,7 +45,21 @@ def laplacian(F: cython.const[cython.int][:, ::1], weight: cython.const[cython.d
         _distribute(F, by_column, by_row, begin, 1)
         _distribute(F, by_row, by_column, begin, 0)
         for j in range(n):
-            count = _fill_column(F, weight, by_column[begin[j] : begin[j + 1]], j, -diagonal[j], count, indices, data)
+            last: cython.int = -1
+            for i in range(begin[j], begin[j + 1]):
+                row: cython.int = _column(F, by_column[i] ^ 1)
+                if last < j <= row:
+                    indices[count], data[count] = j, -diagonal[j]
+                    last = j
+                    count += 1
+                if row != last:
+                    indices[count], data[count] = row, 0.0
+                    last = row
+                    count += 1
+                data[count - 1] += weight[by_column[i] >> 1]
+            if -1 < last < j:
+                indices[count], data[count] = j, -diagonal[j]
+                count += 1
             indptr[j + 1] = count
     return pointers, rows[:count].copy(), values[:count].copy()
 
@@ -78,34 +92,3 @@ def _distribute(
     for i in range(begin.shape[0] - 1, 0, -1):
         begin[i] = begin[i - 1]
     begin[0] = 0
-
-
-@cython.cfunc
-@cython.nogil
-def _fill_column(
-    F: cython.const[cython.int][:, ::1],
-    weight: cython.const[cython.double][::1],
-    entries: cython.uint[::1],
-    j: cython.int,
-    diagonal: cython.double,
-    count: cython.int,
-    indices: cython.int[::1],
-    data: cython.double[::1],
-) -> cython.int:
-    """Append the entries of column j, and the diagonal; returns the number of all entries so far."""
-    last: cython.int = -1
-    for i in range(entries.shape[0]):
-        row: cython.int = _column(F, entries[i] ^ 1)
-        if last < j <= row:
-            indices[count], data[count] = j, diagonal
-            last = j
-            count += 1
-        if row != last:
-            indices[count], data[count] = row, 0.0
-            last = row
-            count += 1
-        data[count - 1] += weight[entries[i] >> 1]
-    if -1 < last < j:
-        indices[count], data[count] = j, diagonal
-        count += 1
-    return count

@@ -20,47 +20,32 @@ def polar_angles(
     total: cython.double[::1] = sums
     count: cython.longlong[::1] = counts
     closed: cython.uchar[::1] = closes
+    most: cython.longlong = twin.shape[0]
+    t: cython.longlong = -1
     with cython.nogil:
         for v in range(n):
-            if first[v] >= 0:
-                closed[v] = _around(angle, twin, first[v], outgoing, cython.address(total[v]), cython.address(count[v]))
+            if first[v] < 0:
+                continue
+            start: cython.longlong = first[v]
+            # Clockwise to the boundary, if there is one: across the half-edge that leaves from the corner.
+            for _k in range(most):
+                t = twin[start + 2 if start % 3 == 0 else start - 1]
+                if t < 0:
+                    break
+                start = t + 2 if t % 3 == 0 else t - 1
+                if start == first[v]:
+                    break
+            at: cython.longlong = start
+            for _k in range(most):
+                outgoing[at + 2 if at % 3 == 0 else at - 1] = total[v]
+                total[v] += angle[at]
+                count[v] += 1
+                # Counterclockwise: across the half-edge that arrives at the corner.
+                t = twin[at - 2 if at % 3 == 2 else at + 1]
+                if t < 0:
+                    break
+                at = t - 2 if t % 3 == 2 else t + 1
+                if at == start:
+                    break
+            closed[v] = t >= 0
     return sums, counts, closes.astype(bool)
-
-
-@cython.cfunc
-@cython.nogil
-def _around(
-    angle: cython.double[::1],
-    twin: cython.longlong[::1],
-    first: cython.longlong,
-    outgoing: cython.double[::1],
-    total: cython.p_double,
-    count: cython.p_longlong,
-) -> cython.bint:
-    """Visit the corners around one vertex; return whether they close up."""
-    most: cython.longlong = twin.shape[0]
-    start: cython.longlong = first
-    # Clockwise to the boundary, if there is one: across the half-edge that leaves from the corner.
-    for _k in range(most):
-        t = twin[start + 2 if start % 3 == 0 else start - 1]
-        if t < 0:
-            break
-        start = t + 2 if t % 3 == 0 else t - 1
-        if start == first:
-            break
-    at: cython.longlong = start
-    angles: cython.double = 0.0
-    for _k in range(most):
-        outgoing[at + 2 if at % 3 == 0 else at - 1] = angles
-        angles += angle[at]
-        count[0] += 1
-        # Counterclockwise: across the half-edge that arrives at the corner.
-        t = twin[at - 2 if at % 3 == 2 else at + 1]
-        if t < 0:
-            total[0] = angles
-            return False
-        at = t - 2 if t % 3 == 2 else t + 1
-        if at == start:
-            break
-    total[0] = angles
-    return True

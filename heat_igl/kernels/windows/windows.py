@@ -90,7 +90,14 @@ class Front:
         slot = np.full(len(tables.edges.vertex), -1, np.int32)
         # The pointers hold as long as the arrays do.
         self.arrays = (tables, found, leaving, position, emitted, touched, slot)
-        _take_surface(s, tables)
+        edges = tables.edges
+        s.vertex, s.twin, s.ring = _ints(edges.vertex), _ints(edges.twin), _ints(edges.ring)
+        s.aligned, s.length = _bytes(edges.aligned), _doubles(edges.length)
+        s.kind, s.double_area, s.bulge = _bytes(tables.kind), _doubles(tables.double_area), _doubles(tables.bulge)
+        s.corner_of_vertex, s.next_corner = _ints(tables.corner_of_vertex), _ints(tables.next_corner)
+        s.n_corners = _ints(tables.n_corners)
+        s.is_delaunay = tables.is_delaunay
+        s.n, s.n_half_edges = tables.n, len(edges.vertex)
         s.distance, s.root, s.label = _doubles(found.distance), _ints(found.root), _ints(found.label)
         s.entered, s.crossing = _ints(found.entered), _doubles(found.crossing)
         s.emitted, s.touched, s.slot = _doubles(emitted), _ints(touched), _ints(slot)
@@ -105,19 +112,6 @@ class Front:
         s.tolerance = tolerance
         s.n_points = s.n_segments = s.n_targets = s.n_goals = 0
         s.first_target = cython.NULL
-
-
-@cython.cfunc
-@cython.exceptval(check=True)
-def _take_surface(s: cython.pointer(Search), tables) -> cython.void:
-    edges = tables.edges
-    s.vertex, s.twin, s.ring = _ints(edges.vertex), _ints(edges.twin), _ints(edges.ring)
-    s.aligned, s.length = _bytes(edges.aligned), _doubles(edges.length)
-    s.kind, s.double_area, s.bulge = _bytes(tables.kind), _doubles(tables.double_area), _doubles(tables.bulge)
-    s.corner_of_vertex, s.next_corner = _ints(tables.corner_of_vertex), _ints(tables.next_corner)
-    s.n_corners = _ints(tables.n_corners)
-    s.is_delaunay = tables.is_delaunay
-    s.n, s.n_half_edges = tables.n, len(edges.vertex)
 
 
 @cython.cfunc
@@ -166,8 +160,23 @@ def search(
     s: cython.pointer(Search) = cython.address(front.state)
     source: cython.int[::1] = starts.vertices
     offset: cython.double[::1] = starts.offset
-    _take_sources(s, starts)
-    _take_targets(s, targets)
+    # Sources inside faces.
+    point: cython.double[:, ::1] = starts.points.barycentric
+    segment: cython.double[:, :, ::1] = starts.segments.barycentric
+    s.n_points, s.n_segments = point.shape[0], segment.shape[0]
+    s.point_face, s.point_offset = _ints(starts.points.faces), _doubles(starts.point_offset)
+    s.point = cython.NULL if s.n_points == 0 else cython.address(point[0, 0])
+    s.segment_face, s.segment_offset = _ints(starts.segments.faces), _doubles(starts.segment_offset)
+    s.segment = cython.NULL if s.n_segments == 0 else cython.address(segment[0, 0, 0])
+    found = targets.found
+    target: cython.double[:, ::1] = targets.place.barycentric
+    s.n_targets = target.shape[0]
+    s.target = cython.NULL if s.n_targets == 0 else cython.address(target[0, 0])
+    s.first_target, s.next_target = _ints(targets.first), _ints(targets.following)
+    s.target_face = _ints(targets.place.faces)
+    s.target_distance, s.target_root = _doubles(found.distance), _ints(found.root)
+    s.target_entered, s.target_crossing = _ints(found.entered), _doubles(found.crossing)
+    s.slack = targets.largest_circle
     s.n_goals = goal.shape[0]
     s.goal = _ints(goal)
     s.stops_early = stops_early
@@ -191,33 +200,6 @@ def search(
     statistics[1] = s.n_windows
     statistics[2] = s.n_lists_done
     return not s.failed
-
-
-@cython.cfunc
-@cython.exceptval(check=True)
-def _take_sources(s: cython.pointer(Search), starts) -> cython.void:
-    """Sources inside faces."""
-    point: cython.double[:, ::1] = starts.points.barycentric
-    segment: cython.double[:, :, ::1] = starts.segments.barycentric
-    s.n_points, s.n_segments = point.shape[0], segment.shape[0]
-    s.point_face, s.point_offset = _ints(starts.points.faces), _doubles(starts.point_offset)
-    s.point = cython.NULL if s.n_points == 0 else cython.address(point[0, 0])
-    s.segment_face, s.segment_offset = _ints(starts.segments.faces), _doubles(starts.segment_offset)
-    s.segment = cython.NULL if s.n_segments == 0 else cython.address(segment[0, 0, 0])
-
-
-@cython.cfunc
-@cython.exceptval(check=True)
-def _take_targets(s: cython.pointer(Search), targets) -> cython.void:
-    found = targets.found
-    target: cython.double[:, ::1] = targets.place.barycentric
-    s.n_targets = target.shape[0]
-    s.target = cython.NULL if s.n_targets == 0 else cython.address(target[0, 0])
-    s.first_target, s.next_target = _ints(targets.first), _ints(targets.following)
-    s.target_face = _ints(targets.place.faces)
-    s.target_distance, s.target_root = _doubles(found.distance), _ints(found.root)
-    s.target_entered, s.target_crossing = _ints(found.entered), _doubles(found.crossing)
-    s.slack = targets.largest_circle
 
 
 @cython.cfunc
