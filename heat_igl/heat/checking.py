@@ -258,20 +258,28 @@ class Checker:
         distance = np.ascontiguousarray(distance)
         if np.isnan(distance).any():
             raise contradicted(f"nan at vertex {np.isnan(distance).argmax()}")
-        total, excess, steepest = checking.edge_excess(distance, self._i, self._j, self._length)
-        steepness = excess / total if total > 0 else 0.0
+        with np.errstate(invalid="ignore"):  # infinite at both ends
+            difference = np.abs(distance[self._i] - distance[self._j])
+        is_known = np.isfinite(difference)
+        excess = np.maximum(np.where(is_known, difference, 0.0) - self._length, 0.0)
+        total = self._length[is_known].sum()
+        steepness = excess.sum() / total if total > 0 else 0.0
+        steepest = int(self._i[excess.argmax()]) if excess.any() else -1
         shortfall, largest, shortest = np.nan, np.nan, -1
         places = self._places(sources)
         if places is not None and self._positions is not None:
             positions, offsets = places
             step = len(self._vertices) * len(positions) // _MOST_LINES + 1
+            vertices, start = self._vertices[::step], offsets.min()
             line = checking.straight_lines(np.ascontiguousarray(self._positions[::step]), positions, offsets)
-            vertices = np.ascontiguousarray(self._vertices[::step])
-            count, deficit, deepest, farthest, worst = checking.line_shortfall(distance, vertices, line, offsets.min())
-            shortfall, largest = deficit / max(count, 1), deepest / farthest if farthest > 0 else 0.0
-            shortest = int(vertices[worst]) if worst >= 0 else -1
-        steepest_vertex = int(self._i[steepest]) if steepest >= 0 else -1
-        return AnswerCheck(shortfall, largest, shortest, steepness, steepest_vertex)
+            is_known = np.isfinite(distance[vertices]) & (line > start)
+            vertices, line = vertices[is_known], line[is_known]
+            missing = np.maximum(line - distance[vertices], 0.0)
+            shortfall = (missing / (line - start)).sum() / max(len(line), 1)
+            farthest = distance[vertices].max(initial=start) - start
+            largest = missing.max() / farthest if farthest > 0 else 0.0
+            shortest = int(vertices[missing.argmax()]) if missing.any() else -1
+        return AnswerCheck(float(shortfall), float(largest), shortest, float(steepness), steepest)
 
     def hold_to_bounds(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck) -> AnswerCheck:
         """Move an answer (n,) inside the bounds that it violates, in place: its mean error falls by a third on shapes

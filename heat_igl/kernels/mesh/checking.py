@@ -2,36 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.libc.math import INFINITY, fabs, isfinite, sqrt
-
-
-def edge_excess(
-    distance: cython.double[::1],
-    i: cython.longlong[::1],
-    j: cython.longlong[::1],
-    length: cython.double[::1],
-):
-    """By how much differences of distances (n,) along edges i, j (e,) exceed the lengths (e,) of the edges.
-
-    Edges with a distance that is not finite are left out. Returns the sum of the other lengths, that of the excess of
-    the differences over them, and the edge with the largest excess, -1 if there is none.
-    """
-    worst: cython.Py_ssize_t = -1
-    total: cython.double = 0.0
-    excess: cython.double = 0.0
-    largest: cython.double = 0.0
-    with cython.nogil:
-        for k in range(i.shape[0]):
-            difference: cython.double = fabs(distance[i[k]] - distance[j[k]])
-            if not isfinite(difference):
-                continue
-            total += length[k]
-            if difference > length[k]:
-                excess += difference - length[k]
-                if difference - length[k] > largest:
-                    largest = difference - length[k]
-                    worst = k
-    return total, excess, worst
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 
 def largest_finite(distance: cython.const[cython.double][::1]) -> float:
@@ -147,38 +118,6 @@ def straight_lines(
                     least = line
             shortest[k] = least
     return found
-
-
-def line_shortfall(
-    distance: cython.const[cython.double][::1],
-    vertex: cython.const[cython.longlong][::1],
-    line: cython.const[cython.double][::1],
-    start: cython.double,
-):
-    """By how much distances (n,) fall short of the straight line (p,) from the nearest source to each `vertex` (p,).
-
-    All lengths count from `start`, the smallest value that distance begins at. Returns the number of vertices with a
-    finite distance; of these the sum of ``(line - distance) / (line - start)`` where that is positive, the largest
-    ``line - distance``, and the largest distance; and the position of the largest shortfall, -1 if none falls short.
-    """
-    worst: cython.Py_ssize_t = -1
-    count: cython.longlong = 0
-    total: cython.double = 0.0
-    largest: cython.double = 0.0
-    farthest: cython.double = 0.0
-    with cython.nogil:
-        for k in range(vertex.shape[0]):
-            d: cython.double = distance[vertex[k]]
-            if not isfinite(d) or line[k] <= start:
-                continue
-            count += 1
-            farthest = max(farthest, d - start)
-            if d < line[k]:
-                total += (line[k] - d) / (line[k] - start)
-                if line[k] - d > largest:
-                    largest = line[k] - d
-                    worst = k
-    return count, total, largest, farthest, worst
 
 
 def wrong_rows(

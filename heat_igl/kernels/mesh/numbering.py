@@ -26,78 +26,61 @@ def breadth_first(edges, n: cython.int, start: cython.int):
     vertices, twins, rings = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
     alignment, lengths = np.empty(3 * m, np.uint8), np.empty(3 * m)
     numbers, faces = np.full(n, -1, np.int32), np.empty(m, np.int32)
-    search: _Numbering = _Numbering()
-    search.vertex, search.twin, search.aligned, search.length = edges.vertex, edges.twin, edges.aligned, edges.length
-    search.new_vertex, search.new_twin, search.new_aligned, search.new_length = vertices, twins, alignment, lengths
-    search.number, search.face, search.place = numbers, faces, np.full(m, -1, np.int32)
-    old_ring: cython.const[cython.int][::1] = edges.ring
+    vertex: cython.const[cython.int][::1] = edges.vertex
+    twin: cython.const[cython.int][::1] = edges.twin
+    ring: cython.const[cython.int][::1] = edges.ring
+    aligned: cython.const[cython.uchar][::1] = edges.aligned
+    length: cython.const[cython.double][::1] = edges.length
+    new_vertex: cython.int[::1] = vertices
+    new_twin: cython.int[::1] = twins
     new_ring: cython.int[::1] = rings
+    new_aligned: cython.uchar[::1] = alignment
+    new_length: cython.double[::1] = lengths
+    number: cython.int[::1] = numbers
+    face: cython.int[::1] = faces
+    place: cython.int[::1] = np.full(m, -1, np.int32)  # new number of each face
+    n_met: cython.int = 0
+    n_done: cython.int = 0
+    n_numbered: cython.int = 0
+    has_many: cython.bint = False  # whether more than two faces meet at an edge
     with cython.nogil:
-        search.go_on_from(start)
-        for first in range(m):
-            search.go_on_from(first)
+        for first in range(-1, m):
+            f: cython.int = first if first >= 0 else start
+            n_met = _meet(f, place, face, n_met)
+            while n_done < n_met:
+                h: cython.int = 3 * face[n_done]
+                g: cython.int = 3 * n_done
+                for c in range(3):
+                    v: cython.int = vertex[h + c]
+                    if number[v] < 0:
+                        number[v] = n_numbered
+                        n_numbered += 1
+                    new_vertex[g + c], new_length[g + c], new_aligned[g + c] = number[v], length[h + c], aligned[h + c]
+                    t: cython.int = twin[h + c]
+                    if t >= 0:
+                        n_met = _meet(t // 3, place, face, n_met)
+                        t = 3 * place[t // 3] + t % 3
+                    has_many |= t == -2
+                    new_twin[g + c] = t
+                n_done += 1
         for v in range(n):
-            if search.number[v] < 0:
-                search.number[v] = search.n_numbered
-                search.n_numbered += 1
+            if number[v] < 0:
+                number[v] = n_numbered
+                n_numbered += 1
         for h in range(3 * m):
             new_ring[h] = h
-            if search.has_many:
-                t: cython.int = old_ring[3 * search.face[h // 3] + h % 3]
-                new_ring[h] = 3 * search.place[t // 3] + t % 3
+            if has_many:
+                t = ring[3 * face[h // 3] + h % 3]
+                new_ring[h] = 3 * place[t // 3] + t % 3
     return vertices, twins, rings, alignment, lengths, numbers, faces
 
 
-@cython.final
-@cython.cclass
-class _Numbering:
-    """Input and results of a breadth-first search over the faces."""
-
-    vertex: cython.const[cython.int][::1]
-    twin: cython.const[cython.int][::1]
-    aligned: cython.const[cython.uchar][::1]
-    length: cython.const[cython.double][::1]
-    new_vertex: cython.int[::1]
-    new_twin: cython.int[::1]
-    new_aligned: cython.uchar[::1]
-    new_length: cython.double[::1]
-    number: cython.int[::1]
-    face: cython.int[::1]
-    place: cython.int[::1]  # new number of each face
-    n_met: cython.int
-    n_done: cython.int
-    n_numbered: cython.int
-    has_many: cython.bint  # whether more than two faces meet at an edge
-
-    @cython.cfunc
-    @cython.nogil
-    def go_on_from(self, first: cython.int) -> cython.void:
-        """Number the faces of the component of this one, unless it has a number."""
-        self.meet(first)
-        while self.n_done < self.n_met:
-            h: cython.int = 3 * self.face[self.n_done]
-            g: cython.int = 3 * self.n_done
-            for c in range(3):
-                v: cython.int = self.vertex[h + c]
-                if self.number[v] < 0:
-                    self.number[v] = self.n_numbered
-                    self.n_numbered += 1
-                self.new_vertex[g + c] = self.number[v]
-                self.new_length[g + c] = self.length[h + c]
-                self.new_aligned[g + c] = self.aligned[h + c]
-                t: cython.int = self.twin[h + c]
-                if t >= 0:
-                    self.meet(t // 3)
-                    t = 3 * self.place[t // 3] + t % 3
-                self.has_many |= t == -2
-                self.new_twin[g + c] = t
-            self.n_done += 1
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def meet(self, f: cython.int) -> cython.void:
-        if self.place[f] < 0:
-            self.place[f] = self.n_met
-            self.face[self.n_met] = f
-            self.n_met += 1
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _meet(f: cython.int, place: cython.int[::1], face: cython.int[::1], n_met: cython.int) -> cython.int:
+    """Number face f unless it has a number; returns how many have one."""
+    if place[f] < 0:
+        place[f], face[n_met] = n_met, f
+        n_met += 1
+    return n_met

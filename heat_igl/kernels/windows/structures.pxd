@@ -124,7 +124,6 @@ cdef struct Search:
     int n_lists, n_all_lists, n_made_lists
     long long n_waiting  # windows in lists
     int free_list
-    int* next_free
     Entry* heap
     int n_heap, n_all_heap
     Window* to_left
