@@ -7,14 +7,21 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
 from heat_igl.curves.face_cutting import Point, cut_triangle
 from heat_igl.curves.places import corners
 from heat_igl.errors import MeshError, SourceError, as_array
 from heat_igl.intrinsic import lay_out
-from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices, named_entries
+from heat_igl.mesh import (
+    Mesh,
+    MeshLike,
+    NestedCurves,
+    SurfaceCurve,
+    SurfacePoints,
+    as_simplices,
+    connectivity,
+    named_entries,
+)
 from heat_igl.mesh.surface_points import require_faces
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
@@ -151,9 +158,8 @@ class CutMesh:
         is_cut = np.isin(facets.vertices @ [n, 1], ascending @ [n, 1])
         face, corner = np.nonzero(~is_cut[facets.of_face])
         m, k = self.mesh.n_faces, len(facets.vertices)
-        pairs = (face, m + facets.of_face[face, corner])
-        graph = sp.coo_array((np.ones(len(face), np.int8), pairs), shape=(m + k, m + k))
-        label = csgraph.connected_components(graph, directed=False)[1][:m]
+        pairs = np.column_stack([face, m + facets.of_face[face, corner]])
+        label = connectivity.connected_components(pairs, m + k)[:m]
         return np.asarray(np.unique(label, return_inverse=True)[1], np.int64)
 
     def split(self) -> list[MeshPiece]:

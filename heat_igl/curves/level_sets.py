@@ -8,12 +8,19 @@ follows from the faces, so rounding cannot open a loop or draw a segment twice.
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.csgraph as csgraph
 
 from heat_igl.errors import MeshError, positive, real_numbers, shown
 from heat_igl.geodesic import Solver
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices, crossings, joined_segments, level_segments
+from heat_igl.mesh import (
+    Mesh,
+    MeshLike,
+    SurfaceCurve,
+    as_simplices,
+    connectivity,
+    crossings,
+    joined_segments,
+    level_segments,
+)
 from heat_igl.sources import Sources
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -169,8 +176,7 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
     curves = _curves(mesh, checked, wanted[0])
     below = checked < wanted[0]
     inner = mesh.edges[below[mesh.edges].all(axis=1)]
-    graph = sp.coo_array((np.ones(len(inner), np.int8), (inner[:, 0], inner[:, 1])), shape=2 * (mesh.n_vertices,))
-    part = csgraph.connected_components(graph, directed=False)[1]
+    part = connectivity.connected_components(inner, mesh.n_vertices)
     # The edges of a face join all vertices below the level.
     one_below = mesh.F[np.arange(mesh.n_faces), np.argmax(below[mesh.F], axis=1)]
     area = np.bincount(part[one_below], weights=_areas_below(mesh, checked, wanted[0]), minlength=mesh.n_vertices)

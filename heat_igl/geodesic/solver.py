@@ -329,11 +329,6 @@ class GeodesicSolver(BatchedSolver):
             return len(domain.weights)
         return domain.triangles.n_faces if isinstance(domain, PointCloud) else domain.n_faces
 
-    @property
-    def _given_faces(self) -> IntArray | None:
-        """Vertices (m, 3) of the triangles that points and curves refer to; None if sources are vertices alone."""
-        return None if self._triangles is None else self._triangles.given_faces
-
     @names_guessed
     def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
         """Distance from the nearest source.
@@ -519,9 +514,9 @@ class GeodesicSolver(BatchedSolver):
         return solver
 
     def _source_set(self, sources: Sources) -> SourceSet:
-        part, domain, faces = self._part, self._domain, self._given_faces
-        if part is not None:
-            faces = None if self._triangles is None else part.whole
+        part, domain, faces = self._part, self._domain, None
+        if self._triangles is not None:
+            faces = self._triangles.given_faces if part is None else part.whole
         surface = domain if part is None and isinstance(domain, Mesh) and not domain.is_tetrahedral else None
         chosen = source_set(sources, self.n_vertices, faces, surface, part=part, originals=self._originals)
         if chosen.offsets.any():

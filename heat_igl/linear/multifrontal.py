@@ -49,6 +49,8 @@ _SINGULAR = 1e-13
 # Peak memory of a factorization over that of its entries: 1.2 to 1.3 on surfaces of 40k to 160k vertices, 1.4 in a box
 # of 30k, with one row per vertex or two.
 _PEAK = 1.5
+# A block of right-hand sides costs as much as a few single ones, however many of its columns are used.
+_FEW = 4
 
 _elimination = import_module(builds("linear.multifrontal")[0])
 _solves = import_module(builds("linear.substitution")[0])
@@ -255,7 +257,13 @@ class MultifrontalAnalysis:
 
 
 class MultifrontalFactorization:
-    """LDL^T of a matrix; entries are stored front by front, as `Fronts` says."""
+    """LDL^T of a matrix; entries are stored front by front, as `Fronts` says.
+
+    Substitution goes from the leaves of the tree of fronts to the roots, and back. The tree is cut into pieces, which
+    are subtrees, and the few fronts above them. Pieces are independent: each stores its updates of the rows above in an
+    array of its own, and these are summed in the order of the pieces. So pieces run in parallel, and the bits of a
+    solution do not depend on the number of threads.
+    """
 
     backend = "multifrontal"
 
@@ -267,75 +275,46 @@ class MultifrontalFactorization:
         self._held = fronts.place[:0] if free is None else fronts.place[~free]
         entries = np.empty(self.nonzeros)
         analysis.eliminate(A, free, entries)
-        self._substitution = Substitution(fronts, entries)
+        self._kernel, self._above = _solves.TriangularSolves(fronts, entries), np.flatnonzero(fronts.above >= 0)
         self.n_bytes = entries.nbytes + fronts.rows.nbytes + fronts.first_row.nbytes + fronts.first_entry.nbytes
         check_probe(self, A, free)
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Solve A x = b on the free vertices for one right-hand side (n,) or several (n, k); 0 on the others."""
+        x, width = np.empty(b.shape), _solves.width
         if b.ndim == 1:
-            return self._solve_one(b)
-        x = np.empty(b.shape)
-        width = self._substitution.width
+            self._solve(b, x)
+            return x
         for first in range(0, b.shape[1], width):
-            columns = b[:, first : first + width]
-            # A block costs as much as a few single columns, however many columns are used.
-            if columns.shape[1] < self._substitution.few:
+            columns, solved = b[:, first : first + width], x[:, first : first + width]
+            if columns.shape[1] < _FEW:
                 for i in range(columns.shape[1]):
-                    x[:, first + i] = self._solve_one(columns[:, i])
+                    self._solve(columns[:, i], solved[:, i])
             else:
-                self._solve_block(columns, x[:, first : first + width])
+                self._solve(columns, solved)
         return x
 
-    def _solve_one(self, b: FloatArray) -> FloatArray:
-        order = self._fronts.order
-        x = np.empty(len(b))
-        ordered = b[order].astype(np.float64, copy=False)
+    def _solve(self, b: FloatArray, x: FloatArray) -> None:
+        """Write the solution for b, (n,) or at most as many columns as a block has, to x."""
+        order, k = self._fronts.order, b.shape[1:]
+        if k:
+            ordered = np.zeros((len(order), _solves.width))
+            ordered[:, : k[0]] = b[order]
+        else:
+            ordered = b[order].astype(np.float64, copy=False)
         ordered[self._held] = 0.0
-        self._substitution.solve(ordered)
-        x[order] = ordered
-        return x
+        self._substitute(ordered)
+        x[order] = ordered[:, : k[0]] if k else ordered
 
-    def _solve_block(self, b: FloatArray, x: FloatArray) -> None:
-        order = self._fronts.order
-        block = np.zeros((len(order), self._substitution.width))
-        block[:, : b.shape[1]] = b[order]
-        block[self._held] = 0.0
-        self._substitution.solve(block)
-        x[order] = block[:, : b.shape[1]]
-
-    def __reduce__(
-        self,
-    ) -> tuple[type[MultifrontalFactorization], tuple[MultifrontalAnalysis, sp.csc_matrix, BoolArray | None]]:
-        return MultifrontalFactorization, self._arguments
-
-
-class Substitution:
-    """Forward substitution with a factor from the leaves of the tree of fronts to the roots, and back.
-
-    The tree is cut into pieces, which are subtrees, and the few fronts above them. Pieces are independent: each stores
-    its updates of the rows above in an array of its own, and these are summed in the order of the pieces. So pieces run
-    in parallel, and the bits of a solution do not depend on the number of threads. `width` right-hand sides are solved
-    together, and fewer than `few` faster one by one.
-    """
-
-    width: int = _solves.width
-    few = 4
-
-    def __init__(self, fronts: Fronts, L: FloatArray) -> None:
-        self._kernel = _solves.TriangularSolves(fronts, L)
-        self._end_entry = fronts.end_entry
-        self._above = np.flatnonzero(fronts.above >= 0)
-
-    def solve(self, x: FloatArray) -> None:
-        """Solve in place for x, (n,) or (n, width), in the order of elimination, on this thread's processors."""
-        kernel = self._kernel
+    def _substitute(self, x: FloatArray) -> None:
+        """Solve in place for x, (n,) or a block, in the order of elimination, on this thread's processors."""
+        kernel, end_entry = self._kernel, self._fronts.end_entry
         forward, back = (
             (kernel.forward_one, kernel.back_one) if x.ndim == 1 else (kernel.forward_block, kernel.back_block)
         )
-        last = len(self._end_entry) - 2
+        last = len(end_entry) - 2
         k = max(1, min(n_threads(), last))
-        shares = np.searchsorted(self._end_entry[:last], np.arange(k + 1) / k * self._end_entry[last])
+        shares = np.searchsorted(end_entry[:last], np.arange(k + 1) / k * end_entry[last])
         ranges = list(pairwise(shares))
         sums = np.zeros((last + 1, len(self._above), *x.shape[1:]))
         side_by_side(lambda pieces: forward(x, *pieces, sums), ranges)
@@ -343,3 +322,8 @@ class Substitution:
         forward(x, last, last + 1, sums)
         back(x, last, last + 1)
         side_by_side(lambda pieces: back(x, *pieces), ranges)
+
+    def __reduce__(
+        self,
+    ) -> tuple[type[MultifrontalFactorization], tuple[MultifrontalAnalysis, sp.csc_matrix, BoolArray | None]]:
+        return MultifrontalFactorization, self._arguments
