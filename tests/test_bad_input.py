@@ -115,7 +115,7 @@ def array_cases() -> Iterator[Case]:
     for shape in ((0, 3), (0, 4), (0,), (3, 0)):
         yield mesh_case(f"F empty, {shape}", V4, np.zeros(shape, int), "F is empty")
     yield mesh_case("V empty", V4[:0], TRIANGLES, "V is empty")
-    yield mesh_case("V ragged", [[0, 0, 0], [1, 0]], TRIANGLES, "V must be an array .* rows differ in length$")
+    yield mesh_case("V ragged", [[0, 0, 0], [1, 0]], TRIANGLES, "V must be an array, .* differ in length$")
     yield mesh_case("F ragged", V4, [[0, 1, 2], [1, 3]], "F must be .* rows differ in length: PolygonMesh")
     masked = np.ma.masked_array(V4, mask=V4 > 0.5)
     yield mesh_case("V masked", masked, TRIANGLES, "V has 3 masked entries: fill or remove them")
@@ -470,8 +470,12 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: heat_igl.speed_operators(GRID, 1.0), r"speed must have shape \(32,\), one per face, not \(\)"),
     (lambda _: heat_igl.speed_operators(GRID, [1.0] * 31 + [0]), r"speed\[31\] = 0.0 must be .* \(1 of 32 are not"),
     *(
-        (lambda _, mask=mask: heat_igl.image_domain(mask), f"mask must be a boolean image{said}")
-        for mask, said in (([[0, 1], [1, 1]], ""), ([[True], [True, False]], ""), (SOLID[None], r" .* \(1, 2, 2, 2\)"))
+        (lambda _, mask=mask: heat_igl.image_domain(mask), f"mask must be {said}")
+        for mask, said in (
+            ([[0, 1], [1, 1]], "a boolean image"),
+            ([[True], [True, False]], "an array, but rows or entries differ"),
+            (SOLID[None], r"a boolean image .* \(1, 2, 2, 2\)"),
+        )
     ),
     *((lambda _, mask=mask: heat_igl.image_domain(mask), "mask holds no pixel") for mask in ([[False]], ~SOLID)),
     *(

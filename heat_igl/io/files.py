@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError, names_guessed, shown
+from heat_igl.errors import MeshError, as_array, names_guessed, shown
 from heat_igl.io import by_meshio, by_nibabel, obj, off, ply
 from heat_igl.io.contents import Contents, Text, format_rows
 from heat_igl.io.storage import form_suffix, is_packed, pack, replacing, unpacked
@@ -348,10 +348,7 @@ def checked_attributes(attributes: Mapping[str, ArrayLike], n: int) -> dict[str,
     for name, values in attributes.items():
         if not _ATTRIBUTE_NAME.fullmatch(name) or name in ("x", "y", "z"):
             raise MeshError(f"{name!r} cannot name an attribute: use letters, digits and _, and not x, y or z")
-        try:
-            array = np.asarray(values)
-        except ValueError:
-            raise MeshError(f"{name} must be an array of shape ({n},) or ({n}, k), but rows differ in length") from None
+        array = as_array(name, values, MeshError)
         if array.dtype.kind not in "biuf" or array.dtype.itemsize > 8:
             raise MeshError(f"{name} must hold real numbers that fit double precision, not {array.dtype}")
         if array.ndim not in (1, 2) or len(array) != n or not array.size:

@@ -15,7 +15,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning, MeshError, refuse_masked
+from heat_igl.errors import AccuracyWarning, MeshError, as_array
 from heat_igl.mesh import connectivity
 from heat_igl.mesh.report import MeshReport, mesh_report
 from heat_igl.mesh.triangulation import triangulated
@@ -48,11 +48,7 @@ def _frozen(array: ArrayT) -> ArrayT:
 
 def checked_positions(V: ArrayLike) -> FloatArray:
     """`V`, of shape (n, 3), or (n, 2) in the plane z = 0, as a new (n, 3) float64 array; errors are those of `Mesh`."""
-    refuse_masked("V", V, MeshError)
-    try:
-        array = np.asarray(V)
-    except ValueError:
-        raise MeshError("V must be an array of shape (n, 3), but rows differ in length") from None
+    array = as_array("V", V, MeshError)
     if array.dtype.kind not in "iuf":
         raise MeshError(f"V must hold real numbers, not {array.dtype}: pass an (n, 3) array of positions")
     if array.ndim != 2 or array.shape[1] not in (2, 3):

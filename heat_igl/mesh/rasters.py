@@ -215,10 +215,7 @@ def _sides(dimension: int) -> IntArray:
 
 
 def _mask(mask: ArrayLike) -> BoolArray:
-    try:
-        array: AnyArray = np.asarray(mask)
-    except ValueError:
-        raise MeshError("mask must be a boolean image (rows, columns), not a ragged sequence") from None
+    array = as_array("mask", mask, MeshError)
     if array.ndim not in (2, 3) or array.dtype.kind != "b":
         raise MeshError(
             "mask must be a boolean image (rows, columns) or (slices, rows, columns), not "
