@@ -769,14 +769,21 @@ def _folded_paper() -> Mesh:
 # Random members.
 
 
-def _bounded(points: FloatArray, edges: IntArray, inside: FloatArray) -> BoolArray:
-    """Whether points (k, 2) lie inside the polygons with edges (e, 2): crossings of a ray to the right are odd."""
-    a, b = points[edges[:, 0]], points[edges[:, 1]]
-    x, y = inside[:, :1], inside[:, 1:]
+def _bounded(outline: FloatArray, points: FloatArray) -> BoolArray:
+    """Whether points (k, 2) lie inside a polygon (e, 2): crossings of a ray to the right are odd."""
+    a, b = outline, np.roll(outline, -1, axis=0)
+    x, y = points[:, :1], points[:, 1:]
     crosses = (a[:, 1] > y) != (b[:, 1] > y)
     with np.errstate(divide="ignore", invalid="ignore"):
         at = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
     return np.asarray(np.count_nonzero(crosses & (x < at), axis=1) % 2 == 1)
+
+
+def _filled(outline: FloatArray, inner: FloatArray) -> tuple[FloatArray, IntArray]:
+    """The corners (e, 2) of a polygon with the points that are inside, and the Delaunay triangles inside."""
+    points = np.concatenate([outline, inner[_bounded(outline, inner)]])
+    F = delaunay(points)
+    return points, F[_bounded(outline, points[F].mean(axis=1))]
 
 
 def _tetrahedra_surface(points: FloatArray, T: IntArray) -> Mesh:
@@ -849,12 +856,8 @@ def star_polygon(rng: Generator) -> Mesh:
     parts = int(rng.integers(1, 8))
     s = np.arange(parts)[None, :, None] / parts
     rim = (outline[:, None] * (1 - s) + np.roll(outline, -1, axis=0)[:, None] * s).reshape(-1, 2)
-    edges = np.stack([np.arange(len(rim)), np.roll(np.arange(len(rim)), -1)], axis=1)
-    inner = rng.uniform(-0.3, 0.3, (int(rng.integers(0, 200)), 2))
-    inner = inner[_bounded(rim, edges, inner)]
-    points = np.concatenate([rim, inner])
-    F = delaunay(points)
-    return compact(raised(points), F[_bounded(points, edges, points[F].mean(axis=1))])
+    points, F = _filled(rim, rng.uniform(-0.3, 0.3, (int(rng.integers(0, 200)), 2)))
+    return compact(raised(points), F)
 
 
 @family("helix")
@@ -1039,11 +1042,7 @@ def extrusion(rng: Generator) -> Mesh:
     """A random polygon with a height and nothing but its outline on the two lids, a gear for instance."""
     n = int(rng.integers(12, 200))
     radius = 1 + rng.uniform(0.05, 0.5) * np.sign(np.sin(rng.integers(2, 20) * 2 * np.pi * (np.arange(n) + 0.3) / n))
-    points = radius[:, None] * ring(n)
-    edges = np.stack([np.arange(n), np.roll(np.arange(n), -1)], axis=1)
-    F = delaunay(points)
-    F = F[_bounded(points, edges, points[F].mean(axis=1))]
-    return extruded(points, F, rng.uniform(0.02, 3))
+    return extruded(*_filled(radius[:, None] * ring(n), np.empty((0, 2))), rng.uniform(0.02, 3))
 
 
 @family("comb")
