@@ -154,7 +154,7 @@ def test_a_metric_at_the_vertices_of_triangles(k, has_windows):
 
 @pytest.mark.filterwarnings("ignore:the metric turns farther")
 def test_thin_triangles_that_turn():
-    """Up to 1:102, with a metric per face, the Hopf-Lax formula on the given faces is 14 % off in the mean."""
+    """Up to 1:102, with a metric per face, which is carried to the vertices; if not, it is 1.1 % off in the mean."""
     mesh, image, _ = twisted_disk(24, 10.0)
     centre = mesh.V[mesh.F].mean(axis=1)
     a, b = 10.0 * centre[:, 0], 10.0 * centre[:, 1]
@@ -166,7 +166,7 @@ def test_thin_triangles_that_turn():
     J[:, 1, 1] += centre[:, 0] * b
     exact = straight(image, 7)
     found = solver(mesh, np.swapaxes(J, 1, 2) @ J).distance(7)
-    assert np.abs(found - exact).mean() < 0.08 * exact.mean()
+    assert np.abs(found - exact).mean() < 0.003 * exact.mean()
 
 
 @pytest.mark.filterwarnings("ignore:the metric turns farther")

@@ -70,8 +70,10 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
         where they are not, since the metric changes too far along an edge, distance is that of the Hopf-Lax formula.
 
         Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of the Hopf-Lax
-        formula, of first order, sharpened to second where the metric and the distance are smooth. Where the tensors of
-        neighbours are those of a smooth field, their velocities are carried to the vertices first.
+        formula.
+
+        This is of first order, sharpened to second where the metric and the distance are smooth. Where tensors per
+        face are those of a smooth field, their velocities are carried to the vertices first.
 
     Raises
     ------

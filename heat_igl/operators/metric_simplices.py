@@ -38,8 +38,8 @@ class MetricSimplices:
         Positions in the space in which the metric is given.
     least : float
         Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
-    tensors : (m, q, 3, 3) float64 or None
-        A metric that is not the same everywhere, of each simplex (q = 1), or of triangles at each corner (q = 3).
+    tensors : (m, 1, 3, 3) float64 or None
+        A metric of each simplex, unless there are velocities.
     velocity : (m, p + 1, 6) float64 or None
         The inverse root of a metric at each corner, linear in between; across a triangle it is 1. Of the symmetric
         matrix the entries on and above the diagonal, row by row.
@@ -74,22 +74,31 @@ class MetricSimplices:
             # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
             mapped = cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(g[0]), mesh.F))
             return replace(mapped, is_given=False)
-        tensors, velocity = None, None
+        across = None
         if p == 2:
-            tensors = g[mesh.F] if at_vertices else g[:, None]
-            if at_vertices:
-                axes = plane_axes(mesh)
-                normal = np.cross(axes[:, 0], axes[:, 1])
-                inside = inverse_root(axes[:, None] @ tensors @ np.swapaxes(axes, 1, 2)[:, None])
-                W = np.swapaxes(axes, 1, 2)[:, None] @ inside @ axes[:, None]
-                W += (normal[:, :, None] * normal[:, None])[:, None]
-                velocity = np.ascontiguousarray(W[..., *_ABOVE])
-        elif at_vertices:
-            velocity = inverse_root(g)[:, *_ABOVE][mesh.F]
+            axes = plane_axes(mesh)[:, None]
+            inside = inverse_root(axes @ (g[mesh.F] if at_vertices else g[:, None]) @ np.swapaxes(axes, 2, 3))
+            W = np.swapaxes(axes, 2, 3) @ inside @ axes
+            normal = np.cross(axes[..., 0, :], axes[..., 1, :])
+            across = normal[..., None] * normal[..., None, :]
         else:
-            velocity, fitted = _at_corners(mesh, inverse_root(g)[:, *_ABOVE])
+            W = inverse_root(g)[:, None]
+        velocity: FloatArray | None
+        if at_vertices:
+            velocity = W[:, 0][:, *_ABOVE][mesh.F] if across is None else (W + across)[..., *_ABOVE]
+        else:
+            planes = None
+            if across is not None:
+                # As fast across a triangle as in the mean in its plane.
+                W += np.trace(W, axis1=2, axis2=3)[..., None, None] / 2 * across
+                planes = across[:, 0][:, *_ABOVE]
+            velocity, fitted = _at_corners(mesh, W[:, 0][:, *_ABOVE], planes)
             least = min(least, fitted)
-            tensors = g[:, None] if velocity is None else None
+            if velocity is not None and across is not None:
+                inside = (np.eye(3) - across) @ _symmetric(velocity) @ (np.eye(3) - across)
+                velocity = (inside + across)[..., *_ABOVE]
+        velocity = None if velocity is None else np.ascontiguousarray(velocity)
+        tensors = g[:, None] if velocity is None else None
         is_given = at_vertices or (p == 3 and velocity is None)
         return cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors, velocity, is_given)
 
@@ -127,9 +136,8 @@ class MetricSimplices:
             return self.tensors[chosen]
         if self.velocity is None:
             raise ValueError("these simplices have lengths, and no tensors")
-        full = np.empty((len(chosen), self.velocity.shape[1], 3, 3))
-        full[..., *_ABOVE] = full[..., *_ABOVE[::-1]] = self.velocity[chosen]
-        return np.asarray(np.linalg.inv(full @ full))
+        W = _symmetric(self.velocity[chosen])
+        return np.asarray(np.linalg.inv(W @ W))
 
     @property
     def edges(self) -> tuple[IntArray, FloatArray]:
@@ -177,27 +185,35 @@ def inverse_root(g: FloatArray) -> FloatArray:
     return np.asarray((axes / np.sqrt(sizes)[..., None, :]) @ np.swapaxes(axes, -1, -2))
 
 
-def _at_corners(mesh: Mesh, W: FloatArray) -> tuple[FloatArray | None, float]:
-    """The velocities W (m, 6) of tetrahedra as samples of a smooth field: (m, 4, 6) at their corners.
+def _symmetric(above: FloatArray) -> FloatArray:
+    """Symmetric matrices (..., 3, 3) by their entries (..., 6) on and above the diagonal."""
+    full = np.empty((*above.shape[:-1], 3, 3))
+    full[..., *_ABOVE] = full[..., *_ABOVE[::-1]] = above
+    return full
+
+
+def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[FloatArray | None, float]:
+    """The velocities W (m, 6) of simplices as samples of a smooth field: (m, p + 1, 6) at their corners.
 
     Around each vertex, a linear function is fitted. The velocity at the vertex is taken from it if it explains all of
-    the variance and is positive definite there, and is that of each tetrahedron if it leaves a quarter or more, as it
-    leaves of a step: jumps stay where they are. None if the field is smooth nowhere. The second result is the least
-    length of a unit vector at vertices.
+    the variance and is positive definite there, and is that of each simplex if it leaves a quarter or more, as it
+    leaves of a step: jumps stay where they are. What varies since triangles, with the projections `across` (m, 6) on
+    their normals, have other planes, counts as left. None if the field is smooth nowhere. The second result is the
+    least length of a unit vector at vertices.
     """
-    m, n = mesh.n_faces, mesh.n_vertices
+    (m, size), n = mesh.F.shape, mesh.n_vertices
     off = np.where(_ABOVE[0] == _ABOVE[1], 1, np.sqrt(2))  # for the norm of symmetric matrices
     level = (W * off).mean(axis=0)
     values = W * off - level
     X = mesh.V - mesh.V.mean(axis=0)
     centre = X[mesh.F].mean(axis=1)
-    products = [centre[:, :, None] * part[:, None] for part in (centre, values)]
-    moments = np.concatenate(
-        [np.ones((m, 1)), centre, values, *(x.reshape(m, -1) for x in products), (values**2).sum(1, keepdims=True)], 1
-    )
-    of_corners = sp.csr_array((np.ones(4 * m), mesh.F.ravel(), np.arange(0, 4 * m + 1, 4)), shape=(m, n))
+    products = [(centre[:, :, None] * part[:, None]).reshape(m, -1) for part in (centre, values)]
+    planes = np.zeros((m, 0)) if across is None else across * off
+    parts = [np.ones((m, 1)), centre, values, *products, (values**2).sum(axis=1, keepdims=True), planes]
+    moments = np.concatenate(parts, axis=1)
+    of_corners = sp.csr_array((np.ones(size * m), mesh.F.ravel(), np.arange(0, size * m + 1, size)), shape=(m, n))
     at = of_corners.T.tocsr()
-    # Around a vertex: the tetrahedra at it and at the other corners of these.
+    # Around a vertex: the simplices at it and at the other corners of these.
     sums = at @ (of_corners @ (at @ moments))
     sums /= np.maximum(sums[:, :1], 1)
     middle, mean = sums[:, 1:4], sums[:, 4:10]
@@ -207,19 +223,19 @@ def _at_corners(mesh: Mesh, W: FloatArray) -> tuple[FloatArray | None, float]:
     fitted = np.linalg.pinv(spread, hermitian=True) @ slope
     explained = (fitted * slope).sum(axis=(1, 2))
     is_constant = variance <= _ROUNDING * ((level**2).sum() + sums[:, 37])
+    if across is not None:
+        explained -= (1 - (sums[:, 38:] ** 2).sum(axis=1)) * ((mean + level) ** 2).sum(axis=1)
     share = np.clip(1 - 4 * (1 - explained / np.where(is_constant, 1, variance)), 0, 1) * ~is_constant
-    if not share.any():
+    if not (share > _ROUNDING).any():
         return None, np.inf
     found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
     count = np.maximum(at.sum(axis=1), 1)[:, None]
     least = share[mesh.F].min(axis=1)[:, None]
-    for _ in range(10):
+    for _ in range(3):
         # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
-        found += at @ ((values - of_corners @ found / 4) * least) / count
+        found += at @ ((values - of_corners @ found / size) * least) / count
     at_vertex = (found + level) / off
-    full = np.empty((n, 3, 3))
-    full[:, *_ABOVE] = full[:, *_ABOVE[::-1]] = at_vertex
-    sizes = np.linalg.eigvalsh(full)
+    sizes = np.linalg.eigvalsh(_symmetric(at_vertex))
     share[sizes[:, 0] <= 0] = 0
     part = share[mesh.F][..., None]
     return np.asarray((1 - part) * W[:, None] + part * at_vertex[mesh.F]), float(1 / sizes.max())

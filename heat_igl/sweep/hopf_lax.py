@@ -52,9 +52,8 @@ class HopfLaxEngine(SimplexEngine):
     def turning(self) -> float:
         """By how much the ratio of lengths in two directions changes over an edge, at a tenth of the simplices.
 
-        From a sample of the simplices: between the corners of one if the metric is linear in between, else between
-        those that meet in a vertex, with planes of triangles turned into each other. It is 1 where tensors differ by a
-        factor alone, as those of speeds.
+        From a sample of the simplices: between the first corner of one, and a simplex that it meets in another, with
+        planes of triangles turned into each other. It is 1 where tensors differ by a factor alone, as those of speeds.
         """
         simplices = self._simplices
         corners, place = simplices.corners, simplices.place
@@ -62,13 +61,10 @@ class HopfLaxEngine(SimplexEngine):
             return 1.0
         size = corners.shape[1]
         chosen = np.arange(0, len(corners), len(corners) // _SAMPLE + 1)
-        one = other = np.repeat(chosen, size)
-        if simplices.velocity is not None:
-            tensors = simplices.metric(chosen)
-            first, two = np.repeat(tensors[:, 0], size, axis=0), tensors.reshape(-1, 3, 3)
-        else:
-            other = self._incident[self._first[corners[chosen]]].ravel() // size
-            first, two = simplices.metric(one)[:, 0], simplices.metric(other)[:, 0]
+        one = np.repeat(chosen, size)
+        other, corner = np.divmod(self._incident[self._first[corners[chosen]]].ravel(), size)
+        first, there = simplices.metric(one)[:, 0], simplices.metric(other)
+        two = there[np.arange(len(there)), corner % there.shape[1]]
         if size == 3:
             x = plane_axes(Mesh(place, corners))
             normal = np.cross(x[:, 0], x[:, 1])
