@@ -45,8 +45,9 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
     left_out = _in_pairs(pairs, len(F))
     # On a surface with one side, neighbours contradict each other where it is flat.
     if 0 < len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(folds) > _FLAT:
-        F = np.delete(F, left_out, axis=0)
-        is_turned, part, pairs, folds = _turned(P, F)
+        stays = np.ones(len(F), bool)
+        stays[left_out] = False
+        F, is_turned, part, pairs, folds = F[stays], is_turned[stays], part[stays], pairs[:0], folds[:0]
     F = np.where(is_turned[:, None], F[:, [0, 2, 1]], F)
     if normals is not None:
         area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])

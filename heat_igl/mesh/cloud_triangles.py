@@ -99,10 +99,10 @@ def with_gaps_closed(
     is_doubtful[_torn_points(F, tree.neighbours[0][at_gap, : _NEAREST + 1], is_part)] = True
     others = np.flatnonzero(is_apart & is_part)
     if len(others):
-        beside, distance = _nearest_of(P, ~is_apart, others)
+        beside, distance = _nearest_of(tree, others, ~is_apart)
         is_other_sheet = np.einsum("kx,kx->k", *near.axes[[others, beside], 2]) < _OTHER_SHEET
         is_doubtful[others] |= (distance <= near.reach[beside]) & ~(is_other_sheet & has_side[others])
-    F = _with_small_parts(P, F, near.reach, part, size)
+    F = _with_small_parts(tree, F, part, size)
     return F, np.flatnonzero(is_doubtful), np.flatnonzero(is_apart)
 
 
@@ -111,17 +111,26 @@ def _torn_points(F: IntArray, nearest: IntArray, is_part: BoolArray) -> IntArray
 
     Beside another sheet, that is where a thin part is torn. Only others that belong to a part (n,) count.
     """
-    if not len(nearest):
-        return np.empty(0, np.int64)
-    a, b, c = F.T
+    # Triangles at most two edges from these points, which hold all shorter ways between two of them.
+    n, is_near = len(is_part), np.zeros(len(is_part), bool)
+    is_near[nearest] = True
+    is_near[F[at_some_corner(is_near, F)]] = True
+    a, b, c = F[at_some_corner(is_near, F)].T
     ends = np.concatenate([a, b, c, b, c, a]), np.concatenate([b, c, a, a, b, c])
-    edges = sp.csr_array((np.ones(len(ends[0]), bool), ends), shape=(len(is_part), len(is_part)))
-    reached = edges[nearest[:, 0]]
-    for _ in range(_EDGES_AWAY - 1):
+    edges = sp.csr_array((np.ones(len(ends[0]), bool), ends), shape=(n, n))
+    points, others = nearest[:, 0], nearest[:, 1:].ravel()
+    row = np.repeat(np.arange(len(points)), nearest.shape[1] - 1)[is_part[others]]
+    others = others[is_part[others]]
+    reached = sp.csr_array((np.ones(len(points), bool), (np.arange(len(points)), points)), shape=(len(points), n))
+    for _ in range(_EDGES_AWAY):
+        rows, row = np.unique(row, return_inverse=True)
+        if not len(rows):
+            break
+        points, reached = points[rows], reached[rows]
         reached = reached + reached @ edges
-    row, others = np.repeat(np.arange(len(nearest)), nearest.shape[1] - 1), nearest[:, 1:].ravel()
-    is_far = is_part[others] & ~np.asarray(reached[row, others])
-    return np.asarray(nearest[np.unique(row[is_far]), 0])
+        is_far = ~np.asarray(reached[row, others])
+        row, others = row[is_far], others[is_far]
+    return np.asarray(points[np.unique(row)])
 
 
 def _angles(P: FloatArray, F: IntArray) -> FloatArray:
@@ -163,23 +172,29 @@ def _triangles_of_stars(
     return corners[count == 3], rows[order], is_settled.astype(bool)
 
 
-def _with_small_parts(P: FloatArray, F: IntArray, reach: FloatArray, part: IntArray, size: IntArray) -> IntArray:
+def _with_small_parts(tree: PointTree, F: IntArray, part: IntArray, size: IntArray) -> IntArray:
     """The triangles, of which those are split that are nearest to points of small parts.
 
     A part (n,) of a size (p,) below that of a neighbourhood, as single points that noise has put above others, is no
-    surface of its own where a gap to another part is no wider than those that are filled there, for `reach` (n,).
+    surface of its own where a gap to another part is no wider than those that are filled there.
     """
+    P, (index, reach) = tree.P, tree.neighbours
     part, reach = part.copy(), reach.copy()
     is_small = size <= K
     is_small[np.argmax(size)] = False
     is_other, is_inserted = is_small[part], np.zeros(len(size), bool)
+    is_near = np.zeros(len(P), bool)
+    is_near[index[is_other]] = True
+    is_around = at_some_corner(is_near, F)
+    inside, F = F[~is_around], F[is_around]
     while is_other.any():
         points = np.flatnonzero(is_other)
-        beside, distance = _nearest_of(P, ~is_other, points)
+        beside, distance = _nearest_of(tree, points, ~is_other)
+        has_one = np.isfinite(distance)
+        points, beside, distance = points[has_one], beside[has_one], distance[has_one]
         # Of the triangles at the nearest point, that with the nearest middle.
-        faces = np.flatnonzero(at_some_corner(np.isin(np.arange(len(P)), beside), F))
-        corners, row = group_by_label(F[faces].ravel(), len(P)).of(beside)
-        faces = faces[corners // 3]
+        corners, row = group_by_label(F.ravel(), len(P)).of(beside)
+        faces = corners // 3
         away = np.linalg.norm(P[F[faces]].mean(axis=1) - P[points[row]], axis=1)
         first = np.lexsort((away, row))[np.searchsorted(row, np.arange(len(points)))]
         is_inserted[part[points[np.minimum(distance, away[first]) <= 2 * _LARGEST_GAP * reach[beside]]]] = True
@@ -196,14 +211,15 @@ def _with_small_parts(P: FloatArray, F: IntArray, reach: FloatArray, part: IntAr
         is_other[point], part[point] = False, part[beside]
         # Other points are as near to it as to the surface: its own neighbours may be far away.
         reach[point] = np.minimum(reach[point], reach[beside])
-    return F
+    return np.concatenate([inside, F])
 
 
-def _nearest_of(P: FloatArray, is_kept: BoolArray, points: IntArray) -> tuple[IntArray, FloatArray]:
-    """The nearest to some of the points (k,) of those that are kept, and the distance (k,)."""
-    kept = np.flatnonzero(is_kept)
-    nearest, distance = PointTree(P[kept], kept).nearest(P[points], 1)
-    return kept[nearest[:, 0]], distance
+def _nearest_of(tree: PointTree, points: IntArray, is_kept: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Of the neighbours of some points (k,), the nearest that is kept, and the distance (k,), infinite without one."""
+    index = tree.neighbours[0][points]
+    first = np.argmax(is_kept[index], axis=1)
+    beside = index[np.arange(len(index)), first]
+    return beside, np.where(is_kept[beside], np.linalg.norm(tree.P[beside] - tree.P[points], axis=1), np.inf)
 
 
 def at_all_corners(is_chosen: BoolArray, F: IntArray) -> BoolArray:
@@ -365,4 +381,8 @@ def _with_largest_fans(inside: IntArray, around: IntArray, is_gap: BoolArray) ->
         if stays.all():
             return np.concatenate([inside, around])
         # What is left of a fan may be several.
+        is_gap = np.zeros(n, bool)
+        is_gap[around[~stays]] = True
         around = around[stays]
+        is_around = at_some_corner(is_gap, around)
+        inside, around = np.concatenate([inside, around[~is_around]]), around[is_around]

@@ -22,7 +22,7 @@ _BLOCK = 1 << 12
 # Points in a leaf of the tree that sorts them: as many as in the smallest boxes.
 _LEAF = 8
 # Ratio of the two smaller variances above which neighbours may be on several sheets.
-_SEVERAL_SHEETS = 0.04
+_SEVERAL_SHEETS = 0.1
 # Directions in which balls are tried, half and their opposites: every 22 degrees. With 60 a tenth of a neighbour
 # stays on the other of two sheets 1.5 spacings apart; with 120 and 160 errors at thin parts are no smaller.
 _DIRECTIONS = 100
