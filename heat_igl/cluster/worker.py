@@ -68,13 +68,9 @@ def memory_for_solvers() -> int:
         limit = get_worker().memory_manager.memory_limit
     except ValueError:  # not on a worker
         limit = None
+    physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 8 * 2**30
     # A tenth is left for errors of the estimate.
-    return int(0.9 * (limit or _physical_memory())) - PROCESS_MEMORY
-
-
-def _physical_memory() -> int:
-    """Bytes of memory that this machine has."""
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 8 * 2**30
+    return int(0.9 * (limit or physical)) - PROCESS_MEMORY
 
 
 @dataclass(eq=False)

@@ -317,11 +317,6 @@ def checked_path(path: str | os.PathLike[str], suffixes: Collection[str], packed
     return found
 
 
-def is_mesh_path(path: Path) -> bool:
-    """Whether `read_mesh` knows the extension of `path`."""
-    return form_suffix(path) in (_PACKED if is_packed(path) else MESH_SUFFIXES)
-
-
 def _load(path: str | os.PathLike[str]) -> tuple[Path, Contents]:
     path = _checked(path)
     return path, _FORMATS[form_suffix(path)].read(path, file_bytes(path))
@@ -426,10 +421,9 @@ def read_mesh_or_cloud(path: str | os.PathLike[str], points: bool = False) -> Me
 
 def is_mesh_or_cloud_path(path: Path, points: bool = False) -> bool:
     """Whether `read_mesh_or_cloud` knows the extension of `path`, but for .npy, which may hold anything."""
+    known = _PACKED if is_packed(path) else MESH_SUFFIXES
     suffix = form_suffix(path)
-    return suffix != ".npy" and (
-        suffix in POINT_CLOUD_SUFFIXES if points else is_mesh_path(path) or suffix in POINT_SUFFIXES
-    )
+    return suffix != ".npy" and suffix in (POINT_CLOUD_SUFFIXES if points else (*known, *POINT_SUFFIXES))
 
 
 def write_point_cloud(path: str | os.PathLike[str], cloud: PointCloud, /, **attributes: ArrayLike) -> None:
@@ -534,7 +528,7 @@ def _to_ply(path: Path, cloud: PointCloud, attributes: _Attributes) -> None:
         if name in columns or values.ndim != 1:
             raise MeshError(f"{path}: {name} must be another name than those of coordinates, and have shape (n,)")
         columns[name] = values
-    ply.write_vertices(path, columns)
+    ply.write_columns(path, columns)
 
 
 def _to_obj(path: Path, cloud: PointCloud, _: _Attributes) -> None:

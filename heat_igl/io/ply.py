@@ -301,15 +301,13 @@ def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     faces = np.empty(mesh.n_faces, [("degree", "u1"), ("corners", "<i4", 3)])
     faces["degree"] = 3
     faces["corners"] = mesh.F
-    _write(path, columns, comments, faces)
+    write_columns(path, columns, comments, faces)
 
 
-def write_vertices(path: Path, columns: Mapping[str, FloatArray]) -> None:
-    """Write vertices without faces: properties of the same length by name, x, y and z among them."""
-    _write(path, columns, [], None)
-
-
-def _write(path: Path, columns: Mapping[str, FloatArray], comments: Sequence[str], faces: AnyArray | None) -> None:
+def write_columns(
+    path: Path, columns: Mapping[str, FloatArray], comments: Sequence[str] = (), faces: AnyArray | None = None
+) -> None:
+    """Write vertices, with faces or without: properties of the same length by name, x, y and z among them."""
     rows = np.stack(list(columns.values()), axis=1).astype("<f8")
     header = ["ply", "format binary_little_endian 1.0", *comments, f"element vertex {len(rows)}"]
     header += [f"property double {name}" for name in columns]

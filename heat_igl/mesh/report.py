@@ -164,6 +164,10 @@ def mesh_report(mesh: Mesh) -> MeshReport:
     is_copy = mesh.originals != np.arange(n)
     cells = len(found.vertices) - len(F) if mesh.is_tetrahedral else len(F)
     mean_edge = float(mesh.edge_lengths.mean())
+    is_delaunay = None
+    if not mesh.is_tetrahedral:
+        opposite = np.bincount(found.of_face.T.ravel(), weights=cotangents.ravel())
+        is_delaunay = not (opposite[found.n_faces == 2] < DELAUNAY_TOLERANCE).any()
     return MeshReport(
         n_vertices=n,
         n_faces=len(F),
@@ -185,7 +189,7 @@ def mesh_report(mesh: Mesh) -> MeshReport:
         longest_edge=float(mesh.edge_lengths.max()),
         smallest_angle=float(np.degrees(angles.min())),
         largest_angle=float(np.degrees(angles.max())),
-        is_intrinsic_delaunay=None if mesh.is_tetrahedral else _is_delaunay(found, cotangents),
+        is_intrinsic_delaunay=is_delaunay,
         edges_across=mesh.longest_distance / mean_edge,
         range_limit=RANGE_LIMIT,
     )
@@ -204,8 +208,3 @@ def _cotangents_and_angles(V: FloatArray, F: IntArray) -> tuple[FloatArray, Floa
     cross = igl.doublearea(V, F)
     with np.errstate(divide="ignore", invalid="ignore"):
         return dot / cross, np.arctan2(cross, dot)
-
-
-def _is_delaunay(found: connectivity.Facets, cotangents: FloatArray) -> bool:
-    total = np.bincount(found.of_face.T.ravel(), weights=cotangents.ravel())
-    return not (total[found.n_faces == 2] < DELAUNAY_TOLERANCE).any()

@@ -90,7 +90,7 @@ def _flattened(P: FloatArray) -> tuple[FloatArray, float]:
     extent = P - P.mean(axis=0)
     if np.linalg.norm(normal) <= _NEARLY_PLANAR * float((extent**2).sum(axis=1).max()):
         axes = np.linalg.svd(extent)[2]
-        axes[1] *= 1 if _signed_area(extent @ axes[:2].T) >= 0 else -1
+        axes[1] *= 1 if normal @ np.cross(axes[0], axes[1]) >= 0 else -1
     else:
         normal /= np.linalg.norm(normal)
         across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
@@ -98,12 +98,6 @@ def _flattened(P: FloatArray) -> tuple[FloatArray, float]:
         axes = np.stack([across, np.cross(normal, across), normal])
     height = np.abs(extent @ axes[2]).max() / np.linalg.norm(extent, axis=1).max()
     return extent @ axes[:2].T, float(height)
-
-
-def _signed_area(p: FloatArray) -> float:
-    """Twice the signed area of a polygon (d, 2)."""
-    following = np.roll(p, -1, axis=0)
-    return float((p[:, 0] * following[:, 1] - p[:, 1] * following[:, 0]).sum())
 
 
 def _area(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
