@@ -20,7 +20,7 @@ from rich.console import Console
 import heat_igl
 from heat_igl.applications import Statistic
 from heat_igl.cli import options as opt
-from heat_igl.cli.options import Row, check_file, described, print_json, print_rows, prints_json, say, wrote
+from heat_igl.cli.options import Row, check_file, described, print_report, print_rows, say, wrote
 from heat_igl.errors import BatchError
 from heat_igl.io import complete_file, read_mesh
 from heat_igl.mesh import Mesh
@@ -233,10 +233,7 @@ def _all_pairs_of(path: Path, suffix: str) -> tuple[float, int, int]:
 
 def _finish(report: BatchReport, json_file: Path | None) -> None:
     """Print the report of a batch; the status is 1 if anything is missing."""
-    if json_file is not None:
-        print_json(report.to_dict(), json_file)
-    if not prints_json(json_file):
-        print(report.to_markdown(), end="")
+    print_report(report.to_dict(), report.to_markdown(), json_file)
     if report.failed or report.unfinished:
         raise typer.Exit(1)
 

@@ -76,15 +76,14 @@ def described(path: Path, mesh: Mesh | PointCloud) -> Row:
 
 def print_rows(rows: Sequence[Row], json_file: Path | None = None) -> None:
     """Print names and texts as two columns; also as JSON to a file, or to standard output in their place."""
-    if json_file == _STANDARD_OUTPUT:
+    if json_file is not None:
         print_json(as_dictionary(rows), json_file)
+    if json_file == _STANDARD_OUTPUT:
         return
     width = max(len(row[0]) for row in rows)
     console = Console(highlight=False, soft_wrap=True)  # no wrapping, so that pipes receive one line per row
     for name, text, *_ in rows:
         console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {text}"))
-    if json_file is not None:
-        print_json(as_dictionary(rows), json_file)
 
 
 def as_dictionary(rows: Sequence[Row]) -> dict[str, Any]:
@@ -105,9 +104,12 @@ def print_json(content: Mapping[str, Any], json_file: Path) -> None:
         temporary.write_bytes(text.encode("utf8"))
 
 
-def prints_json(json_file: Path | None) -> bool:
-    """Whether standard output is for JSON alone."""
-    return json_file == _STANDARD_OUTPUT
+def print_report(content: Mapping[str, Any], text: str, json_file: Path | None) -> None:
+    """Print a text, and write the content as JSON to a file, or print it in place of the text."""
+    if json_file is not None:
+        print_json(content, json_file)
+    if json_file != _STANDARD_OUTPUT:
+        print(text, end="")
 
 
 def wrote(*paths: Path | None) -> list[Row]:

@@ -25,9 +25,8 @@ from heat_igl.cli.options import (
     check_writable,
     described,
     plan_row,
-    print_json,
+    print_report,
     print_rows,
-    prints_json,
     say,
 )
 from heat_igl.drawing.figure import Picture
@@ -88,11 +87,9 @@ def validate(
         say(f"no picture of errors: {report.failure or 'there is no reference'}")
     elif picture is not None:
         Picture(report.plot()).save(picture)
-    if json_file is not None:
-        print_json(report.to_dict(), json_file)
-    if not prints_json(json_file):
-        # The columns that a terminal has space for, and all to anything else.
-        print(report.to_markdown(_NARROW) if Console().is_terminal else report.to_markdown(), end="")
+    # The columns that a terminal has space for, and all to anything else.
+    text = report.to_markdown(_NARROW) if Console().is_terminal else report.to_markdown()
+    print_report(report.to_dict(), text, json_file)
     exceeding = report.exceeding(fail_above) if fail_above is not None else ()
     if exceeding:
         found = ", ".join(f"{row.method} {_verdict(row)}" for row in exceeding)
