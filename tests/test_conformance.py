@@ -80,6 +80,7 @@ def test_zero_at_sources_and_positive_elsewhere(name, method):
         assert np.isfinite(d).all()
 
 
+@pytest.mark.filterwarnings("ignore:the points are in several parts")
 @table()
 def test_infinity_in_other_components_and_at_vertices_of_no_cell(name, method):
     one, both = domain(name), domain(name).doubled()

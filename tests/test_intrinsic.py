@@ -712,6 +712,11 @@ def test_a_face_that_is_there_twice_counts_once():
     assert (one.L != other.L).nnz == 0
     assert (one.M != other.M).nnz == 0
     assert other.surface.uncovered is None
+    # A point is as it is given, in the face or in its copy, whose corners run the other way.
+    here, there = ([5], [[0.2, 0.3, 0.5]]), ([5 + sphere.n_faces], [[0.5, 0.3, 0.2]])
+    expected, solver = HeatMethodSolver(sphere).distance(SurfacePoints(*here)), HeatMethodSolver(doubled)
+    for place in (here, there):
+        np.testing.assert_allclose(solver.distance(SurfacePoints(*place)), expected, rtol=1e-9)
 
     fins = finned_sphere()
     F = np.concatenate([fins.F, np.roll(fins.F[-5:], 1, axis=1), fins.F[:9, ::-1]])
