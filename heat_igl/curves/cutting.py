@@ -33,17 +33,7 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class MeshPiece:
-    """A piece of a cut mesh.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        The faces of the piece, on the vertices that they use.
-    vertices : (n,) int64
-        The vertex of the cut mesh that each vertex is.
-    faces : (m,) int64
-        The face of the cut mesh that each face is.
-    """
+    """A piece of a cut mesh, on the vertices that it uses; which vertices and faces of the cut mesh these are."""
 
     mesh: Mesh
     vertices: IntArray
@@ -55,10 +45,7 @@ class MeshPiece:
     def boundary_loops(self) -> list[IntArray]:
         """The vertices along each loop of the boundary, with the piece on the left, from the smallest on.
 
-        Raises
-        ------
-        MeshError
-            If more than two faces meet at an edge, or neighbours are oriented differently.
+        A MeshError if more than two faces meet at an edge, or neighbours are oriented differently.
         """
         F = self.mesh.F
         tail, head, apex = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel(), F.ravel()

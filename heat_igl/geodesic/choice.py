@@ -21,14 +21,8 @@ _OPTIONS_OF_HEAT = tuple(option.name for option in fields(SolverOptions))
 class SolverChoice:
     """A method of distance with its options; hashable.
 
-    Attributes
-    ----------
-    method : {"auto", "windows", "exact", "sweep", "heat"}
-        "heat" is `HeatMethodSolver`, the others are those of `GeodesicSolver`.
-    tolerance : float
-        As for `GeodesicSolver`.
-    heat : SolverOptions
-        For heat.
+    "heat" is `HeatMethodSolver`, with the options `heat`; the others are methods of `GeodesicSolver`, as `tolerance` is
+    its.
     """
 
     method: DistanceMethod = "auto"

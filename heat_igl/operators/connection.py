@@ -72,19 +72,11 @@ def with_rotations(L: sp.csc_matrix, rotations: sp.csc_matrix) -> sp.csc_matrix:
 
 
 def edge_rotations(domain: Operators) -> sp.csc_matrix:
-    """Factors of the entries of L for the connection Laplacian of triangles.
+    """Factors (n, n) of the entries of L for the connection Laplacian of triangles, Hermitian and in the pattern of L.
 
-    Returns
-    -------
-    (n, n) csc_matrix of complex128
-        Hermitian, in the pattern of L. Entry (j, i) is exp(i rho), with rho the angle by which components turn from i
-        to j; of several edges between the same two vertices, the mean by weight. The diagonal is 1, and more by the
-        amount that edges from a vertex to itself cost.
-
-    Raises
-    ------
-    MeshError
-        If the domain has no triangles, or they are no oriented manifold.
+    Entry (j, i) is exp(i rho), with rho the angle by which components turn from i to j; of several edges between the
+    same two vertices, the mean by weight. The diagonal is 1, and more by the amount that edges from a vertex to itself
+    cost. A MeshError if the domain has no triangles, or they are no oriented manifold.
     """
     triangulation, angles = _triangles(domain)
     half_edge = np.arange(triangulation.F.size)
@@ -120,10 +112,8 @@ def face_rotations(domain: Operators) -> tuple[AnyArray, AnyArray]:
     Angles around a vertex are scaled and those in a face are not: of the directions between the two sides of a corner,
     the middle one keeps its place, and the plane of the face is turned by one angle.
 
-    Raises
-    ------
-    MeshError
-        As for `edge_rotations`.
+    Returns factors (m, 3) for the faces of the mesh, and for the triangles that the operators belong to. A MeshError as
+    for `edge_rotations`.
     """
     triangulation, angles = _triangles(domain)
     surface = domain.surface

@@ -99,16 +99,11 @@ class TriangleElements:
         return self.triangulation.F
 
     def frames(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The gradient in the plane of each triangle, in three numbers (m,).
+        """The gradient in the plane of each triangle, in three numbers (m,): `per_base`, `foot` and `per_height`.
 
         With corner 0 at the origin and corner 1 on the first axis, the gradient of u is ``x = per_base (u_1 - u_0)``,
-        ``y = per_height (u_2 - u_0 - foot (u_1 - u_0))``.
-
-        Returns
-        -------
-        per_base, foot, per_height : (m,) float64
-            One over the length of the side from corner 0 to corner 1; the foot of corner 2 on that side, from 0 to 1
-            between the ends; one over the height of corner 2.
+        ``y = per_height (u_2 - u_0 - foot (u_1 - u_0))``: one over the length of the side from corner 0 to corner 1;
+        the foot of corner 2 on that side, from 0 to 1 between the ends; one over the height of corner 2.
         """
         lengths = self.triangulation.l
         base = lengths[:, 2]

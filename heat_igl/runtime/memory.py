@@ -56,15 +56,10 @@ def available_memory() -> float:
 
 
 class PeakMemory:
-    """A context that measures the growth of the resident memory of this process.
+    """A context that measures the growth of the resident memory of this process, in `bytes` once it is left.
 
     On Linux the peak is exact, since the kernel records a high-water mark. On other systems psutil samples the memory
     every 5 ms, which can miss a short peak. Without psutil `bytes` stays None.
-
-    Attributes
-    ----------
-    bytes : int or None
-        Peak resident memory inside the context minus the memory at the start; set on exit.
     """
 
     def __init__(self) -> None:

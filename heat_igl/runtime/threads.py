@@ -196,13 +196,7 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: i
 
 
 def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
-    """The floating-point type of returned distances; float64 if `dtype` is None.
-
-    Raises
-    ------
-    ValueError
-        If `dtype` is neither float64 nor float32.
-    """
+    """The type of returned distances: float64, also for None, or float32; a ValueError for any other."""
     try:
         found = np.dtype(np.float64 if dtype is None else dtype)
     except TypeError:

@@ -194,18 +194,8 @@ class Origin(NamedTuple):
 class ExactSolution:
     """Distances of one query, and where the shortest paths come from.
 
-    Attributes
-    ----------
-    distance : (n,) float64
-        Distance of every vertex; ``inf`` where no source is reached, or none within the cutoff.
-    origin : Origin
-        Of the paths to the vertices, (n,) each. The half-edge that is entered by lies opposite the vertex.
-    target_distance : (t,) float64
-        Distance of the target points; ``inf`` as for vertices.
-    target_origin : Origin
-        Of the paths to the target points, (t,) each.
-    n_windows : int
-        Windows that were carried over an edge.
+    At vertices (n,) and at target points (t,); ``inf`` where no source is reached, or none within the cutoff. The
+    half-edge by which a path to a vertex enters lies opposite the vertex. `n_windows` were carried over an edge.
     """
 
     distance: FloatArray
