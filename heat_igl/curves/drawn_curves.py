@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.curves.geodesics import GeodesicPathSolver, as_curve
-from heat_igl.curves.places import Waypoints, mixed_places
+from heat_igl.curves.places import Waypoints, checked_places
 from heat_igl.errors import SourceError, names_guessed, positive, truth
 from heat_igl.heat import SignedHeatSolver
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices
@@ -57,7 +57,7 @@ def curve_through(mesh: MeshLike, points: Waypoints, *, closed: bool = False) ->
     1.2
     """
     triangles, closed = as_simplices(mesh), truth("closed", closed)
-    faces, barycentric = mixed_places("points", triangles, points)
+    faces, barycentric = checked_places("points", triangles, points)
     needed = 3 if closed else 2
     if len(faces) < needed:
         raise SourceError(f"points must be {needed} places or more for {'a closed' if closed else 'a'} curve")

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import igl
 import numpy as np
 
-from heat_igl.curves.places import CommonFaces, Waypoints, corners, mixed_places
+from heat_igl.curves.places import CommonFaces, Waypoints, checked_places, corners
 from heat_igl.errors import MeshError, SourceError, names_guessed, shown, truth
 from heat_igl.intrinsic import HalfEdges, corner_angles, lengths_to_divide_by
 from heat_igl.kernels.paths import routes, shortening, strips
@@ -289,7 +289,7 @@ class GeodesicPathSolver:
 
         Arguments, result and errors are those of `geodesic_path`.
         """
-        faces, barycentric = mixed_places("waypoints", self._mesh, waypoints, self._corner_at)
+        faces, barycentric = checked_places("waypoints", self._mesh, waypoints, self._corner_at)
         needed = 3 if truth("closed", closed) else 2
         if len(faces) < needed:
             raise SourceError(
@@ -428,7 +428,7 @@ def geodesic_bezier(mesh: MeshLike, points: Waypoints, pieces: int = 32) -> Surf
         raise ValueError(f"pieces must be an integer from 1 to {_MOST_PIECES}, not {shown(pieces)}")
     triangles = as_simplices(mesh)
     solver = GeodesicPathSolver(triangles)
-    faces, barycentric = mixed_places("points", triangles, points)
+    faces, barycentric = checked_places("points", triangles, points)
     if len(faces) < 2:
         raise SourceError(f"points must be two control points or more, not {len(faces)}")
     first = solver.geodesics(faces, barycentric)

@@ -8,7 +8,7 @@ import numpy as np
 
 from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.paths import shortest_paths
-from heat_igl.curves.places import Waypoints, mixed_places
+from heat_igl.curves.places import Waypoints, checked_places
 from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import AccuracyWarning, SourceError, is_number, names_guessed, real_numbers, shown
 from heat_igl.geodesic import GeodesicSolver
@@ -85,7 +85,7 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     """
     mesh = as_mesh(mesh)
     triangles = as_simplices(mesh)
-    faces, barycentric = mixed_places("points", triangles, points)
+    faces, barycentric = checked_places("points", triangles, points)
     weight = _checked_weights(weights, len(faces))
     power = _checked_power(p)
     used = weight > 0

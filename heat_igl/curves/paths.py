@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from heat_igl.curves.places import places
+from heat_igl.curves.places import checked_places
 from heat_igl.errors import MeshError, SourceError, names_guessed
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.kernels.windows.paths import trace_back
@@ -71,14 +71,14 @@ def shortest_paths(
     part = None if region is None else MeshPart.of(mesh, region)
     chosen = source_set(sources, mesh.n_vertices, mesh.F, mesh, part=part, originals=mesh.originals)
     if part is None:
-        face, barycentric = places("targets", mesh, targets)
+        face, barycentric = checked_places("targets", mesh, targets)
         return [path.on(mesh) for path in _exact(mesh, chosen, face, barycentric)]
     if isinstance(targets, SurfacePoints):
-        face, barycentric = places("targets", mesh, targets)
+        face, barycentric = checked_places("targets", mesh, targets)
         face = part.numbers_of(face, "targets")
     else:
         part.require_vertices(named_vertices(targets, mesh.n_vertices, "targets"), "targets")
-        face, barycentric = places("targets", part.mesh, targets)
+        face, barycentric = checked_places("targets", part.mesh, targets)
     paths = _exact(part.mesh, chosen, face, barycentric)
     return [SurfaceCurve(part.faces[path.faces], path.start, path.end).on(mesh) for path in paths]
 

@@ -19,8 +19,10 @@ from heat_igl.typing import FloatArray, IntArray
 Waypoints = Sources | Sequence[int | SurfacePoints]
 
 
-def places(name: str, mesh: Mesh, points: Sources, corner_at: IntArray | None = None) -> tuple[IntArray, FloatArray]:
-    """Faces (k,) and barycentric coordinates (k, 3) of points, or of vertices in the order given.
+def checked_places(
+    name: str, mesh: Mesh, points: Waypoints, corner_at: IntArray | None = None
+) -> tuple[IntArray, FloatArray]:
+    """Faces (k,) and barycentric coordinates (k, 3) of points, of vertices in their order, or of a sequence of both.
 
     `name` is the name of the argument, for messages; `corner_at`, the result of `corners`, saves time in many calls.
     """
@@ -28,10 +30,17 @@ def places(name: str, mesh: Mesh, points: Sources, corner_at: IntArray | None = 
         require_triangles(mesh)
         require_faces(points.faces, mesh.n_faces, f"{name}: ")
         return points.faces, on_simplex(points.barycentric)
+    if isinstance(points, Sequence) and any(isinstance(point, SurfacePoints) for point in points):
+        parts = []
+        for i, point in enumerate(points):
+            if not isinstance(point, SurfacePoints | int | np.integer):
+                raise SourceError(f"{name}[{i}] must be a vertex or SurfacePoints, not {type(point).__name__}")
+            parts.append(checked_places(f"{name}[{i}]", mesh, point, corner_at))
+        return np.concatenate([faces for faces, _ in parts]), np.concatenate([weights for _, weights in parts])
     rows = isinstance(points, np.ndarray | list | tuple) and len(points) > 0 and np.ndim(points[0]) == 1
     if rows or are_positions(points):
-        return places(name, mesh, points_beside(mesh, points, name))  # type: ignore[arg-type]
-    vertex = mesh.originals[named_vertices(points, mesh.n_vertices, name)]
+        return checked_places(name, mesh, points_beside(mesh, points, name))  # type: ignore[arg-type]
+    vertex = mesh.originals[named_vertices(cast(Sources, points), mesh.n_vertices, name)]
     corner = (corners(mesh) if corner_at is None else corner_at)[vertex]
     if (corner < 0).any():
         first = int(np.argmax(corner < 0))
@@ -44,20 +53,6 @@ def corners(mesh: Mesh) -> IntArray:
     corner_at = np.full(mesh.n_vertices, -1)
     corner_at[mesh.F.ravel()] = np.arange(mesh.F.size)
     return corner_at
-
-
-def mixed_places(
-    name: str, mesh: Mesh, points: Waypoints, corner_at: IntArray | None = None
-) -> tuple[IntArray, FloatArray]:
-    """The same for a sequence that holds both vertices and `SurfacePoints`."""
-    if not isinstance(points, Sequence) or not any(isinstance(point, SurfacePoints) for point in points):
-        return places(name, mesh, cast(Sources, points), corner_at)
-    parts = []
-    for i, point in enumerate(points):
-        if not isinstance(point, SurfacePoints | int | np.integer):
-            raise SourceError(f"{name}[{i}] must be a vertex or SurfacePoints, not {type(point).__name__}")
-        parts.append(places(f"{name}[{i}]", mesh, cast(Sources, point), corner_at))
-    return np.concatenate([faces for faces, _ in parts]), np.concatenate([weights for _, weights in parts])
 
 
 class CommonFaces:

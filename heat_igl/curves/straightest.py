@@ -6,15 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from heat_igl.curves.places import checked_places
 from heat_igl.errors import SourceError, is_number, real_numbers, shown
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels.paths import straightest
 from heat_igl.mesh import MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
 from heat_igl.mesh.cloud_orientation import on_one_side
-from heat_igl.mesh.surface_points import require_faces
 from heat_igl.runtime import over_rows
-from heat_igl.sources import Sources, named_vertices
-from heat_igl.sources.source_sets import on_simplex
+from heat_igl.sources import Sources
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 # The compiled module, whose signatures are those of Cython.
@@ -207,20 +206,10 @@ class Tracer:
 
         A point in a vertex is the vertex for components `in_frame`; a vector in space is in the plane of its face.
         """
-        if isinstance(points, SurfacePoints):
-            require_faces(points.faces, self._mesh.n_faces)
-            weights = on_simplex(points.barycentric)
-            corner = self._surface.F[points.faces, weights.argmax(axis=1)]
-            vertices = np.where((weights.max(axis=1) == 1) & in_frame, corner, -1)
-            return _Starts(points.faces.copy(), np.ascontiguousarray(weights), vertices)
-        vertices = self._surface.originals[named_vertices(points, self._mesh.n_vertices, name)]
-        corner = self._frames.angles.first[vertices]
-        if (corner < 0).any():
-            first = int(np.argmax(corner < 0))
-            raise SourceError(
-                f"{name}[{first}] = {vertices[first]} is a vertex that no face uses: no geodesic starts there"
-            )
-        return _Starts(corner // 3, np.eye(3)[corner % 3], vertices)
+        faces, weights = checked_places(name, self._mesh, points, self._frames.angles.first)
+        is_vertex = (weights.max(axis=1) == 1) & (in_frame or not isinstance(points, SurfacePoints))
+        corner = self._surface.F[faces, weights.argmax(axis=1)]
+        return _Starts(faces.copy(), np.ascontiguousarray(weights), np.where(is_vertex, corner, -1))
 
     def directions(self, name: str, starts: _Starts, vectors: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Angle (k,) of each vector in the face of the start, from corner 0 to corner 1, and length.

@@ -328,18 +328,17 @@ class ExactSurface:
         return np.where(within, distance, np.inf), origin
 
 
-def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources, *, cutoff: float = np.inf) -> FloatArray:
+def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources) -> FloatArray:
     """Exact geodesic distance (n,) on triangles F (m, 3) with positions V (n, 3), in one call.
 
-    `sources` are a vertex, a sequence of them or a mask (n,) of bool. What is farther than `cutoff` is ``inf``, as are
-    vertices that no source reaches. A MeshError if the mesh cannot be used or is tetrahedral, and a SourceError if
-    `sources` does not name vertices.
+    `sources` are a vertex, a sequence of them or a mask (n,) of bool. A MeshError if the mesh cannot be used or is
+    tetrahedral, and a SourceError if `sources` does not name vertices.
     """
     mesh = Mesh(V, F)
     if mesh.is_tetrahedral:
         raise MeshError("exact distance needs triangles, but F has 4 columns")
     chosen = source_set(vertex_sources(sources, mesh.n_vertices), mesh.n_vertices, None)
-    return ExactSurface(from_mesh(mesh, int(chosen.vertices[0]))).distance(chosen, cutoff, n_threads())
+    return ExactSurface(from_mesh(mesh, int(chosen.vertices[0]))).distance(chosen, threads=n_threads())
 
 
 # A search of the kernel on a front, from some sources; it fills statistics, and returns whether memory sufficed.
