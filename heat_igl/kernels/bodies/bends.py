@@ -37,30 +37,15 @@ def bend_around(
     edge whose ends know their distances is a source: vertices around it are searched as far as they see the edge,
     and its ways are the shortest.
 
-    Parameters
-    ----------
-    edges : (e, 2) int32
-        Edges of the body around which ways bend, roughly from near to far.
-    outward : (e, 3) float64
-        Direction out of the body at each, halfway between the two walls; zero where more than two meet.
-    wall : (e,) float64
-        Cosine of the angle between that direction and the walls.
-    body : Body
-        Tetrahedra.
-    beside : float
-        Share of the longest edge at a vertex by which it may lie beside the part of the body that an edge hides, and
-        the search still goes on behind it: a larger one finds more of what is hidden in coarse bodies, and takes time.
-    sources, offset : (k,) int32, (k,) float64
-        Vertex of each source, and the value at which distance begins there.
-    d, begin, label : (n,) float64, (n,) float64, (n,) int32
-        Distances, the value at which the front that arrives seems to begin, and the source of each; changed.
-    way : (n,) int32
-        The edge around which the way to each vertex bends last, -1 on straight ways, -2 where it is not known; changed.
+    The edges (e, 2) int32 are those of the `body` around which ways bend, roughly from near to far. `outward` (e, 3) is
+    the direction out of the body at each, halfway between the two walls, zero where more than two meet, and `wall` (e,)
+    the cosine of the angle between that direction and the walls. A vertex may lie `beside` the part of the body that an
+    edge hides, by this share of its longest edge, and the search still goes on behind it: a larger one finds more of
+    what is hidden in coarse bodies, and takes time. `way` (n,) int32 is the edge around which the way to each vertex
+    bends last, -1 on straight ways, -2 where it is not known. The other arguments are those of `sight.look_around`;
+    `d`, `begin`, `label` and `way` are changed.
 
-    Returns
-    -------
-    int
-        Number of times that vertices were searched around an edge.
+    Returns the number of times that vertices were searched around an edge.
     """
     n, e = body.positions.shape[0], edges.shape[0]
     ends = np.asarray(body.positions)[np.asarray(edges)]

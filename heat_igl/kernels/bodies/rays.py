@@ -22,14 +22,8 @@ class Body:
     vertex v are at ``first_neighbour[v]`` to ``first_neighbour[v + 1]`` of `neighbours`, and `reach` (n,) is the
     longest edge at each vertex.
 
-    Parameters
-    ----------
-    corners : (m, 4) int32
-        Tetrahedra.
-    first, incident : (n + 1,) int32, (4 m,) int32
-        Corners ``4 * tetrahedron + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
-    positions : (n, 3) float64
-        Of the vertices.
+    It is made of tetrahedra `corners` (m, 4) int32, positions (n, 3) of the vertices, and the corners
+    ``4 * tetrahedron + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
     """
 
     def __init__(

@@ -32,22 +32,11 @@ def look_around(
     other cells. Candidates are then the sources of all vertices around (Danielsson 1980, there for pixels), and a line
     is followed through the tetrahedra.
 
-    Parameters
-    ----------
-    order : (n,) int32
-        All vertices, roughly from near to far.
-    body : Body
-        Tetrahedra.
-    sources, offset : (k,) int32, (k,) float64
-        Vertex of each source, and the value at which distance begins there.
-    turns : (k,) uint8
-        Whether ways bend at the source, so that not all tetrahedra there see the same.
-    is_concave : bool
-        Whether ways bend anywhere.
-    guess : (n,) int32
-        A source that each vertex looks for first, or -1; changed.
-    d, begin, label : (n,) float64, (n,) float64, (n,) int32
-        Distances, the value at which the front that arrives seems to begin, and the source of each; changed.
+    All vertices are in `order` (n,), roughly from near to far. Source i of k is at vertex ``sources[i]``, and distance
+    begins there at ``offset[i]``; ways bend at it if ``turns[i]``, so that not all tetrahedra there see the same.
+    `is_concave` tells whether ways bend anywhere. A vertex looks first for the source `guess` (n,), unless that is -1.
+    `begin` (n,) is the value at which the front that arrives seems to begin, and `label` (n,) the source of each; with
+    `d` and `guess` they are changed.
     """
     n = order.shape[0]
     one = _Sight(body, sources, offset, d, begin, label)

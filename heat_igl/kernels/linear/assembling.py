@@ -5,23 +5,11 @@ import numpy as np
 
 
 def laplacian(F: cython.const[cython.int][:, ::1], weight: cython.const[cython.double][::1], n: cython.Py_ssize_t):
-    """L of triangles: sums of weights off the diagonal, on it minus the sum of the row.
+    """L of triangles F (m, 3): sums of weights off the diagonal, on it minus the sum of the row.
 
-    Parameters
-    ----------
-    F : (m, 3) int32
-        Vertices of each triangle.
-    weight : (3 m,) float64
-        Of the side opposite each corner.
-    n : int
-        Number of vertices; one that no triangle uses has an empty row.
-
-    Returns
-    -------
-    indptr, indices : (n + 1,) int32, (nnz,) int32
-        The pattern, row indices ascending; zeros are stored.
-    data : (nnz,) float64
-        The entries. Those of the diagonal are summed in the order of libigl's `cotmatrix`, for the same bits.
+    The weights (3 m,) are those of the side opposite each corner. A vertex of n that no triangle uses has an empty row.
+    Returns pointers (n + 1,) and row indices, ascending, both int32, and the entries, of which zeros are stored. Those
+    of the diagonal are summed in the order of libigl's `cotmatrix`, for the same bits.
     """
     size: cython.Py_ssize_t = 6 * F.shape[0]
     by_row: cython.uint[::1] = np.empty(size, np.uint32)

@@ -77,27 +77,19 @@ class Elimination:
         self.diagonal = np.empty(np.diff(fronts.start).max(initial=1))
         self.local = np.empty(n, np.int32)
         self.child_rows = np.empty(np.diff(fronts.first_row).max(initial=1), np.int32)
-        self.stack = np.empty(max(1, _largest_stack(self.first_row, self.parent, np.zeros(k, np.int64))))
+        # How many entries of updates wait at the same time.
+        largest: cython.longlong = 1
+        waiting: cython.longlong = 0
+        waiting_for: cython.longlong[::1] = np.zeros(k, np.int64)
+        for b in range(self.parent.shape[0]):
+            left: cython.longlong = self.first_row[b + 1] - self.first_row[b]
+            largest = max(largest, waiting + left * left)
+            waiting += left * left - waiting_for[b]
+            if self.parent[b] >= 0:
+                waiting_for[self.parent[b]] += left * left
+        self.stack = np.empty(largest)
         self.waiting, self.n_children = np.empty(k, np.int64), np.zeros(k, np.int32)
         self.top = self.n_waiting = 0
-
-
-@cython.cfunc
-def _largest_stack(
-    first_row: cython.const[cython.longlong][::1],
-    parent: cython.const[cython.longlong][::1],
-    waiting_for: cython.longlong[::1],
-) -> cython.longlong:
-    """How many entries of updates wait at the same time."""
-    waiting: cython.longlong = 0
-    largest: cython.longlong = 0
-    for b in range(parent.shape[0]):
-        left: cython.longlong = first_row[b + 1] - first_row[b]
-        largest = max(largest, waiting + left * left)
-        waiting += left * left - waiting_for[b]
-        if parent[b] >= 0:
-            waiting_for[parent[b]] += left * left
-    return largest
 
 
 @cython.cfunc

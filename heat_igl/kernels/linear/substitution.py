@@ -12,11 +12,7 @@ width = WIDTH
 class TriangularSolves:
     """A factor and the index arrays of it, which `heat_igl.linear.multifrontal.Fronts` describes.
 
-    Parameters
-    ----------
-    fronts : Fronts
-    L : (entries,) float64
-        The factor.
+    `L` (entries,) is the factor that belongs to the `fronts`.
     """
 
     L: cython.double[::1]

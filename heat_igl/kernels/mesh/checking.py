@@ -88,13 +88,9 @@ def steepest_edge(
                         continue
                     if max(d[a], d[b]) == INFINITY and not min(d[a], d[b]) + sqrt(squared) < cutoff - slack:
                         continue
-                    far = F[f, b] if d[a] < d[b] else F[f, a]
-                    near = F[f, a] if d[a] < d[b] else F[f, b]
-                    break
-                if far >= 0:
-                    break
-            if far >= 0:
-                break
+                    if far < 0:
+                        far = F[f, b] if d[a] < d[b] else F[f, a]
+                        near = F[f, a] if d[a] < d[b] else F[f, b]
     return far, near
 
 

@@ -18,14 +18,7 @@ class VisitOrder:
     put again when it comes. A vertex may wait several times, and those of a band may come in any order, so that they
     need no heap: it is that in which they were put.
 
-    Parameters
-    ----------
-    spokes : Spokes
-        The triangulation.
-    d : (n,) float64
-        Distances, which are changed outside; the order begins with those that are finite.
-    width : float
-        Of the bands.
+    The distances d (n,) are changed outside; the order begins with those that are finite.
     """
 
     def __init__(self, spokes, d, width):

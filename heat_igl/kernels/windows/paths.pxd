@@ -1,18 +1,6 @@
 from heat_igl.kernels.mesh.segments cimport SegmentList
 from heat_igl.kernels.mesh.straight cimport Exit, Heading
 
-cdef class InnerSources:
-    cdef int n, n_points
-    cdef const int[::1] point_face
-    cdef const double[:, ::1] point
-    cdef const double[::1] point_offset
-    cdef const int[::1] segment_face
-    cdef const double[:, :, ::1] segment
-    cdef const double[::1] segment_offset
-
-    cdef int face(self, int root) noexcept nogil
-    cdef double nearest(self, const double* side, int root, double* here, double* found) noexcept nogil
-
 cdef struct LineEnd:
     # Where a straight part of a path ends: barycentric coordinates in a face, and what the search found there.
     int face
@@ -42,13 +30,22 @@ cdef class PathTracer:
     cdef const int[::1] vertex, twin, ring, root, entered
     cdef const unsigned char[::1] aligned
     cdef const double[::1] length, double_area, distance, crossing
-    cdef InnerSources sources
+    # Sources inside faces.
+    cdef int n, n_points
+    cdef const int[::1] point_face
+    cdef const double[:, ::1] point
+    cdef const double[::1] point_offset
+    cdef const int[::1] segment_face
+    cdef const double[:, :, ::1] segment
+    cdef const double[::1] segment_offset
     cdef SegmentList segments
     cdef long long n_steps
     # Lines to be tried, the next one last.
     cdef Line[MOST_LINES] line
     cdef int n_lines
 
+    cdef int source_face(self, int root) noexcept nogil
+    cdef double nearest_source(self, const double* side, int root, double* here, double* found) noexcept nogil
     cdef int along_bends(self, int v) except -4 nogil
     cdef int from_vertex(self, int v) except -4 nogil
     cdef int straight(self, const LineEnd* begin) except -4 nogil

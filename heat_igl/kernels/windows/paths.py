@@ -22,46 +22,6 @@ _ASTRAY = cython.declare(cython.double, 1e-6)
 _MOST_STEPS = cython.declare(cython.int, 4000000)
 
 
-@cython.final
-@cython.cclass
-class InnerSources:
-    """Source points and, after them, source segments of a search by windows.
-
-    `n` is the number of vertices, and `starts` are the sources, see `heat_igl.windows.exact.Starts`.
-    """
-
-    def __init__(self, n, starts):
-        points, segments = starts.points, starts.segments
-        self.n, self.n_points = n, len(points.faces)
-        self.point_face, self.point, self.point_offset = points.faces, points.barycentric, starts.point_offset
-        self.segment_face, self.segment = segments.faces, segments.barycentric
-        self.segment_offset = starts.segment_offset
-
-    def face(self, root: cython.int) -> cython.int:
-        """The face that holds a source; -1 if the root is a vertex."""
-        i: cython.int = root - self.n
-        if i < 0:
-            return -1
-        return self.point_face[i] if i < self.n_points else self.segment_face[i - self.n_points]
-
-    def nearest(
-        self,
-        side: cython.pointer[cython.const[cython.double]],
-        root: cython.int,
-        here: cython.p_double,
-        found: cython.p_double,
-    ) -> cython.double:
-        """Find the point of a source that is nearest to a point of its face with these sides; the source's offset."""
-        i: cython.int = root - self.n
-        if i < self.n_points:
-            for k in range(3):
-                found[k] = self.point[i, k]
-            return self.point_offset[i]
-        i -= self.n_points
-        nearest_on(side, cython.address(self.segment[i, 0, 0]), here, found)
-        return self.segment_offset[i]
-
-
 def trace_back(
     tables,
     found,
@@ -73,25 +33,12 @@ def trace_back(
 ):
     """Paths from vertices and points to the sources of a search.
 
-    Parameters
-    ----------
-    tables : Tables
-        As for `windows.Front`, of triangles that were not flipped: no face has a vertex twice.
-    found : Found
-        What `windows.search` found for the vertices.
-    sources : Starts
-        Its sources.
-    targets : Targets
-        Points whose distance was asked for.
-    vertex, target : (k,)
-        Where the paths end: a vertex, or if that is -1, one of the places of `targets`.
-    end : (k,)
-        Takes where the segments of each path end; nothing is added for a path that was lost.
+    The search is that on `tables` of triangles that were not flipped, so that no face has a vertex twice, as for
+    `windows.Front`: what it `found`, its `sources` and its `targets`. Path i ends at ``vertex[i]``, or if that is -1,
+    at place ``target[i]`` of `targets`.
 
-    Returns
-    -------
-    face, place : (r,) int64, (r, 2, 3) float64
-        The segments, path after path: face, and barycentric coordinates of both ends.
+    Returns the segments, path after path: the faces (r,), and the barycentric coordinates (r, 2, 3) of both ends. `end`
+    (k,) takes where the segments of each path end; nothing is added for a path that was lost.
     """
     tracer: PathTracer = PathTracer(tables, found, sources)
     segments: SegmentList = tracer.segments
@@ -137,7 +84,36 @@ class PathTracer:
         self.double_area = tables.double_area
         self.distance, self.root = found.distance, found.root
         self.entered, self.crossing = found.entered, found.crossing
-        self.sources, self.segments = InnerSources(tables.n, sources), SegmentList()
+        self.segments = SegmentList()
+        points, segments = sources.points, sources.segments
+        self.n, self.n_points = tables.n, len(points.faces)
+        self.point_face, self.point, self.point_offset = points.faces, points.barycentric, sources.point_offset
+        self.segment_face, self.segment = segments.faces, segments.barycentric
+        self.segment_offset = sources.segment_offset
+
+    def source_face(self, root: cython.int) -> cython.int:
+        """The face that holds a source; -1 if the root is a vertex."""
+        i: cython.int = root - self.n
+        if i < 0:
+            return -1
+        return self.point_face[i] if i < self.n_points else self.segment_face[i - self.n_points]
+
+    def nearest_source(
+        self,
+        side: cython.pointer[cython.const[cython.double]],
+        root: cython.int,
+        here: cython.p_double,
+        found: cython.p_double,
+    ) -> cython.double:
+        """Find the point of a source that is nearest to a point of its face with these sides; the source's offset."""
+        i: cython.int = root - self.n
+        if i < self.n_points:
+            for k in range(3):
+                found[k] = self.point[i, k]
+            return self.point_offset[i]
+        i -= self.n_points
+        nearest_on(side, cython.address(self.segment[i, 0, 0]), here, found)
+        return self.segment_offset[i]
 
     def along_bends(self, v: cython.int) -> cython.int:
         """From vertex v to a source; AT_SOURCE or LOST."""
@@ -159,11 +135,11 @@ class PathTracer:
         begin.distance, begin.root, begin.entered, begin.crossing = self.distance[v], self.root[v], h, self.crossing[v]
         if h < 0:
             # A source inside a face with this vertex, of which it may be two corners.
-            begin.face = self.sources.face(begin.root)
+            begin.face = self.source_face(begin.root)
             sides = cython.address(self.length[3 * begin.face])
             for c in range(3):
                 at_corner(c, corner)
-                self.sources.nearest(sides, begin.root, corner, there)
+                self.nearest_source(sides, begin.root, corner, there)
                 if self.vertex[3 * begin.face + c] == v and apart(sides, corner, there) < least:
                     least = apart(sides, corner, there)
                     h = 3 * begin.face + c
@@ -287,9 +263,9 @@ class PathTracer:
         """Whether the source inside a face that the path comes from lies ahead in face f."""
         there: cython.double[3]
         side: cython.pointer[cython.const[cython.double]] = cython.address(self.length[3 * f])
-        if self.sources.face(begin.root) != f:
+        if self.source_face(begin.root) != f:
             return False
-        walked += self.sources.nearest(side, begin.root, here, there)
+        walked += self.nearest_source(side, begin.root, here, there)
         return fabs(walked + apart(side, here, there) - begin.distance) <= _AT_ROOT * begin.distance
 
     def add(self, f: cython.int, here: cython.p_double, h: cython.int, x: cython.double) -> cython.int:
@@ -302,9 +278,9 @@ class PathTracer:
     def add_to_source(self, f: cython.int, here: cython.p_double, root: cython.int) -> cython.int:
         """A segment to a source inside face f."""
         there: cython.double[3]
-        if self.sources.face(root) != f:
+        if self.source_face(root) != f:
             return LOST
-        self.sources.nearest(cython.address(self.length[3 * f]), root, here, there)
+        self.nearest_source(cython.address(self.length[3 * f]), root, here, there)
         self.segments.append(f, here, there)
         return AT_SOURCE
 
@@ -362,17 +338,10 @@ def pull_back(
     A path consists of straight lines from a vertex to the next one that it passes, or to a source point. What is behind
     the end of its last line is added by visiting the vertices in the order of distance.
 
-    Parameters
-    ----------
-    tables, found, starts
-        As for `trace_back`; e source points.
-    order : (n,)
-        Vertices by ascending distance.
-    weight : (n + e,)
-        Of each vertex; it is handed on along the paths, in descending order of distance, and behind those of the
-        vertices it becomes the sum of the weights of all paths to each source point.
-    by_side, by_place : (3 m,), (e, 3)
-        Take the derivatives.
+    `tables`, `found` and `starts` are those of `trace_back`, with e source points, and `order` (n,) has the vertices by
+    ascending distance. The `weight` (n + e,) of each vertex is handed on along the paths, in descending order of
+    distance, and behind those of the vertices it becomes the sum of the weights of all paths to each source point.
+    `by_side` (3 m,) and `by_place` (e, 3) take the derivatives.
     """
     tracer: PathTracer = PathTracer(tables, found, starts)
     n: cython.int = order.shape[0]

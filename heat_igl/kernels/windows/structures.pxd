@@ -72,9 +72,7 @@ cdef struct Search:
     int* ring
     double* double_area
     double* bulge
-    int* corner_of_vertex
-    int* next_corner
-    int* n_corners
+    int *corner_of_vertex, *next_corner, *n_corners
     unsigned char* kind
     bint is_delaunay
     int n, n_half_edges
@@ -110,14 +108,10 @@ cdef struct Search:
     int aim
     double* position
     double within
-    int* target_face
-    int* first_target
-    int* next_target
+    int *target_face, *first_target, *next_target
     double* target
-    double* target_distance
-    int* target_root
-    int* target_entered
-    double* target_crossing
+    double *target_distance, *target_crossing
+    int *target_root, *target_entered
     # The front.
     int* slot
     List* lists

@@ -56,22 +56,13 @@ _TRIES = cython.declare(cython.int, 2000)
 class Front:
     """A surface, and the arrays that searches on it write, for `search` or `search_each`.
 
-    Parameters
-    ----------
-    tables : Tables
-        m triangles on n vertices, see `heat_igl.windows.tables.Tables`. The kinds of vertices are filled further,
-        the same by every search.
-    found : Found
-        Takes distances, and where the shortest paths come from, see `heat_igl.windows.exact.Found`: nothing
-        found yet at n vertices, with labels for as many source points and segments as there will be.
-    tolerance : float
-        A window is cut where another path is shorter by more than this fraction of the distance.
-    leaving : Leaving, optional
-        Takes in which direction the straight last parts of the paths leave their roots, see `front.relax`:
-        on surfaces whose faces are oriented alike.
-    position : (3 n,), optional
-        Positions of the vertices, in the unit of the lengths. With one goal for a source, `search_each` uses them to
-        leave out vertices that are too far from the goal along straight lines.
+    `tables` are m triangles on n vertices; their kinds of vertices are filled further, the same by every search.
+    `found` takes distances, and where the shortest paths come from: nothing found yet at n vertices, with labels for as
+    many source points and segments as there will be. A window is cut where another path is shorter by more than the
+    fraction `tolerance` of the distance. On surfaces whose faces are oriented alike, `leaving` takes in which direction
+    the straight last parts of the paths leave their roots, see `front.relax`. With positions (3 n,) of the vertices, in
+    the unit of the lengths, `search_each` leaves out vertices that are too far along straight lines from the one goal
+    of a source.
     """
 
     state: Search
@@ -140,22 +131,11 @@ def search(
 ) -> bool:
     """Exact distances from vertices, points and segments; false if memory runs out.
 
-    Parameters
-    ----------
-    front : Front
-        Used for one search only; its labels have room for the source points and segments. Of a pair (see
-        `pair`), one gets all sources and the other none.
-    starts : Starts
-        The sources, see `heat_igl.windows.exact.Starts`. A source on a side is listed once for every face
-        there, and the ends of segments must be among the points.
-    goal : (g,)
-        With `stops_early`, the search ends when the distances of these vertices and of all targets are known.
-    targets : Targets
-        Points whose distance is asked for, see `heat_igl.windows.exact.Targets`.
-    cutoff : float
-        Distances up to here are exact, larger ones may be too large.
-    statistics : (3,)
-        Takes the numbers of vertices that were reached, of windows, and of lists that crossed a face.
+    The front is used for one search only; of a pair (see `pair`), one gets all sources and the other none. A source of
+    `starts` on a side is listed once for every face there, and the ends of segments must be among the points. If it
+    `stops_early`, the search ends when the distances of the vertices `goal` and of all points `targets` are known.
+    Distances up to the cutoff are exact, larger ones may be too large. `statistics` (3,) takes the numbers of vertices
+    that were reached, of windows, and of lists that crossed a face.
     """
     s: cython.pointer(Search) = cython.address(front.state)
     source: cython.int[::1] = starts.vertices
@@ -278,28 +258,15 @@ def search_each(
 
     Searches end early, and clear the entries that they changed, so the cost does not depend on the size of the mesh.
 
-    Parameters
-    ----------
-    front : Front
-        In its initial state, to which it returns.
-    source : (k,)
-        Vertices that distance starts from, each alone.
-    goal, first_goal : (g,), (k + 1,)
-        If not empty: the distances of ``goal[first_goal[i]:first_goal[i + 1]]`` are asked for from source i.
-    cutoff : float
-        Without goals: all vertices up to this distance are asked for.
-    n_nearest : int
-        At most this many of them, the nearest; 0 for all.
-    name : (n,)
-        The number by which `found` refers to each vertex.
-    found, value : (r,)
-        Take vertices and their distances, source after source. The search stops at the first source whose results do
-        not fit.
-    end : (k,)
-        Takes the end of the results of each source. With goals each result is one value, and `found` is not used.
-    way, line : (r, 3)
-        If not empty, on a front that finds in which direction paths leave: take how the path to each vertex within the
-        cutoff runs, see `_write_within`, by the numbers of the tables.
+    The front is in its initial state, to which it returns, and distance starts at each vertex of `source` (k,) alone.
+    Distances of ``goal[first_goal[i] : first_goal[i + 1]]`` are asked for from source i; without goals all vertices up
+    to the cutoff are, or if `n_nearest` is not 0, at most this many of them, the nearest.
+
+    `found` and `value` (r,) take vertices, by their `name` (n,), and distances, source after source, and `end` (k,)
+    where those of each source end; with goals each is one value, and `found` is not used. The search stops at the first
+    source whose results do not fit. If `way` and `line` (r, 3) are not empty, on a front that finds in which direction
+    paths leave, they take how the path to each vertex within the cutoff runs, see `_write_within`, by the numbers of
+    the tables.
     """
     s: cython.pointer(Search) = cython.address(front.state)
     n_done: cython.int = 0
@@ -338,10 +305,10 @@ def search_each(
                     if s.n_touched >= n_nearest:
                         _narrow(s)
                     at += _write_nearest(s, names, to, distance)
-                elif way.shape[0] > 0:
-                    at += _write_within(s, names, to, distance, cython.address(way[at, 0]), cython.address(line[at, 0]))
                 else:
-                    at += _write_within(s, names, to, distance, cython.NULL, cython.NULL)
+                    ways: cython.p_int = cython.address(way[at, 0]) if way.shape[0] > 0 else cython.NULL
+                    lines: cython.p_double = cython.address(line[at, 0]) if way.shape[0] > 0 else cython.NULL
+                    at += _write_within(s, names, to, distance, ways, lines)
             end[i] = at
             n_done += 1
             _forget(s)
@@ -361,18 +328,10 @@ def pair(
     """Prepare two fronts to share a search: `search` is called on both, on one with all sources, on the other with
     none.
 
-    Parameters
-    ----------
-    first, second : Front
-        The two fronts. Each has result arrays of its own; they share `kind` only. The distance of a vertex is the
-        smaller of the two that they find.
-    upper, other_upper : (n,)
-        Upper bounds on distances, see `bound`; infinity if there are none.
-    round_length : float
-        How far the search goes before the threads exchange distances.
-    plenty : int
-        With about this many windows on the front there is work for two threads. With less than a third, one goes on
-        alone.
+    Each has result arrays of its own; they share `kind` only. The distance of a vertex is the smaller of the two that
+    they find, and below `upper` (n,) each, see `bound`; infinity if there is no bound. The threads exchange distances
+    after every `round_length`. With about `plenty` windows on the front there is work for two threads. With less than a
+    third, one goes on alone.
     """
     bound(first, upper)
     bound(second, other_upper)
