@@ -676,24 +676,30 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
 
 
 @cython.cfunc
-@cython.nogil
-def _place(
-    apex: cython.pointer(Apex), to_left: cython.bint, at: cython.double, x: cython.p_double, y: cython.p_double
-) -> cython.void:
-    """A point of the side to the left or right of the apex, in the frame of the half-edge."""
-    if to_left:
-        x[0], y[0] = at * apex.cos_left, at * apex.sin_left
-    else:
-        at = apex.right_length - at
-        x[0], y[0] = apex.length - at * apex.cos_right, at * apex.sin_right
-
-
-@cython.cfunc
 @cython.inline
 @cython.nogil
 def _longest(apex: cython.pointer(Apex)) -> cython.double:
     """The longest side of the face, which places on its sides are rounded to."""
     return max(apex.length, apex.left_length, apex.right_length)
+
+
+@cython.cfunc
+@cython.nogil
+def _leads(
+    w: cython.pointer(Window),
+    at: cython.double,
+    apex: cython.pointer(Apex),
+    out: cython.pointer(Window),
+    place: cython.double,
+    to_left: cython.bint,
+) -> cython.bint:
+    """Whether w leads through a point of the half-edge to a place of `out`, on the left or right, by no longer path."""
+    x: cython.double = place * apex.cos_left
+    y: cython.double = place * apex.sin_left
+    if not to_left:
+        x = apex.length - (apex.right_length - place) * apex.cos_right
+        y = (apex.right_length - place) * apex.sin_right
+    return is_within(bent(w, at, x, y), out.offset + reach(out, place), _longest(apex))
 
 
 @cython.cfunc
@@ -705,52 +711,28 @@ def _continues(
 
     So it is reached by straight lines through w, all of them inside the faces, and covers what w leads to.
     """
-    x: cython.double
-    y: cython.double
-    place: cython.double
-    at: cython.double
-    i: cython.int
+    start: cython.double = w.start
+    stop: cython.double = w.stop
     if not 0.0 <= out.start < out.stop <= (apex.left_length if to_left else apex.right_length):
         return False
-    for i in range(2):
-        place = out.stop if i else out.start
-        at = w.stop if i else w.start
-        _place(apex, to_left, place, cython.address(x), cython.address(y))
-        if w.side == AROUND_APEX and i == to_left:
-            at = min(max(backward(w, apex.x, apex.y), w.start), w.stop)
-        # Lengths agree, not places: a line along the side meets it anywhere.
-        if not is_within(bent(w, at, x, y), out.offset + reach(out, place), _longest(apex)):
-            return False
-    return True
+    if w.side == AROUND_APEX:
+        at: cython.double = min(max(backward(w, apex.x, apex.y), w.start), w.stop)
+        start, stop = (start, at) if to_left else (at, stop)
+    # Lengths agree, not places: a line along the side meets it anywhere.
+    return _leads(w, start, apex, out, out.start, to_left) and _leads(w, stop, apex, out, out.stop, to_left)
 
 
 @cython.cfunc
 @cython.nogil
 def _is_behind(
-    w: cython.pointer(Window),
-    apex: cython.pointer(Apex),
-    best: cython.pointer(Window),
-    to_left: cython.bint,
+    w: cython.pointer(Window), apex: cython.pointer(Apex), best: cython.pointer(Window), to_left: cython.bint
 ) -> cython.bint:
     """Whether the window that the apex is reached through leads to where w does by paths that are no longer."""
     out: Window
-    x: cython.double
-    y: cython.double
-    place: cython.double
-    i: cython.int
-    if to_left:
-        if not _to_left(w, apex, cython.address(out)):
-            return True
-    elif not _to_right(w, apex, cython.address(out)):
+    if not (_to_left(w, apex, cython.address(out)) if to_left else _to_right(w, apex, cython.address(out))):
         return True
-    for i in range(2):
-        place = out.stop if i else out.start
-        _place(apex, to_left, place, cython.address(x), cython.address(y))
-        if not is_within(
-            bent(best, apex.best_at, x, y), out.offset + reach(cython.address(out), place), _longest(apex)
-        ):
-            return False
-    return True
+    to_start: cython.bint = _leads(best, apex.best_at, apex, cython.address(out), out.start, to_left)
+    return to_start and _leads(best, apex.best_at, apex, cython.address(out), out.stop, to_left)
 
 
 @cython.cfunc
