@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.kernels.mesh import flipping, gluing, numbering
+from heat_igl.kernels.mesh import flipping, gluing
 from heat_igl.mesh import DELAUNAY_TOLERANCE, Mesh, connectivity
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -124,7 +124,7 @@ class HalfEdges(NamedTuple):
         Returns them by the new numbers, with corners in place; the new number (n,) of each of the n vertices; and the
         old number (m,) of each face.
         """
-        *edges, number, face = numbering.breadth_first(self, n, start)
+        *edges, number, face = gluing.breadth_first(self, n, start)
         return HalfEdges(*edges), number, face
 
 

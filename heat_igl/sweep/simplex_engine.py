@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.kernels.mesh import bounds
+from heat_igl.kernels.mesh import checking
 from heat_igl.mesh.connectivity import group_by_label
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -83,5 +83,5 @@ class SimplexEngine(Engine):
             distance[np.isnan(distance)] = np.inf
             np.maximum(distance, line * (1 - ROUNDING), out=distance)
         labels = label.astype(np.int64)
-        bounds.EdgePaths(*self._edges, len(distance)).shorten(distance, labels)
+        checking.EdgePaths(*self._edges, len(distance)).shorten(distance, labels)
         label[:] = labels

@@ -14,7 +14,6 @@ import numpy as np
 
 from heat_igl.errors import AccuracyWarning
 from heat_igl.intrinsic import IntrinsicTriangulation
-from heat_igl.kernels.mesh import bounds as kernels
 from heat_igl.kernels.mesh import checking
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.operators import Surface
@@ -270,7 +269,7 @@ class Bounds:
             # Most edges are there twice then, which costs less than to find out which.
             more_ends, more_length = _sides(given)
             ends, length = np.concatenate([ends, more_ends]), np.concatenate([length, more_length])
-        return kernels.EdgePaths(ends, length, unfolding.n)
+        return checking.EdgePaths(ends, length, unfolding.n)
 
     def shorten(self, distance: FloatArray, labels: IntArray | None = None, share: float = 0.0) -> None:
         """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them.
@@ -330,5 +329,5 @@ def raise_to_lines(distance: FloatArray, V: FloatArray, places: FloatArray, offs
 def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:
     """Ends (e, 2) and lengths (e,) of edges, each once."""
     F, lengths = np.ascontiguousarray(triangulation.F), np.ascontiguousarray(triangulation.l)
-    ends, length = kernels.glued_edges(F, lengths.ravel(), triangulation.twin)
+    ends, length = checking.glued_edges(F, lengths.ravel(), triangulation.twin)
     return ends, length

@@ -19,7 +19,7 @@ from heat_igl.intrinsic import (
 )
 from heat_igl.intrinsic.half_edges import mean_exponent
 from heat_igl.intrinsic.triangulation import next_half_edge
-from heat_igl.kernels.mesh import numbering
+from heat_igl.kernels.mesh import gluing
 from heat_igl.kernels.windows.surface import shapes
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourcePoints, SourceSegments
@@ -232,7 +232,7 @@ def from_mesh(mesh: Mesh, start: int) -> Tables:
         return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
     edges.flip(mesh.F, MARGIN)
     m, n = mesh.n_faces, mesh.n_vertices
-    if m <= _FEW_FACES and numbering.n_near(edges.twin, _NEAR) > 3 * m // 2:
+    if m <= _FEW_FACES and gluing.n_near(edges.twin, _NEAR) > 3 * m // 2:
         return Tables(edges, np.arange(n, dtype=np.int32), np.arange(m, dtype=np.int32), exponent)
     edges, number, face = edges.numbered(n, int(np.argmax(edges.vertex == start)) // 3)
     return Tables(edges, number, face, exponent)
