@@ -130,13 +130,13 @@ class MetricSimplices:
         mean = np.ascontiguousarray(lengths**2)
         return mean[:, None], mean, lengths, np.ones(len(mean))
 
-    def metric(self, chosen: IntArray) -> FloatArray:
-        """The tensors (k, q, 3, 3) of chosen simplices."""
+    def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:
+        """The tensors (..., 3, 3) of chosen simplices (...) at corners (...)."""
         if self.tensors is not None:
-            return self.tensors[chosen]
+            return np.asarray(self.tensors[chosen, 0])
         if self.velocity is None:
             raise ValueError("these simplices have lengths, and no tensors")
-        W = _symmetric(self.velocity[chosen])
+        W = _symmetric(self.velocity[chosen, corner])
         return np.asarray(np.linalg.inv(W @ W))
 
     @property

@@ -22,12 +22,10 @@ from heat_igl.typing import AnyArray, FloatArray
 # Simplices of which it is asked how far the metric turns.
 _SAMPLE = 1000
 _ROUNDING = 1e-12
-# How far distances settle before they are differentiated, so that the facets are those of the fixed point.
-_SETTLED = 1e-9
 
 
 class HopfLaxEngine(SimplexEngine):
-    """Distance by the Hopf-Lax formula: on each simplex until nothing changes, then of second order on facets.
+    """Distance by the Hopf-Lax formula on each simplex, of second order, until nothing changes.
 
     Parameters
     ----------
@@ -63,8 +61,7 @@ class HopfLaxEngine(SimplexEngine):
         chosen = np.arange(0, len(corners), len(corners) // _SAMPLE + 1)
         one = np.repeat(chosen, size)
         other, corner = np.divmod(self._incident[self._first[corners[chosen]]].ravel(), size)
-        first, there = simplices.metric(one)[:, 0], simplices.metric(other)
-        two = there[np.arange(len(there)), corner % there.shape[1]]
+        first, two = simplices.metric(one, 0), simplices.metric(other, corner)
         if size == 3:
             x = plane_axes(Mesh(place, corners))
             normal = np.cross(x[:, 0], x[:, 1])
@@ -81,18 +78,17 @@ class HopfLaxEngine(SimplexEngine):
         """Lower distance to that of second order."""
         self._found(offset, distance, label)
 
-    def _found(
-        self, offset: FloatArray, distance: FloatArray, label: AnyArray, *settled: float
-    ) -> tuple[AnyArray, ...]:
+    def _found(self, offset: FloatArray, distance: FloatArray, label: AnyArray) -> tuple[AnyArray, ...]:
+        self._along_edges(distance, label)
         kernel: Any = HopfLax
         scheme = kernel(self._corners, self._first, self._incident, *self._in_metric)
-        scheme.first_order(distance, label, offset)
-        found: tuple[AnyArray, ...] = scheme.second_order(*settled)
+        found: tuple[AnyArray, ...] = scheme.settle(distance, label, offset)
         return found
 
     def derivative(self, sources: SourceSet) -> FixedPointDerivative:
         """The distance from source vertices with its derivative."""
         distance, label = self._begun(sources)
-        found = self._found(sources.vertex_offset, distance, label, _SETTLED)
-        answer = self.distance(sources)
+        found = self._found(sources.vertex_offset, distance, label)
+        answer = distance.copy()
+        self._keep_bounds(sources.vertices.astype(np.int32), sources.vertex_offset, answer, label.copy())
         return FixedPointDerivative(self._simplices, sources, answer, distance, label, *found)

@@ -440,11 +440,12 @@ class FixedPointDerivative(SimplexDerivative):
 
     def _inputs(self) -> _Inputs:
         simplices, facet, distance = self._simplices, self._vertices[:, 1:], self._state[:, 0]
-        place, tensors = simplices.place, simplices.metric(self._simplex)
+        place = simplices.place
         if place is None:
             raise ValueError("these simplices have no positions")
-        if tensors.shape[1] > 1:
-            tensors = np.take_along_axis(tensors, self._corner[:, :, None, None], axis=1)
+        # One tensor for all corners is one input.
+        corner = self._corner if simplices.velocity is not None else self._corner[:, :1]
+        tensors = simplices.metric(self._simplex[:, None], corner)
         start = self._sources.vertex_offset[self._first]
         return _Inputs(distance[facet], self._state[facet, 1:], place[self._vertices], tensors, start)
 

@@ -66,6 +66,10 @@ class SimplexEngine(Engine):
         pairs, lengths = self._simplices.edges
         return pairs.astype(np.int32), np.ascontiguousarray(lengths)
 
+    @cached_property
+    def _paths(self) -> checking.EdgePaths:
+        return checking.EdgePaths(*self._edges, self._simplices.n)
+
     def _keep_bounds(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
         """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""
         place, least = self._simplices.place, self._simplices.least
@@ -82,6 +86,10 @@ class SimplexEngine(Engine):
             # In place of a value that is no number, a path along edges is found.
             distance[np.isnan(distance)] = np.inf
             np.maximum(distance, line * (1 - ROUNDING), out=distance)
+        self._along_edges(distance, label)
+
+    def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
+        """Lower distance to paths along edges."""
         labels = label.astype(np.int64)
-        checking.EdgePaths(*self._edges, len(distance)).shorten(distance, labels)
+        self._paths.shorten(distance, labels)
         label[:] = labels

@@ -14,9 +14,7 @@ in the plane of their triangle; the distance of v is that of the straight line t
 *Hopf-Lax formula* (`heat_igl.sweep.hopf_lax`). The distance of a corner v of a simplex is the least of
 T(x) + |v - x| over the facet opposite, with T the distance on the facet and |v - x| in the metric of the simplex.
 
-- `hopf_lax`, first order: T is linear, and the least value has a closed form (`linear`). The nearest vertex comes next,
-  and again if its distance falls much again.
-- `hopf_lax`, second order: the square of T is quadratic, with second differences from the slopes of distance at the
-  corners; vertices are visited in rounds, each after those it depends on, until no distance changes. `facets` finds
-  the least value over a facet, by Newton's method from the place that first order gives.
+Distances begin with those along edges. `hopf_lax` visits vertices in rounds, each after those it depends on, until no
+distance changes. Where T is linear on the facet, the least value has a closed form (`linear`). From there, `facets`
+finds it for a quadratic square of T, with second differences from the slopes of distance at the corners.
 """

@@ -1,16 +1,13 @@
-from heat_igl.kernels.priority_queue cimport PriorityQueue
 from heat_igl.kernels.sweep.facets cimport Facet
 
 cdef extern from *:
     """
-    // In the first order, a fall of a distance by less than this share of it is not handed on.
-    #define GAIN 1e-2
-    // By which share of a distance the changes along a path that the second order does not hand on may add up, about.
+    // By which share of a distance the changes along a path that are not handed on may add up, about.
     #define SETTLED 1e-3
     // Difference of values, as a share of them, that is rounding.
     #define EQUAL 1e-12
     """
-    double GAIN, SETTLED, EQUAL
+    double SETTLED, EQUAL
 
 cdef enum:
     MOST_ROUNDS = 100
@@ -25,7 +22,6 @@ cdef class HopfLax(Facet):
     cdef const double[:, ::1] mean
     cdef const double[:, :, ::1] gradient
     cdef const double[:, ::1] V
-    cdef PriorityQueue queue
     cdef double[::1] pending
     cdef int[::1] n_visits
     # Of the topological order: depth-first search has not seen a vertex, has it open, or is done with it.
@@ -33,12 +29,10 @@ cdef class HopfLax(Facet):
     cdef int[::1] roots
     cdef int[::1] stack
     cdef unsigned char[::1] state
-    cdef long long n_carried
-    cdef double unit, low
+    cdef double low
     cdef const unsigned char[::1] fixed
     cdef double[::1] d
     cdef int[::1] label
-    cdef double[::1] handed
     cdef const double[::1] offset
     # The derivative of distance by the position of each vertex, where it is known.
     cdef double[:, ::1] slope
@@ -54,15 +48,12 @@ cdef class HopfLax(Facet):
     cdef int side[3]
     cdef double level[3]
 
-    cdef void wait(self, int v) noexcept nogil
-    cdef int nearest_waiting(self) noexcept nogil
-    cdef void spread(self) noexcept nogil
     cdef int nearest_corner(self) noexcept nogil
     cdef double face(self, int s, int c) noexcept nogil
-    cdef double linear(self, int s, int c, double room, int from_v) noexcept nogil
+    cdef double linear(self, int s, int c, double room) noexcept nogil
     cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
     cdef double across(self, int s, int c, double room) noexcept nogil
-    cdef void sharpen(self, double least) noexcept nogil
+    cdef void sharpen(self) noexcept nogil
     cdef void arrange(self) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil

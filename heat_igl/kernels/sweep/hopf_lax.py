@@ -9,14 +9,15 @@ lead to one fixed point, which converges to the distance in a continuous metric 
 *Second order*: the square of T is quadratic, as the squared distance from a point in one metric is, at the source too.
 Its second differences along the edges of the facet are found from the slopes of distance at the corners, and are used
 as far as these agree with the distances, and with the metric of the simplex.
+
+Distances begin with those along edges, and are updated in rounds, each vertex after those it has its distance from.
 """
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
-from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
+from cython.cimports.heat_igl.kernels.signals import is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, invert, mean_velocity, multiply
-from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, GAIN, MOST_ROUNDS, SETTLED
+from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, MOST_ROUNDS, SETTLED
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 from heat_igl.kernels.signals import raise_caught
@@ -215,36 +216,16 @@ class HopfLax(Facet):
         self.velocity, self.mean, self.widest, self.slack = velocity, mean, widest, slack
         self.growths, self.gradient, self.V = growth, gradient, V
         self.p, self.q = corners.shape[1] - 1, squares.shape[1]
-        self.unit = sqrt(np.mean(widest))
 
-    def first_order(self, d, label, offset):
-        """Lower distances `d` (n,) to those from the vertices where they are finite, in place.
-
-        They are never below the straight line times the smallest length of a unit vector in any metric.
+    def settle(self, d, label, offset):
+        """Change distances along edges to those of second order, in place.
 
         Parameters
         ----------
         d, label : (n,) float64, (n,) int32
-            Distances, ``inf`` but at the sources, and the source of each, -1 for none; changed.
+            Distances along edges, and the source of each, -1 for none; changed.
         offset : (k,) float64
             Of each source.
-        """
-        n = len(d)
-        self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
-        self.fixed = np.isfinite(d).view(np.uint8)
-        self.queue = PriorityQueue(n)
-        self.handed, self.facet = np.full(n, np.inf), np.full(n, -1, np.int32)
-        with cython.nogil:
-            self.spread()
-        raise_caught()
-
-    def second_order(self, settled: cython.double = SETTLED):
-        """After `first_order`: change its distances to those of second order.
-
-        Parameters
-        ----------
-        settled : float
-            Share of a distance by which the changes along a path that are not handed on may add up, about.
 
         Returns
         -------
@@ -255,60 +236,19 @@ class HopfLax(Facet):
         slope, is_sloped : (n, 3) float64, (n,) uint8
             The derivative of distance by the position of each vertex, and whether it is known.
         """
-        n = self.d.shape[0]
+        n = len(d)
+        self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
+        # Nearer than a source to itself is another one.
+        self.fixed = (d == np.append(offset, np.inf)[label]).view(np.uint8)
         self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
-        np.asarray(self.facet)[np.asarray(self.fixed).view(bool)] = -1
-        self.place = np.ones((n, self.p))
-        self.order = np.argsort(self.d).astype(np.int32)
+        self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
+        self.order = np.argsort(d, kind="stable").astype(np.int32)
         self.roots, self.state, self.stack = np.zeros(n, np.int32), np.zeros(n, np.uint8), np.zeros(4 * n, np.int32)
-        self.pending, self.n_visits = np.where(np.isfinite(self.d), np.inf, 0.0), np.zeros(n, np.int32)
+        self.pending, self.n_visits = np.where(np.isfinite(d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
-            self.sharpen(settled)
+            self.sharpen()
         raise_caught()
         return tuple(map(np.asarray, (self.facet, self.place, self.slope, self.is_sloped)))
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def wait(self, v: cython.int) -> cython.void:
-        """Put v into the queue, by its distance."""
-        self.queue.set_key(v, 1.0 / (1.0 + (self.d[v] - self.low) / self.unit))
-
-    def nearest_waiting(self) -> cython.int:
-        """Take the nearest vertex out of the queue; -1 if it is empty, or after an interrupt."""
-        self.n_carried += 1
-        if self.queue.count == 0 or (self.n_carried % ASK == 0 and is_interrupted()):
-            return -1
-        v: cython.int = cython.cast(cython.int, self.queue.first())
-        self.queue.set_key(v, 0.0)
-        return v
-
-    def spread(self) -> cython.void:
-        """First order: Dijkstra's algorithm, in which a vertex comes again if its distance falls much again."""
-        v: cython.int
-        size: cython.int = self.p + 1
-        for v in range(self.d.shape[0]):
-            if self.d[v] < INFINITY:
-                self.wait(v)
-        v = self.nearest_waiting()
-        while v >= 0:
-            self.handed[v] = self.d[v]
-            for k in range(self.first[v], self.first[v + 1]):
-                s: cython.int = self.incident[k] // size
-                for c in range(size):
-                    u: cython.int = self.corners[s, c]
-                    if u == v:
-                        continue
-                    nearest: cython.double = self.face(s, c)
-                    if not nearest < self.d[u]:
-                        continue
-                    value: cython.double = self.linear(s, c, self.d[u] - nearest, v)
-                    if value < self.d[u]:
-                        self.label[u] = self.label[self.corners[s, self.nearest_corner()]]
-                        self.d[u], self.facet[u] = value, s * size + c
-                        if value + GAIN * fabs(value) < self.handed[u]:
-                            self.wait(u)
-            v = self.nearest_waiting()
 
     @cython.cfunc
     @cython.inline
@@ -337,11 +277,10 @@ class HopfLax(Facet):
                 k += 1
         return nearest
 
-    def linear(self, s: cython.int, c: cython.int, room: cython.double, from_v: cython.int) -> cython.double:
+    def linear(self, s: cython.int, c: cython.int, room: cython.double) -> cython.double:
         """The least value at corner c of simplex s with T linear, after `face`; sets `share`.
 
-        It may be inf if it is above the nearest corner by `room` or more, or if a vertex `from_v` has no share in it,
-        unless that is negative.
+        It may be inf if it is above the nearest corner by `room` or more.
         """
         self.share[0] = self.share[1] = self.share[2] = 0.0
         if self.p == 2:
@@ -355,9 +294,7 @@ class HopfLax(Facet):
             for k in range(3):
                 i: cython.int = 1 if k == 0 else 0
                 j: cython.int = 1 if k == 2 else 2
-                if not is_within[k] and (
-                    from_v < 0 or self.corners[s, self.side[i]] == from_v or self.corners[s, self.side[j]] == from_v
-                ):
+                if not is_within[k]:
                     least = self.over_edge(s, c, i, j, least)
         return least
 
@@ -434,13 +371,13 @@ class HopfLax(Facet):
             return INFINITY
         return self.level[0] + b * fb + e * fe + far
 
-    def sharpen(self, least: cython.double) -> cython.void:
+    def sharpen(self) -> cython.void:
         """Second order, in rounds: each vertex after those it has its distance from, which may be farther away."""
         v: cython.int
         size: cython.int = self.p + 1
         turn: cython.double[3]
         # Changes add up along a path.
-        settled: cython.double = least * self.order.shape[0] ** (-1.0 / self.p)
+        settled: cython.double = SETTLED * self.order.shape[0] ** (-1.0 / self.p)
         for _round in range(MOST_ROUNDS):
             is_settled: cython.bint = True
             self.arrange()
@@ -567,7 +504,7 @@ class HopfLax(Facet):
     def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
         """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
 
-        It is at least what first order and the nearest corner say, with some margin.
+        Its lower bound is what T linear and the nearest corner say, with some margin.
         """
         nearest: cython.double = self.face(s, c)
         # Between corners at one distance from a point, the square is less by at most a third of a squared edge.
@@ -577,7 +514,7 @@ class HopfLax(Facet):
         room: cython.double = (best + sag - nearest) / self.slack[s]
         if not room > 0.0:
             return INFINITY
-        linear: cython.double = self.linear(s, c, room, -1)
+        linear: cython.double = self.linear(s, c, room)
         return self.curved(s, c, linear, best) if linear - nearest < room else INFINITY
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
