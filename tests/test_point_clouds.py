@@ -532,7 +532,7 @@ def test_faces_of_a_mesh_are_ignored(tmp_path):
         ("a.xyz", "0 0 0\n1 0 0\n1 2\n", r"line 3 \(1 2\): a point has 3 numbers, or 6 with a normal"),
         ("a.xyz", "0 0 0\n1 0 x\n", "line 2 .*'x' is not a number"),
         ("a.xyz", "0 0 0\n1 0 0\n", "a.xyz: P has 2 points"),
-        ("a.obj", "v 0 0\n", "line 1 .*three numbers must follow v"),
+        ("a.obj", "v 0 0\n", "line 1 .*a vertex needs three coordinates"),
         ("a.obj", "vn 0 0 1\n", "the file has no points"),
         ("a.npy", "no array", "not an array in the format of numpy.save"),
         ("a.ply", "ply\nformat ascii 1.0\nend_header\n", "no element 'vertex'"),
