@@ -125,16 +125,11 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
     return Plan("windows", float(tolerance), "windows are exact, which holds every tolerance, and need no factor")
 
 
-def sweep_plan(measures: SurfaceMeasures, plan: Plan, *, is_estimate: bool = False) -> Plan:
-    """The plan for a surface on which a sweep is due: windows where these cost little and a sweep is inaccurate.
-
-    Where triangles are an estimate, between points, their own error is a multiple of what a sweep adds.
-    """
+def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:
+    """The plan for a surface on which a sweep is due: windows where these cost little and a sweep is inaccurate."""
     reason = None
     if measures.n <= _FEW:
         reason = f"on {measures.n} vertices windows take as long as a sweep, and are exact"
-    elif is_estimate:
-        return plan
     elif measures.curvature > _ROUGH_FOR_SWEEP:
         reason = f"the surface is rough, with {measures.curvature:.2g} radians of curvature at each vertex"
     elif measures.flatness > _FLAT and measures.has_holes:

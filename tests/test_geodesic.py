@@ -107,8 +107,6 @@ def test_where_a_sweep_is_replaced_the_plan_says_why(measures, words):
     found = sweep_plan(measures, asked)
     assert (found.engine, found.tolerance) == ("windows", 0)
     assert words in found.reason
-    # Between points the triangles are an estimate, and their error is larger than that of a sweep.
-    assert (sweep_plan(measures, asked, is_estimate=True) == asked) is (measures.n > 1000)
 
 
 def test_solvers_carry_their_plan():

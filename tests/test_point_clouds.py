@@ -98,6 +98,15 @@ def test_nothing_depends_on_where_how_large_or_in_which_order():
 # Distance.
 
 
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+def test_rough_clouds_are_swept_and_their_meshes_are_not():
+    """Between points the triangles are an estimate themselves; of few points windows take no longer."""
+    rough = SHAPES["fractal terrain"].make()
+    assert GeodesicSolver(rough, method="sweep").plan.engine == "windows"
+    assert GeodesicSolver(PointCloud(rough.V)).plan.engine == "sweep"
+    assert GeodesicSolver(PointCloud(rough.V[:800])).plan.engine == "windows"
+
+
 @pytest.mark.parametrize(("options", "most"), [(HEAT, 0.012), ({}, 0.003), ({"method": "exact"}, 0.002)])
 def test_distance_on_a_sphere(options, most):
     P = sphere(4000)

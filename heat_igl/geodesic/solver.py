@@ -14,7 +14,7 @@ from heat_igl.heat.batches import BatchedSolver, LabelledDistance
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Operators
-from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod, Method, Plan, distance_plan, sweep_plan
+from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod, Method, Plan, SurfaceMeasures, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
 from heat_igl.sources import OffsetSources, Sources, SourceSet, named_vertices, require_resolved, source_set
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
@@ -290,7 +290,12 @@ class GeodesicSolver(BatchedSolver):
         self._triangles = triangles
         if chosen.engine == "sweep":
             sweep = _sweep_engine(triangles)
-            chosen = sweep_plan(sweep.measures, chosen, is_estimate=isinstance(self._domain, PointCloud))
+            if isinstance(self._domain, PointCloud):
+                # Whatever the triangles are, their own error is a multiple of what a sweep adds.
+                measures = SurfaceMeasures(triangles.surface.unfolding.n_used, 0.0, 0.0, has_holes=False)
+            else:
+                measures = sweep.measures
+            chosen = sweep_plan(measures, chosen)
             if chosen.engine == "sweep":
                 return chosen, sweep
         # All other engines are held to bounds where they are made.

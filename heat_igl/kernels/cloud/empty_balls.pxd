@@ -1,7 +1,6 @@
 cdef enum:
-    # Balls along so many directions at a time, which a vector holds; and sums of the three coordinates of these.
+    # Balls along so many directions at a time, which a vector holds.
     LANES = 4
-    SUMS = 12
 
 cdef extern from *:
     """

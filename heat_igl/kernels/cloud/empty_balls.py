@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.empty_balls import LANES, ROUNDS, SUMS, TINY
+from cython.cimports.heat_igl.kernels.cloud.empty_balls import LANES, ROUNDS, TINY
 from cython.cimports.libc.math import sqrt
 
 
@@ -129,7 +129,7 @@ def _average(
     """The mean direction on the side of the largest ball."""
     best: cython.Py_ssize_t = 0
     of_best: cython.Py_ssize_t = 0
-    mean: cython.float[SUMS]
+    mean: cython.double[3]
     for side in range(2):
         for a in range(share.shape[1]):
             if share[side, a] > share[of_best, best]:
@@ -140,29 +140,16 @@ def _average(
         for a in range(share.shape[1]):
             share[side, a] = share[side, a] * share[side, a] * share[side, a] * share[side, a]
     for _ in range(ROUNDS):
-        ux: cython.float = cython.cast(cython.float, normal[0])
-        uy: cython.float = cython.cast(cython.float, normal[1])
-        uz: cython.float = cython.cast(cython.float, normal[2])
-        for a in range(3 * LANES):
-            mean[a] = 0.0
-        for block in range(share.shape[1] // LANES):
-            for lane in range(LANES):
-                a = LANES * block + lane
-                x_of: cython.float = directions[0, a]
-                y_of: cython.float = directions[1, a]
-                z_of: cython.float = directions[2, a]
-                weight: cython.float = x_of * ux + y_of * uy + z_of * uz
-                weight *= share[0, a] if weight > 0.0 else share[1, a]
-                mean[lane] += weight * x_of
-                mean[LANES + lane] += weight * y_of
-                mean[2 * LANES + lane] += weight * z_of
+        mean[0] = mean[1] = mean[2] = 0.0
+        for a in range(share.shape[1]):
+            weight: cython.double = directions[0, a] * normal[0] + directions[1, a] * normal[1]
+            weight += directions[2, a] * normal[2]
+            weight *= share[0, a] if weight > 0.0 else share[1, a]
+            for x in range(3):
+                mean[x] += weight * directions[x, a]
+        size: cython.double = sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2])
         for x in range(3):
-            normal[x] = 0.0
-            for lane in range(LANES):
-                normal[x] += mean[LANES * x + lane]
-        size: cython.double = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
-        for x in range(3):
-            normal[x] /= size
+            normal[x] = mean[x] / size
 
 
 def on_one_side(

@@ -1,7 +1,3 @@
-cdef enum:
-    # Sums over neighbours are taken in so many parts, which vectors hold.
-    LANES = 4
-
 cdef extern from *:
     """
     // Least weight of a neighbour.

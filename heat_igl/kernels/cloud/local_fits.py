@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.local_fits import DIAGONAL, LANES, LEAST_WEIGHT, TINY
+from cython.cimports.heat_igl.kernels.cloud.local_fits import DIAGONAL, LEAST_WEIGHT, TINY
 from cython.cimports.libc.math import fabs, sqrt
 
 
@@ -31,7 +31,7 @@ def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[c
     radius: cython.double[::1] = radii
     variances: cython.double[::1] = np.empty(3)
     work: cython.double[:, ::1] = np.empty((6, 3))
-    local: cython.double[:, ::1] = _room_for(index.shape[1])
+    local: cython.double[:, ::1] = np.empty((index.shape[1], 4))
     with cython.nogil:
         for row in range(index.shape[0]):
             radius[row] = _principal_axes(P, index[row], local, work, axes[row], variances)
@@ -64,7 +64,7 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
     moved: cython.double[:, ::1] = positions
     deviation: cython.double[::1] = deviations
     thickness: cython.double[::1] = ratios
-    local: cython.double[:, ::1] = _room_for(k)
+    local: cython.double[:, ::1] = np.empty((k, 4))
     system: cython.double[:, ::1] = np.empty((6, 7))
     work: cython.double[:, ::1] = np.empty((6, 3))
     axes: cython.double[:, ::1] = np.empty((3, 3))
@@ -86,11 +86,6 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
             for x in range(3):
                 moved[row, x] = P[index[row, 0], x] + radius * system[0, 6] * axes[2, x]
     return positions, deviations, ratios
-
-
-def _room_for(k: cython.Py_ssize_t):
-    """Neighbours in columns. Sums are taken over LANES at a time; the last ones may be none, which weigh nothing."""
-    return np.zeros((4, (k + LANES - 1) // LANES * LANES))
 
 
 @cython.cfunc
@@ -116,27 +111,24 @@ def _around(
     P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][::1], local: cython.double[:, ::1]
 ) -> cython.double:
     """Put the neighbours, from the point and in units of the radius, and the weights into `local`; the radius."""
-    k: cython.Py_ssize_t = index.shape[0]
     farthest: cython.double = 0.0
     px: cython.double = P[index[0], 0]
     py: cython.double = P[index[0], 1]
     pz: cython.double = P[index[0], 2]
-    for j in range(k):
+    for j in range(index.shape[0]):
         dx: cython.double = P[index[j], 0] - px
         dy: cython.double = P[index[j], 1] - py
         dz: cython.double = P[index[j], 2] - pz
-        local[0, j], local[1, j], local[2, j] = dx, dy, dz
-        local[3, j] = dx * dx + dy * dy + dz * dz
-        farthest = max(farthest, local[3, j])
+        local[j, 0], local[j, 1], local[j, 2], local[j, 3] = dx, dy, dz, dx * dx + dy * dy + dz * dz
+        farthest = max(farthest, local[j, 3])
     # In units of the radius: squares of tiny lengths would underflow.
     radius: cython.double = max(sqrt(farthest), TINY)
     scale: cython.double = 1.0 / radius
     per_square: cython.double = 1.0 / max(farthest, TINY)
-    for j in range(k):
-        local[0, j], local[1, j], local[2, j] = scale * local[0, j], scale * local[1, j], scale * local[2, j]
-        local[3, j] = max(1.0 - per_square * local[3, j], LEAST_WEIGHT)
-    for j in range(k, local.shape[1]):
-        local[3, j] = 0.0
+    for j in range(index.shape[0]):
+        for x in range(3):
+            local[j, x] *= scale
+        local[j, 3] = max(1.0 - per_square * local[j, 3], LEAST_WEIGHT)
     return radius
 
 
@@ -144,108 +136,63 @@ def _around(
 @cython.nogil
 def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cython.void:
     """The covariance in rows 0 to 2 of `work`."""
-    part: cython.double[40]
-    sums: cython.double[10]
-    c: cython.Py_ssize_t
-    lane: cython.Py_ssize_t
-    for c in range(10 * LANES):
-        part[c] = 0.0
-    for block in range(local.shape[1] // LANES):
-        for lane in range(LANES):
-            j: cython.Py_ssize_t = LANES * block + lane
-            wx: cython.double = local[3, j] * local[0, j]
-            wy: cython.double = local[3, j] * local[1, j]
-            wz: cython.double = local[3, j] * local[2, j]
-            part[lane] += local[3, j]
-            part[LANES + lane] += wx
-            part[2 * LANES + lane] += wy
-            part[3 * LANES + lane] += wz
-            part[4 * LANES + lane] += wx * local[0, j]
-            part[5 * LANES + lane] += wx * local[1, j]
-            part[6 * LANES + lane] += wx * local[2, j]
-            part[7 * LANES + lane] += wy * local[1, j]
-            part[8 * LANES + lane] += wy * local[2, j]
-            part[9 * LANES + lane] += wz * local[2, j]
-    for c in range(10):
-        sums[c] = 0.0
-        for lane in range(LANES):
-            sums[c] += part[c * LANES + lane]
-    for c in range(1, 10):
-        sums[c] /= sums[0]
-    work[0, 0], work[1, 1] = sums[4] - sums[1] * sums[1], sums[7] - sums[2] * sums[2]
-    work[2, 2] = sums[9] - sums[3] * sums[3]
-    work[0, 1] = work[1, 0] = sums[5] - sums[1] * sums[2]
-    work[0, 2] = work[2, 0] = sums[6] - sums[1] * sums[3]
-    work[1, 2] = work[2, 1] = sums[8] - sums[2] * sums[3]
+    square: cython.double[9]
+    mean: cython.double[3]
+    total: cython.double = 0.0
+    a: cython.int
+    b: cython.int
+    for a in range(3):
+        mean[a] = square[3 * a] = square[3 * a + 1] = square[3 * a + 2] = 0.0
+    for j in range(local.shape[0]):
+        total += local[j, 3]
+        for a in range(3):
+            moment: cython.double = local[j, 3] * local[j, a]
+            mean[a] += moment
+            for b in range(3):
+                square[3 * a + b] += moment * local[j, b]
+    for a in range(3):
+        for b in range(3):
+            work[a, b] = square[3 * a + b] / total - mean[a] / total * (mean[b] / total)
 
 
 @cython.cfunc
 @cython.nogil
 def _turn(local: cython.double[:, ::1], axes: cython.double[:, ::1]) -> cython.void:
-    """Turn rows 0 to 2 of `local` into the axes."""
-    for j in range(local.shape[1]):
-        x: cython.double = local[0, j]
-        y: cython.double = local[1, j]
-        z: cython.double = local[2, j]
-        local[0, j] = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
-        local[1, j] = x * axes[1, 0] + y * axes[1, 1] + z * axes[1, 2]
-        local[2, j] = x * axes[2, 0] + y * axes[2, 1] + z * axes[2, 2]
+    """Turn columns 0 to 2 of `local` into the axes."""
+    turn: cython.double[9]
+    for a in range(9):
+        turn[a] = axes[a // 3, a % 3]
+    for j in range(local.shape[0]):
+        x: cython.double = local[j, 0]
+        y: cython.double = local[j, 1]
+        z: cython.double = local[j, 2]
+        for a in range(3):
+            local[j, a] = x * turn[3 * a] + y * turn[3 * a + 1] + z * turn[3 * a + 2]
 
 
 @cython.cfunc
 @cython.nogil
 def _normal_equations(local: cython.double[:, ::1], system: cython.double[:, ::1]) -> cython.void:
-    """The upper half of the matrix (6, 6) of least squares for the terms 1, x, y, xx, xy, yy of z; z in column 6."""
-    moment: cython.double[84]
-    sums: cython.double[21]
-    lane: cython.Py_ssize_t
-    c: cython.Py_ssize_t
-    for c in range(21 * LANES):
-        moment[c] = 0.0
-    for block in range(local.shape[1] // LANES):
-        j: cython.Py_ssize_t = LANES * block
-        for lane in range(LANES):
-            x: cython.double = local[0, j + lane]
-            y: cython.double = local[1, j + lane]
-            z: cython.double = local[2, j + lane]
-            w: cython.double = local[3, j + lane]
-            wx: cython.double = w * x
-            wy: cython.double = w * y
-            wxx: cython.double = wx * x
-            wxy: cython.double = wx * y
-            wyy: cython.double = wy * y
-            moment[lane] += w
-            moment[LANES + lane] += wx
-            moment[2 * LANES + lane] += wy
-            moment[3 * LANES + lane] += wxx
-            moment[4 * LANES + lane] += wxy
-            moment[5 * LANES + lane] += wyy
-            moment[6 * LANES + lane] += wxx * x
-            moment[7 * LANES + lane] += wxx * y
-            moment[8 * LANES + lane] += wyy * x
-            moment[9 * LANES + lane] += wyy * y
-            moment[10 * LANES + lane] += wxx * x * x
-            moment[11 * LANES + lane] += wxx * x * y
-            moment[12 * LANES + lane] += wxx * y * y
-            moment[13 * LANES + lane] += wyy * x * y
-            moment[14 * LANES + lane] += wyy * y * y
-            moment[15 * LANES + lane] += w * z
-            moment[16 * LANES + lane] += wx * z
-            moment[17 * LANES + lane] += wy * z
-            moment[18 * LANES + lane] += wxx * z
-            moment[19 * LANES + lane] += wxy * z
-            moment[20 * LANES + lane] += wyy * z
-    for c in range(21):
-        sums[c] = 0.0
-        for lane in range(LANES):
-            sums[c] += moment[c * LANES + lane]
-    # Row 0 has the moments of order 0 to 2, row 1 those of x, xx, xy, xxx and so on.
-    for c in range(6):
-        system[0, c], system[c, 6] = sums[c], sums[15 + c]
-    system[1, 1], system[1, 2], system[1, 3], system[1, 4], system[1, 5] = sums[3], sums[4], sums[6], sums[7], sums[8]
-    system[2, 2], system[2, 3], system[2, 4], system[2, 5] = sums[5], sums[7], sums[8], sums[9]
-    system[3, 3], system[3, 4], system[3, 5] = sums[10], sums[11], sums[12]
-    system[4, 4], system[4, 5], system[5, 5] = sums[12], sums[13], sums[14]
+    """The matrix (6, 6) of least squares for the terms 1, x, y, xx, xy, yy of z; z in column 6."""
+    term: cython.double[8]
+    moment: cython.double[48]
+    a: cython.int
+    b: cython.int
+    for a in range(48):
+        moment[a] = 0.0
+    term[0], term[7] = 1.0, 0.0
+    for j in range(local.shape[0]):
+        x: cython.double = local[j, 0]
+        y: cython.double = local[j, 1]
+        term[1], term[2], term[3], term[4], term[5], term[6] = x, y, x * x, x * y, y * y, local[j, 2]
+        for a in range(6):
+            weighted: cython.double = local[j, 3] * term[a]
+            # Eight columns, of which the last is none, fill vectors.
+            for b in range(8):
+                moment[8 * a + b] += weighted * term[b]
+    for a in range(6):
+        for b in range(7):
+            system[a, b] = moment[8 * a + b]
 
 
 @cython.cfunc
@@ -269,18 +216,14 @@ def _eliminate(system: cython.double[:, ::1]) -> cython.void:
 @cython.nogil
 def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1]) -> cython.double:
     """The weighted sum of the squared deviations from the quadric whose coefficients are column 6 of `system`."""
-    squares: cython.double[4]
-    squares[0] = squares[1] = squares[2] = squares[3] = 0.0
-    lane: cython.Py_ssize_t
-    for block in range(local.shape[1] // LANES):
-        j: cython.Py_ssize_t = LANES * block
-        for lane in range(LANES):
-            x: cython.double = local[0, j + lane]
-            y: cython.double = local[1, j + lane]
-            off: cython.double = local[2, j + lane] - system[0, 6] - system[1, 6] * x - system[2, 6] * y
-            off -= system[3, 6] * x * x + system[4, 6] * x * y + system[5, 6] * y * y
-            squares[lane] += local[3, j + lane] * off * off
-    return squares[0] + squares[1] + squares[2] + squares[3]
+    squares: cython.double = 0.0
+    for j in range(local.shape[0]):
+        x: cython.double = local[j, 0]
+        y: cython.double = local[j, 1]
+        off: cython.double = local[j, 2] - (system[0, 6] + system[1, 6] * x + system[2, 6] * y)
+        off -= x * (system[3, 6] * x + system[4, 6] * y) + system[5, 6] * y * y
+        squares += local[j, 3] * off * off
+    return squares
 
 
 @cython.cfunc
