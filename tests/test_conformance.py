@@ -172,6 +172,10 @@ def test_points_in_faces_and_curves_are_sources(name, method):
     """A point is what a vertex in its place is, one in a corner is that corner; batches hold what single sets do."""
     at, prepared = domain(name), solver(name, method)
     curve = heat_igl.edge_curve(at.made(), at.cells[7][:2])
+    tail, head, tip = at.V[at.cells[7]]
+    share = np.clip((tip - tail) @ (head - tail) / ((head - tail) ** 2).sum(), 0, 1)
+    straight = np.linalg.norm(tip - tail - share * (head - tail))
+    np.testing.assert_allclose(prepared.distance(curve)[at.cells[7]], [0, 0, straight], rtol=1e-9)
     for face in (7, len(at.cells) // 2):
         point, corners = SurfacePoints([face], [[1 / 3] * 3]), at.cells[face]
         found, expected = prepared.distance(point), subdivided(name, method).distance(at.n + face)[: at.n]

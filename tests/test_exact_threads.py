@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from conftest import perturbed
-from surfaces import bent_pages, moebius_strip, on, two_arms
+from surfaces import bent_pages, on
+from test_paths import MESHES
 
 from heat_igl import Mesh, OffsetSources, SurfacePoints, isolines, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
@@ -23,14 +24,8 @@ def pinched() -> Mesh:
 
 
 ZOO = {
-    "sphere": lambda: shapes.icosphere(3),
-    "rough sphere": lambda: perturbed(shapes.icosphere(3), 0.5, 1),
-    "torus": lambda: shapes.torus(40, 20),
-    "boundary": lambda: perturbed(shapes.grid(24), 0.6, 2),
-    "bends at a corner": lambda: two_arms(10),
-    "plane": lambda: shapes.grid(20),
+    **MESHES,
     "edges of three faces": bent_pages,
-    "cannot be oriented": lambda: moebius_strip(80, 8),
     "pinched, and components": pinched,
     "strip": lambda: shapes.strip(200, 2),
     "needles": lambda: Mesh(shapes.icosphere(3).V * [1, 30, 1], shapes.icosphere(3).F),
