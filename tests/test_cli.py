@@ -337,9 +337,10 @@ MISUSES = {
 }
 
 
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a directory in which even root cannot write")
 @pytest.mark.parametrize("arguments", [*FAILURES, *MISUSES])
 def test_failures_are_one_line_and_leave_nothing(folder, capsys, monkeypatch, arguments):
+    if "/proc" in arguments and not Path("/proc/self").exists():
+        pytest.skip("needs a directory in which even root cannot write")
     circle = (folder / "circle.obj").read_text()
     n = circle.count("v ")
     (folder / "far.obj").write_text(f"{circle}v 9 0 0\nv 9 1 0\nl {n + 1} {n + 2}\n")
