@@ -375,16 +375,11 @@ def lowest_full_rate(
         full_rate = _FULL_RATE_FITTED if fitted else _FULL_RATE
     if isinstance(t, np.ndarray):
         t = operators.expand_to_faces(t)
-    lowest = full_rate * (np.full(len(operators.weights), t**-0.5) if fitted else _front_rate(operators, t))
-    lowest[operators.boundary_faces] *= _AT_BOUNDARY if fitted else 0.0
-    return np.asarray(lowest)
-
-
-def _front_rate(operators: Operators, t: float | FloatArray) -> FloatArray:
-    """How fast a front of heat falls on each face (m,), in e-foldings per length, if the flow is not fitted."""
     size = operators.face_sizes
     # The same as arccosh(1 + size^2 / (2 t)) / size, which is 0 if size^2 is lost beside 1: faces of no size at all.
-    return np.asarray(2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
+    lowest = full_rate * (np.full(len(size), t**-0.5) if fitted else 2 * np.arcsinh(size / (2 * np.sqrt(t))) / size)
+    lowest[operators.boundary_faces] *= _AT_BOUNDARY if fitted else 0.0
+    return np.asarray(lowest)
 
 
 class NormalizedDivergence:

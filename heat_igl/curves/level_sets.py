@@ -72,7 +72,10 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
     mesh = as_simplices(mesh)
     if isinstance(levels, int | np.integer) and not isinstance(levels, bool):
         checked, _ = _checked(mesh, values, [])
-        wanted = _evenly_spaced(checked, int(levels))
+        finite, k = checked[np.isfinite(checked)], int(levels)
+        if k < 1 or not len(finite):
+            raise ValueError(f"levels must be a positive number of levels between finite values, or a list, not {k}")
+        wanted = np.linspace(finite.min(), finite.max(), k + 2)[1:-1]
     else:
         checked, wanted = _checked(mesh, values, levels)
     return [_curves(mesh, checked, level) for level in wanted]
@@ -182,14 +185,6 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
     area = np.bincount(part[one_below], weights=_areas_below(mesh, checked, wanted[0]), minlength=mesh.n_vertices)
     first = np.array([curve.faces[0] for curve in curves], np.int64)
     return np.asarray(area[part[one_below[first]]])
-
-
-def _evenly_spaced(values: FloatArray, k: int) -> FloatArray:
-    """K levels between the smallest and the largest finite value."""
-    finite = values[np.isfinite(values)]
-    if k < 1 or not len(finite):
-        raise ValueError(f"levels must be a positive number of levels between finite values, or a list, not {k}")
-    return np.linspace(finite.min(), finite.max(), k + 2)[1:-1]
 
 
 def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -126,7 +126,7 @@ class _Mean:
         """The point with the least sum."""
         if len(self._faces) == 1:
             return SurfacePoints(self._faces, self._barycentric)
-        fields = self._fields()
+        fields = np.asarray(GeodesicSolver(self._mesh).distances(self._places))  # (k, n)
         energy = self._weight @ fields**self._power
         if not np.isfinite(energy).any():
             raise SourceError("points lie on different components of the mesh, so none is at a distance from all")
@@ -139,10 +139,6 @@ class _Mean:
         starts = [int(np.argmax(corners == vertex)) for vertex in best if energy[vertex] < np.inf]
         ends = [self._descend(self._state(corner // 3, np.eye(3)[corner % 3])) for corner in starts]
         return min(ends, key=lambda end: end.energy).points
-
-    def _fields(self) -> FloatArray:
-        """Distances (k, n) of all vertices from each point."""
-        return np.asarray(GeodesicSolver(self._mesh).distances(self._places))
 
     def _state(self, face: int, barycentric: FloatArray) -> _State:
         inside = np.maximum(barycentric, _INSIDE)

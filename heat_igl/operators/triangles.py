@@ -67,13 +67,6 @@ def cotan_operators(mesh: Mesh, on_laplacian: OnLaplacian | None = None) -> Oper
     return replace(_assembled(mesh, L, G), simplices=MetricSimplices.in_space(mesh))
 
 
-def surface_operators(mesh: Mesh, surface: Surface, on_laplacian: OnLaplacian | None = None) -> Operators:
-    """The operators on the mesh's own triangles as for `cotan_operators`, and `surface` with the same triangles."""
-    check_measures(mesh)
-    elements = TriangleElements(surface.triangulation, partial(_gradient, mesh.V, mesh.F, _unit(mesh)))
-    return _assembled(mesh, _cotangent_laplacian(mesh, on_laplacian), elements, elements, surface)
-
-
 def _cotangent_laplacian(mesh: Mesh, on_laplacian: OnLaplacian | None) -> sp.csc_matrix:
     """L of triangles."""
     L = cotangent_laplacian(igl.cotmatrix_entries(mesh.V / _unit(mesh), mesh.F), mesh.F, mesh.n_vertices)
@@ -326,7 +319,10 @@ def operators(
         return replace(
             intrinsic_operators(triangulation, mesh, on_laplacian), surface=Surface(triangulation, faces, V=mesh.V)
         )
-    return surface_operators(mesh, Surface(triangulation, faces, V=mesh.V), on_laplacian)
+    check_measures(mesh)
+    surface = Surface(triangulation, faces, V=mesh.V)
+    elements = TriangleElements(triangulation, partial(_gradient, mesh.V, mesh.F, _unit(mesh)))
+    return _assembled(mesh, _cotangent_laplacian(mesh, on_laplacian), elements, elements, surface)
 
 
 def tufted_operators(

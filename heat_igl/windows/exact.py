@@ -360,7 +360,8 @@ def search(
 
     Only distances smaller than `upper` (n,) are found, by the numbers of the tables.
     """
-    n, starts, wanted = tables.n, starts_at(tables, sources), _targets_at(tables, targets)
+    n, starts, place = tables.n, starts_at(tables, sources), tables.located(targets)
+    wanted = Targets(place, *tables.by_face(place), tables.largest_circle(place), Found.of(len(place.faces), 0))
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
     found, leaving = Found.of(n, n_labels), Leaving.of(n) if directed else None
     goal, limit = tables.number[_NO_VERTICES if goals is None else goals], float(tables.scaled(cutoff))
@@ -408,12 +409,6 @@ def _beside(tables: Tables, starts: Starts, found: Found, upper: FloatArray | No
     _require(all(done))
     found.take_nearer(also)
     return np.asarray(statistics.sum(axis=0)) if is_same else None
-
-
-def _targets_at(tables: Tables, points: SurfacePoints | None) -> Targets:
-    """Target points for the kernel, with initial values."""
-    place = tables.located(points)
-    return Targets(place, *tables.by_face(place), tables.largest_circle(place), Found.of(len(place.faces), 0))
 
 
 def _from_curves(tables: Tables, done: Searched, leaving: Leaving, root: IntArray) -> tuple[FloatArray, FloatArray]:
