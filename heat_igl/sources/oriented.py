@@ -92,7 +92,6 @@ class OrientedSet:
     point_barycentric: FloatArray
     point_label: IntArray
     normals: FloatArray
-    n_labels: int
 
     def unoriented(self) -> list[SurfaceCurve | SurfacePoints]:
         """The same places as sources of a distance without a sign."""
@@ -127,7 +126,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
     no_points = (np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64), np.empty((0, 3)))
     faces, start, end, label = (np.concatenate(column) for column in zip(no_segments, *segments, strict=True))
     at, barycentric, label_at, normals = (np.concatenate(column) for column in zip(no_points, *points, strict=True))
-    return OrientedSet(faces, start, end, label, at, barycentric, label_at, normals, len(parts))
+    return OrientedSet(faces, start, end, label, at, barycentric, label_at, normals)
 
 
 def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
