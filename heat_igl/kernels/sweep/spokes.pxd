@@ -1,4 +1,4 @@
-# The structures that a sweep reads; what their fields mean stands in heat_igl/sweep/spokes.py.
+# The structures that a sweep reads; what their fields mean stands in `heat_igl.sweep.sweep.Spokes`.
 
 # One line of the processor's cache.
 cdef struct Spoke:

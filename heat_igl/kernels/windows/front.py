@@ -4,8 +4,9 @@ The square of the key of a list is the power of the root with respect to the cir
 next. On a Delaunay triangulation that power grows along every straight line from the root, it is no larger than the
 square of the distance of any vertex ahead, and it sorts faces from front to back. So a list is nearly always complete
 when its turn comes, a face is crossed once from each side, and no vertex can come nearer than the key. On other
-triangulations the key is the distance of the nearest point of the windows. The queue is a heap of its own: an entry
-that is out of date stays until its turn comes, which takes less time than to find it (`kernels.priority_queue`).
+triangulations the key is the distance of the nearest point of the windows. The queue is a heap of its own, in which an
+entry that is out of date stays until its turn comes: `kernels.priority_queue` moves entries whose keys change, and for
+that keeps three numbers for every half-edge and vertex of the surface.
 
 In a search for the distance of one goal, windows that cannot lead to it on a shortest path are left out.
 

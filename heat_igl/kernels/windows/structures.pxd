@@ -132,7 +132,7 @@ cdef struct Search:
     int n_nearest, n_next
     double* ranked
     int n_all_ranked
-    # Of two searches that share a surface, what each tells the other after a round: see `search`.
+    # Of two searches that share a surface, what each tells the other after a round: see `windows`.
     Search* other        # NULL if there is none
     bint is_first
     double round_length
