@@ -32,8 +32,6 @@ _MOST_STEPS, _SETTLED = 12, 1e-12
 _UNSETTLED, _SAME = 1e-2, 1e-3
 # A share of a corner, and of a second difference, that is rounding.
 _ROUNDING = 1e-9
-# Squared volume of a flat tetrahedron, as in `heat_igl.kernels.sweep.facets`.
-_FLAT = 1e-4
 
 
 class _Inputs(NamedTuple):
@@ -176,10 +174,6 @@ class _FacetUpdate:
         square = np.einsum("kij,kijl,kil->ki", w, np.linalg.inv(np.broadcast_to(metric, (k, p, p, p))), w)
         is_known = self._is_sloped & (np.real(square) > 0)
         trust = _larger(1 - np.log(np.where(is_known, square, 1.0)) ** 2, 0.0) * is_known
-        flat = np.zeros(k, bool)
-        if p == 3:
-            own = np.real(product[:, 0])
-            flat = np.linalg.det(own) < _FLAT * np.einsum("kii->ki", own).prod(axis=1)
         result = np.zeros((k, p, p), D.dtype if np.iscomplexobj(D) else np.result_type(D, w, product))
         for i in range(p):
             for j in range(i):
@@ -211,7 +205,7 @@ class _FacetUpdate:
                 )
                 sag = _smaller(sag, _smaller(rise + from_i, from_j - rise) - level)
                 sag = _larger(sag, _larger(rise - from_i, -from_j - rise) - level)
-                result[:, i, j] = result[:, j, i] = np.where(doubted | flat | ~self._same[:, i, j], 0, sag)
+                result[:, i, j] = result[:, j, i] = np.where(doubted | ~self._same[:, i, j], 0, sag)
         return result
 
 

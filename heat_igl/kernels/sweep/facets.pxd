@@ -2,11 +2,8 @@ cdef extern from *:
     """
     // Share of a facet by which the place moves in the last step of Newton's method; the error is of second order in it.
     #define PLACED 1e-8
-    // Squared volume of a flat tetrahedron, over that of three edges at right angles. Without this bound, single vertices
-    // next to tetrahedra of 1e-7 are up to 40 % too short; with 1e-4 not more so than with first order.
-    #define FLAT 1e-4
     """
-    double PLACED, FLAT
+    double PLACED
 
 cdef enum:
     MOST_STEPS = 12
@@ -45,7 +42,7 @@ cdef class Facet:
     cdef double start
     cdef double D[3]
     cdef double sag[3][3]
-    cdef double product[36]
+    cdef double product[9]
     cdef double share[3]
     cdef double g[3]
     cdef double H[3][3]
@@ -64,7 +61,6 @@ cdef class Facet:
     cdef double inverse[6]
     cdef double a[3][3]
 
-    cdef bint is_flat(self) noexcept nogil
     cdef double dual(self, int k, const double* e) noexcept nogil
     cdef double along_edges(self) noexcept nogil
     cdef double length(self, const double* x) noexcept nogil

@@ -2,7 +2,6 @@
 
 import cython
 from cython.cimports.heat_igl.kernels.sweep.facets import (
-    FLAT,
     MOST_HALVINGS,
     MOST_STEPS,
     PLACED,
@@ -17,31 +16,21 @@ class Facet:
     """The facet opposite a corner v of a triangle, p = 2, or of a tetrahedron, p = 3.
 
     Of its corners, `D` are the distances less `start`, and `sag[i][j]` is by how much the square of T sags below that
-    of the linear function between two of them. `product` has the scalar products of the vectors from v to the corners,
-    in one metric (q = 1), or in that at v and those at the corners (q = p + 1). The best place has the shares `share`.
+    of the linear function between two of them. In one metric (q = 1), `product` has the scalar products of the vectors
+    from v to the corners; else `W` has the velocity at v and the corners (q = p + 1). The best place has the shares
+    `share`.
     For p = 2 the third of each is 0.
     """
 
     @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def is_flat(self) -> cython.bint:
-        """Whether v and the facet lie nearly in one plane: then slopes across it may come from the wrong side."""
-        m = cython.address(self.product[0])
-        det: cython.double = (
-            m[0] * (m[4] * m[8] - m[5] * m[5]) - m[1] * (m[1] * m[8] - m[5] * m[2]) + m[2] * (m[1] * m[5] - m[4] * m[2])
-        )
-        return det < FLAT * m[0] * m[4] * m[8]
-
-    @cython.cfunc
     @cython.nogil
     def dual(self, k: cython.int, e: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """The square of the slope that rises by e towards the corners, in the inverse of the metric k of `product`."""
+        """The square of a slope in the inverse metric: e at corner k - 1, or that which rises by e if q = 1."""
         if self.q > 1:
             w: cython.double[3]
             multiply(cython.address(self.W[k][0]), e, w)
             return w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-        m = cython.address(self.product[9 * k])
+        m = cython.address(self.product[0])
         if self.p == 2:
             return (m[4] * e[0] * e[0] - 2.0 * m[1] * e[0] * e[1] + m[0] * e[1] * e[1]) / (m[0] * m[4] - m[1] * m[1])
         # Cofactors.

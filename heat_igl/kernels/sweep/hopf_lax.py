@@ -412,15 +412,13 @@ class HopfLax(Facet):
                         most = max(most, fabs(by))
                     for c in range(size):
                         u = self.corners[s, c]
+                        if u == v or not most > self.pending[u]:
+                            continue
                         # Farther away, v matters to u if it now has a slope, and u gains by that.
                         if (
-                            most > self.pending[u]
-                            and u != v
-                            and (
-                                self.d[v] < self.d[u]
-                                or self.rests_on(u, v)
-                                or (change == INFINITY and self.through(s, c, self.d[u]) < self.d[u])
-                            )
+                            self.d[v] < self.d[u]
+                            or self.rests_on(u, v)
+                            or (change == INFINITY and self.through(s, c, self.d[u]) < self.d[u])
                         ):
                             self.pending[u] = most
             if is_settled:
@@ -518,25 +516,25 @@ class HopfLax(Facet):
         return self.curved(s, c, linear, best) if linear - nearest < room else INFINITY
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
-        """Fill `product`: of v's metric first, then of those of the corners of the facet."""
-        at: cython.int
-        sq = cython.address(self.squares[s, c if self.q > 1 else 0, 0])
-        m = cython.address(self.product[0])
-        for i in range(self.p):
-            m[4 * i] = sq[_pair(c, self.side[i])]
-            for j in range(i):
-                between: cython.double = m[4 * i] + m[4 * j] - sq[_pair(self.side[i], self.side[j])]
-                m[3 * i + j] = m[3 * j + i] = 0.5 * between
-        if self.q > 1:
-            self.growth = self.growths[s]
-            for i in range(self.p + 1):
-                at = c if i == 0 else self.side[i - 1]
-                for k in range(6):
-                    self.W[i][k] = self.velocity[s, at, k]
-                self.s[i] = mean_velocity(self.W[i], self.p)
+        """What `Facet` knows of the metric of s, after `face`."""
+        if self.q == 1:
+            sq = cython.address(self.mean[s, 0])
+            m = cython.address(self.product[0])
             for i in range(self.p):
-                for k in range(3):
-                    self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
+                m[4 * i] = sq[_pair(c, self.side[i])]
+                for j in range(i):
+                    between: cython.double = m[4 * i] + m[4 * j] - sq[_pair(self.side[i], self.side[j])]
+                    m[3 * i + j] = m[3 * j + i] = 0.5 * between
+            return
+        self.growth = self.growths[s]
+        for i in range(self.p + 1):
+            at: cython.int = c if i == 0 else self.side[i - 1]
+            for k in range(6):
+                self.W[i][k] = self.velocity[s, at, k]
+            self.s[i] = mean_velocity(self.W[i], self.p)
+        for i in range(self.p):
+            for k in range(3):
+                self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
 
     def curved(self, s: cython.int, c: cython.int, best: cython.double, limit: cython.double) -> cython.double:
         """The least value at corner c of simplex s with T of second order, after that of first order; sets `share`.
@@ -554,21 +552,17 @@ class HopfLax(Facet):
         self.start = start
         self.lay(s, c)
         is_source: cython.bint = False
-        is_flat: cython.bint = self.p == 3 and self.is_flat()
         x: cython.double[3]
         for i in range(self.p):
             self.D[i] = self.d[self.corners[s, self.side[i]]] - start
             is_source = is_source or not self.D[i] > 0.0
-            x[i] = self.trust(s, c, i)
-        for i in range(self.p):
-            for j in range(i):
-                sag: cython.double = 0.0
-                if not is_flat:
-                    sag = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
-                self.sag[i][j] = self.sag[j][i] = sag
         if is_source and self.q > 1:
             # T is not linear on an edge to the source, and its square not quadratic.
             return self.along_edges()
+        for i in range(self.p):
+            x[i] = self.trust(s, c, i)
+            for j in range(i):
+                self.sag[i][j] = self.sag[j][i] = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
         best = self.newton(limit)
         if is_source:
             # Straight from the source, where the square of T may have no derivatives.
@@ -632,8 +626,7 @@ class HopfLax(Facet):
     def trust(self, s: cython.int, c: cython.int, i: cython.int) -> cython.double:
         """How far the slope at a corner i of `side` has length 1 in simplex s, as unless metrics jump: from 0 to 1.
 
-        With the square of the logarithm, distances have a derivative where metrics begin to differ. A slope that was
-        found through the vertex for which it is asked says nothing new: two such vertices would lower each other.
+        With the square of the logarithm, distances have a derivative where metrics begin to differ.
         """
         v: cython.int = self.corners[s, self.side[i]]
         if not self.is_sloped[v]:
