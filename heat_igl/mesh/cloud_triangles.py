@@ -150,25 +150,29 @@ def _triangles_of_stars(
     """
     largest = _LARGEST_RADIUS * near.radius
 
-    def stars_of(rows: slice) -> tuple[IntArray, FloatArray, IntArray, IntArray]:
-        corners, radii, sizes, is_closed = delaunay_stars(
+    def stars_of(rows: slice) -> tuple[IntArray, IntArray, IntArray]:
+        corners, sizes, is_closed = delaunay_stars(
             P, near.axes, near.index, largest, least_cosine, rows.start, rows.stop
         )
-        return corners, radii, sizes, is_closed
+        return corners, sizes, is_closed
 
-    corners, radii, sizes, is_closed = map(np.concatenate, zip(*over_rows(stars_of, len(P), _BLOCK), strict=True))
+    corners, sizes, is_closed = map(np.concatenate, zip(*over_rows(stars_of, len(P), _BLOCK), strict=True))
     first = np.zeros(len(P) + 1, np.int64)
     np.cumsum(sizes, out=first[1:])
 
-    def agreement_of(rows: slice) -> tuple[IntArray, FloatArray, IntArray]:
-        count, radius, is_settled = agreement(first, corners, radii, is_closed, rows.start, rows.stop)
-        return count, radius, is_settled
+    def agreement_of(rows: slice) -> tuple[IntArray, IntArray]:
+        count, is_settled = agreement(first, corners, is_closed, rows.start, rows.stop)
+        return count, is_settled
 
-    count, radius, is_settled = map(np.concatenate, zip(*over_rows(agreement_of, len(P), _BLOCK), strict=True))
+    count, is_settled = map(np.concatenate, zip(*over_rows(agreement_of, len(P), _BLOCK), strict=True))
     others = np.flatnonzero((count == 1) | (count == 2))
     rows = ascending_rows(corners[others])
-    # Those in more stars first, then the smaller ones.
-    order = np.lexsort((*rows.T[::-1], radius[others], -count[others].astype(int)))
+    a, b, c = P[rows.T]
+    sides = [np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c)]
+    product = sides[0] * sides[1] * sides[2]
+    radius = product / np.maximum(np.linalg.norm(np.cross(b - a, c - a), axis=1), 1e-12 * product ** (2 / 3))
+    # Those in more stars first, then those with smaller circles.
+    order = np.lexsort((*rows.T[::-1], radius, -count[others].astype(int)))
     return corners[count == 3], rows[order], is_settled.astype(bool)
 
 

@@ -7,7 +7,6 @@ import numpy as np
 def agreement(
     first: cython.const[cython.longlong][::1],
     triangles: cython.const[cython.int][:, ::1],
-    radii: cython.const[cython.double][::1],
     is_closed: cython.const[cython.uchar][::1],
     begin: cython.Py_ssize_t,
     end: cython.Py_ssize_t,
@@ -20,8 +19,6 @@ def agreement(
         The star of point i has rows ``first[i]`` to ``first[i + 1]`` of `triangles`.
     triangles : (s, 3) int32
         The triangles of all stars, the point itself first.
-    radii : (s,) float64
-        Of their circles.
     is_closed : (n,) uint8
         Whether a star goes all the way around its point.
 
@@ -30,16 +27,12 @@ def agreement(
     count : (b,) uint8
         For each row of these stars the number of stars that have the triangle, 1 to 3, in the star of its lowest point
         that has it; 0 in the others.
-    radius : (b,) float64
-        The largest radius that one of these stars gives the triangle.
     is_settled : (end - begin,) uint8
         Whether the star of a point is closed, and all its triangles are in three stars.
     """
     offset: cython.Py_ssize_t = first[begin]
-    counts, largest = np.zeros(first[end] - offset, np.uint8), np.empty(first[end] - offset)
-    settled = np.empty(end - begin, np.uint8)
+    counts, settled = np.zeros(first[end] - offset, np.uint8), np.empty(end - begin, np.uint8)
     count: cython.uchar[::1] = counts
-    radius: cython.double[::1] = largest
     is_settled: cython.uchar[::1] = settled
     with cython.nogil:
         for i in range(begin, end):
@@ -54,12 +47,7 @@ def agreement(
                 if (of_a >= 0 and a < i) or (of_b >= 0 and b < i):
                     continue
                 count[row - offset] = 1 + (of_a >= 0) + (of_b >= 0)
-                radius[row - offset] = radii[row]
-                if of_a >= 0:
-                    radius[row - offset] = max(radius[row - offset], radii[of_a])
-                if of_b >= 0:
-                    radius[row - offset] = max(radius[row - offset], radii[of_b])
-    return counts, largest, settled
+    return counts, settled
 
 
 @cython.cfunc

@@ -24,8 +24,6 @@ def delaunay_stars(
     -------
     triangles : (s, 3) int32
         Star by star, the point itself first, and around each point counterclockwise.
-    radii : (s,) float64
-        Of the circumscribed circles.
     sizes : (end - begin,) int32
         Number of triangles of each star.
     is_closed : (end - begin,) uint8
@@ -33,12 +31,10 @@ def delaunay_stars(
     """
     n: cython.Py_ssize_t = end - begin
     k: cython.Py_ssize_t = neighbours.shape[1]
-    corners, radii = np.empty((n * k, 3), np.int32), np.empty(n * k)
-    sizes, closed = np.empty(n, np.int32), np.zeros(n, np.uint8)
+    corners, sizes, closed = np.empty((n * k, 3), np.int32), np.empty(n, np.int32), np.zeros(n, np.uint8)
     size: cython.int[::1] = sizes
     is_closed: cython.uchar[::1] = closed
     found: cython.int[:, ::1] = corners
-    radius: cython.double[::1] = radii
     star: cython.double[:, ::1] = np.empty((k + 1, 3))
     members: cython.int[::1] = np.empty(k + 1, np.int32)
     stack: cython.int[::1] = np.empty(k + 2, np.int32)
@@ -49,10 +45,10 @@ def delaunay_stars(
             count: cython.Py_ssize_t = _neighbours_around(i, P, axes, neighbours, least_cosine, star, members, stack)
             if count >= 2:
                 top: cython.Py_ssize_t = _visible_hull(count, star, stack)
-                m = _triangles(i, top, star, members, stack, largest[i], found, radius, m)
+                m = _triangles(i, top, star, members, stack, largest[i], found, m)
                 is_closed[i - begin] = m - before == top
             size[i - begin] = cython.cast(cython.int, m - before)
-    return corners[:m].copy(), radii[:m].copy(), sizes, closed
+    return corners[:m].copy(), sizes, closed
 
 
 @cython.cfunc
@@ -175,7 +171,6 @@ def _triangles(
     stack: cython.int[::1],
     largest: cython.double,
     found: cython.int[:, ::1],
-    radius: cython.double[::1],
     m: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:
     """Append the triangles of point i on the sides of the hull to the m that are found; return how many there are."""
@@ -189,7 +184,6 @@ def _triangles(
         # The line through two inverted points is 1 / (2 R) away from the point; beyond half a turn there is no face.
         if turn > 0.0 and side <= 2.0 * largest * turn:
             found[m, 0], found[m, 1], found[m, 2] = cython.cast(cython.int, i), members[p], members[q]
-            radius[m] = 0.5 * side / turn
             m += 1
     return m
 

@@ -146,20 +146,23 @@ def _fill(
                 best = i
         if cost[best] == INFINITY:
             if flat >= 0:
+                # What was cut last closes nothing, and goes with its edges.
+                for i in range(count - 1, flat - 1, -1):
+                    head[min(triangles[i, 0], triangles[i, 2])] = link[n_edges + i, 1]
                 return flat
             flat, limit = count, most_folded
             for i in range(size):
                 cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit)
             continue
-        # In the meantime its third side may have become an edge, or all fans there are joined.
-        current: cython.double = _ear(P, ring, size, best, joints, largest, head, link, limit)
-        if current != cost[best]:
-            cost[best] = current
+        before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
+        after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
+        # In the meantime its third side may have become an edge, or all fans there may be joined.
+        is_edge: cython.bint = size > 3 and _is_edge(head, link, ring[POINT, before], ring[POINT, after])
+        if is_edge or (cost[best] < 0.0 and joints[ring[POINT, best]] == 0):
+            cost[best] = INFINITY if is_edge else _ear(P, ring, size, best, joints, largest, head, link, limit)
             continue
         is_whole[count] = cost[best] >= 0.0
         joints[ring[POINT, best]] -= joints[ring[POINT, best]] > 0
-        before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
-        after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
         triangles[count, 0], triangles[count, 1] = ring[POINT, before], ring[POINT, best]
         triangles[count, 2] = ring[POINT, after]
         _enter(head, link, n_edges + count, ring[POINT, before], ring[POINT, after])
