@@ -310,27 +310,29 @@ def test_blocks_are_whole_blocks_of_right_hand_sides():
 
 
 def test_a_full_disk_ends_with_one_error_and_can_be_resumed(client, tmp_path):
-    meshes = {f"ball {i}": Mesh(ball.V * (1 + i), ball.F) for i, ball in enumerate([heat_igl.shapes.icosphere(3)] * 4)}
+    ball = heat_igl.shapes.icosphere(2)  # 162 vertices: 3 blocks
+    meshes = {f"ball {i}": Mesh((1 + i) * ball.V, ball.F) for i in range(3)}
     disk, full = tmp_path / "disk", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     with (
         pytest.raises(BatchError, match=r"disk.*cannot be written: No space left on device.*free some space"),
-        killed_at(40, full),
+        killed_at(30, full),
     ):
         cluster.distances(meshes, "all", disk / "store", client=client)
     begun = chunk_times(disk / "store")
-    assert 0 < len(begun) < 44
+    assert 0 < len(begun) < 9
     # A mesh whose metadata the full disk cut off counts as damaged and is made again.
     begun_meshes = {row.name for row in cluster.report(disk / "store").rows if row.n_sources}
     intact = {
         path
         for name in begun_meshes
-        for block in set(range(11)) - set(Store(disk / "store").group(name).missing())
+        for block in set(range(3)) - set(Store(disk / "store").group(name).missing())
         for path in begun
         if f"/{name}/distance/c/{block}/" in path
     }
     report = cluster.distances(meshes, "all", disk / "store", client=client)
-    assert [row.status for row in report.rows] == ["done"] * 4
+    assert [row.status for row in report.rows] == ["done"] * 3
     after = chunk_times(disk / "store")
+    assert intact
     assert all(after[path] == begun[path] for path in intact)
     undisturbed = cluster.distances(meshes, "all", tmp_path / "undisturbed", client=client)
     assert [row.checksum for row in report.rows] == [row.checksum for row in undisturbed.rows]
