@@ -414,11 +414,11 @@ class HopfLax(Facet):
                         u = self.corners[s, c]
                         if u == v or not most > self.pending[u]:
                             continue
-                        # Farther away, v matters to u if it now has a slope, and u gains by that.
+                        # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
                         if (
                             self.d[v] < self.d[u]
                             or self.rests_on(u, v)
-                            or (change == INFINITY and self.through(s, c, self.d[u]) < self.d[u])
+                            or ((change == INFINITY or self.d[v] < old) and self.through(s, c, self.d[u]) < self.d[u])
                         ):
                             self.pending[u] = most
             if is_settled:
