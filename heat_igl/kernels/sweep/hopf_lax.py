@@ -323,7 +323,7 @@ class HopfLax(Facet):
         elif along < base and rest > 0.0:
             along /= base
             value = self.level[i] + rise * along + far
-        else:  # also if the distance of corner i is not known, and their difference is infinite
+        else:
             along, value = 1.0, self.level[j] + sqrt(sq[_pair(c, self.side[j])])
         if not value < least:
             return least
@@ -346,7 +346,7 @@ class HopfLax(Facet):
         det: cython.double = bb * ee - be * be
         b: cython.double = self.level[1] - self.level[0]
         e: cython.double = self.level[2] - self.level[0]
-        if not (det > 0.0 and fabs(b) + fabs(e) < INFINITY):
+        if not det > 0.0:
             return INFINITY
         det = 1.0 / det
         wb: cython.double = 0.5 * (bb + to - sq[_pair(c, self.side[1])])
@@ -545,10 +545,7 @@ class HopfLax(Facet):
         j: cython.int
         start: cython.double = INFINITY
         for i in range(self.p):
-            u: cython.int = self.corners[s, self.side[i]]
-            if self.d[u] == INFINITY:
-                return best
-            start = min(start, self.offset[self.label[u]])
+            start = min(start, self.offset[self.label[self.corners[s, self.side[i]]]])
         self.start = start
         self.lay(s, c)
         is_source: cython.bint = False
