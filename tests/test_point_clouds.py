@@ -25,6 +25,7 @@ from heat_igl.geodesic import SolverChoice
 from heat_igl.io import ply
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.local_fits import tangent_planes
+from heat_igl.kernels.cloud.loop_filling import filling_triangles
 from heat_igl.mesh.cloud_orientation import is_oriented_manifold, oriented
 from heat_igl.mesh.cloud_triangles import (
     glued_sides,
@@ -843,6 +844,22 @@ def test_beside_a_closed_fan_triangles_stay_only_where_they_are_the_connection()
         given = np.array(F, np.int32)
         np.testing.assert_array_equal(pinched_vertices(given, 9, glued_sides(given, 9)), [0])
         np.testing.assert_array_equal(with_gaps_filled(P, given, np.zeros(9), points_at_gaps(given, 9)), expected)
+
+
+def test_edges_of_triangles_that_are_given_up_are_free_again():
+    """Of two loops at one point: in the first a single ear may be cut, which folds back and closes nothing."""
+    P = np.zeros((13, 3))
+    P[:9, :2] = [[0, 0], [1, -1], [2, 0], [2, 5], [0, 5], [-1, -1], [-2, 0], [-2, 5], [-1, 5]]
+    P[9:] = [[2, 0, 1.5], [0, 0, 1.5], [-1, -5, 0], [0, 9, 0]]
+    loops, following = np.array([[0, 1, 2, 3, 4], [0, 5, 6, 7, 8]]), np.array([1, 2, 3, 4, 0, 6, 7, 8, 9, 5])
+    ends = np.stack([np.roll(loops, -1, axis=1).ravel(), loops.ravel()], axis=1).astype(np.int32)
+    opposite = np.array([9, 10, 12, 12, 12, 11, 11, 12, 12, 12], np.int32)
+    partner = np.full(20, -1)
+    partner[::2] = 2 * following + 1
+    largest = np.where(np.isin(np.arange(13), [3, 4, 7, 8]), 0.0, 10.0)
+    joints = np.zeros(13, np.int32)
+    filled, is_whole = filling_triangles(P, ends, opposite, partner, joints, largest, ends, -0.1, 0.99)
+    assert (filled.tolist(), is_whole.tolist()) == ([[0, 5, 6]], [False])
 
 
 @pytest.mark.parametrize("seed", range(3))
