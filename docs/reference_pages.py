@@ -41,7 +41,7 @@ MODULES = {
     "heat_igl.compat.igl": "libigl's functions for distance",
     "heat_igl.compat.potpourri3d": "potpourri3d's classes and functions",
     "heat_igl.sampling": "samples of a surface",
-    "heat_igl.steps": "the three steps of the heat method, each alone",
+    "heat_igl.heat.steps": "the three steps of the heat method, each alone",
     "heat_igl.operators": "the operators of every kind of domain",
     "heat_igl.linear": "factor once, solve many times",
     "heat_igl.applications": "activation times, maps on a surface, errors of matches",

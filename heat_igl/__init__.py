@@ -1,6 +1,6 @@
 """Geodesic distance on meshes by the heat method, with operators from libigl."""
 
-from heat_igl.lazy import attached as _attached
+from heat_igl.runtime.lazy import attached as _attached
 
 __version__ = "0.1.0"
 # What other libraries and the literature call what is here.

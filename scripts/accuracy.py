@@ -26,8 +26,8 @@ import numpy as np
 
 from heat_igl import Mesh, read_mesh, reference
 from heat_igl.errors import AccuracyWarning, MeshError, MissingExtraError, ReferenceSolverError
+from heat_igl.heat.steps import HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.operators import operators
-from heat_igl.steps import HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 

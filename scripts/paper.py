@@ -23,16 +23,16 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, shapes
+from heat_igl.heat.steps import diffuse, integrate, normalize, smallest_time_step
 from heat_igl.operators import operators
 from heat_igl.reference import edge_paths
-from heat_igl.steps import diffuse, integrate, normalize, smallest_time_step
 
 from harness import Row, Table, parsed, publish
 
 Rows = list[Row]
 
 
-# The formulas as printed: `heat_igl.steps` is the way to run the three steps.
+# The formulas as printed: `heat_igl.heat.steps` is the way to run the three steps.
 
 
 class Square:

@@ -56,7 +56,7 @@ def test_import_loads_what_a_distance_needs_and_little_else():
 
 
 def test_a_distance_by_windows_loads_no_other_engine():
-    others = [f"heat_igl.{name}" for name in ("heat.solver", "linear", "steps", "sweep.sweep", "curves")]
+    others = [f"heat_igl.{name}" for name in ("heat.solver", "linear", "heat.steps", "sweep.sweep", "curves")]
     V, F = [[0, 0, 0], [3, 0, 0], [3, 4, 0], [0, 4, 0]], [[0, 1, 3], [1, 2, 3]]
     asked = f"import heat_igl; heat_igl.geodesic_distance(({V}, {F}), 0"
     assert loaded(f"{asked})", others) == []

@@ -13,10 +13,10 @@ from conftest import mean_error
 import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, shapes
 from heat_igl.heat.checking import Comparisons
+from heat_igl.heat.steps import PoissonProblem
 from heat_igl.kernels.sweep import sweeping
 from heat_igl.kernels.windows import windows
 from heat_igl.sources import SourceSet, source_set
-from heat_igl.steps import PoissonProblem
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES, joined

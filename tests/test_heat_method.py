@@ -12,8 +12,8 @@ from surfaces import arcs, nearest_vertex
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, read_mesh, shapes
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import SolverOptions
+from heat_igl.heat.steps import HeatFlow, fitted_laplacian, integrate
 from heat_igl.operators import Operators, intrinsic_operators, operators
-from heat_igl.steps import HeatFlow, fitted_laplacian, integrate
 from heat_igl.validation import closed_forms
 
 

@@ -27,8 +27,8 @@ from heat_igl import (
 )
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat.source_terms import SourceTerm
+from heat_igl.heat.steps import fitted_laplacian
 from heat_igl.sources import Sources, source_set, vertex_sources
-from heat_igl.steps import fitted_laplacian
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import scipy.sparse as sp
 from conftest import perturbed
 from surfaces import twice
 
-from heat_igl import HeatMethodSolver, Mesh, shapes, steps
-from heat_igl.operators import Operators, operators, speed_operators, tufted_operators
-from heat_igl.steps import (
+from heat_igl import HeatMethodSolver, Mesh, shapes
+from heat_igl.heat import steps
+from heat_igl.heat.steps import (
     HeatFlow,
     NormalizedDivergence,
     PoissonProblem,
@@ -20,6 +20,7 @@ from heat_igl.steps import (
     integrate,
     normalize,
 )
+from heat_igl.operators import Operators, operators, speed_operators, tufted_operators
 
 
 @pytest.fixture(scope="module")

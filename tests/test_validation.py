@@ -25,8 +25,8 @@ from heat_igl import (
     validate,
     validation,
 )
+from heat_igl.heat.steps import NormalizedDivergence
 from heat_igl.operators import Operators, operators
-from heat_igl.steps import NormalizedDivergence
 from heat_igl.validation import closed_forms, draw_sources, metrics
 from heat_igl.validation.report import error_figure
 

@@ -8,8 +8,8 @@ from surfaces import box_surface
 
 import heat_igl
 from heat_igl import Mesh, VectorHeatSolver, exp_map, shapes, tangent_frames
+from heat_igl.heat.steps import VectorHeatFlow
 from heat_igl.operators import connection_laplacian, edge_rotations, operators
-from heat_igl.steps import VectorHeatFlow
 
 SHAPES = {
     "sphere": perturbed(shapes.icosphere(3)),

@@ -4,6 +4,6 @@ notebooks/10_applications.ipynb shows them. `heat_igl.applications.torch` and `h
 function that PyTorch and JAX differentiate, are imported by these names alone.
 """
 
-from heat_igl.lazy import attached
+from heat_igl.runtime.lazy import attached
 
 __all__, __getattr__, __dir__ = attached(__name__, __file__)

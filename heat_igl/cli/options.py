@@ -16,10 +16,10 @@ from rich.text import Text
 
 from heat_igl.errors import MeshError, MissingExtraError, SourceError
 from heat_igl.geodesic import DistanceMethod
+from heat_igl.heat.steps import Boundary
 from heat_igl.io import CURVE_SUFFIXES, MAP_SUFFIXES, complete_file, read_attributes, write_mesh, write_point_cloud
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.plan import Plan
-from heat_igl.steps import Boundary
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
 if TYPE_CHECKING:

@@ -15,6 +15,15 @@ import scipy.sparse as sp
 from heat_igl.errors import AccuracyWarning, positive, require_choice
 from heat_igl.heat.checking import AnswerCheck, Checker, Comparison, Comparisons
 from heat_igl.heat.source_terms import SourceAssembler
+from heat_igl.heat.steps import (
+    Boundary,
+    HeatFlow,
+    NormalizedDivergence,
+    PoissonProblem,
+    analysis,
+    smallest_time_step,
+    smallest_time_steps,
+)
 from heat_igl.linear import Analysis, Backend
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import (
@@ -38,15 +47,6 @@ from heat_igl.plan import (
     heat_plan,
 )
 from heat_igl.runtime import Pool, in_order, n_threads, warn_caller
-from heat_igl.steps import (
-    Boundary,
-    HeatFlow,
-    NormalizedDivergence,
-    PoissonProblem,
-    analysis,
-    smallest_time_step,
-    smallest_time_steps,
-)
 from heat_igl.typing import FloatArray
 
 Magnitude = Literal["auto", "unit", "damped"]

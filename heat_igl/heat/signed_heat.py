@@ -25,13 +25,13 @@ from heat_igl.heat.curve_sides import (
 )
 from heat_igl.heat.parts import SolverOptions, SolverParts, prepare
 from heat_igl.heat.solver import HeatMethodSolver
+from heat_igl.heat.steps import VectorHeatFlow
 from heat_igl.intrinsic import IntrinsicTriangulation, lay_out, oriented
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, one_sided
 from heat_igl.operators import Operators, TriangleElements, divergence_matrix, edge_rotations, face_rotations, operators
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, both, n_threads, warn_caller
 from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, require_resolved, source_set
-from heat_igl.steps import VectorHeatFlow
 from heat_igl.sweep import SweepEngine
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.windows import MeshTriangles, guarded_windows

@@ -13,13 +13,13 @@ from heat_igl.heat.batches import BatchedSolver, LabelledDistance
 from heat_igl.heat.checking import AnswerCheck
 from heat_igl.heat.parts import Diagnostics, HeatSolution, Magnitude, SolverOptions, SolverParts, prepare, prepare_mesh
 from heat_igl.heat.source_terms import Seeds, SourceTerm, drop_overtaken, right_hand_side, warmest_sources
+from heat_igl.heat.steps import Boundary, damping, normalize
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh
 from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.plan import Plan
 from heat_igl.runtime import LOWEST_HEAT, warn_caller
 from heat_igl.sources import Sources, SourceSet, require_resolved, source_set
-from heat_igl.steps import Boundary, damping, normalize
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 # A known distance that is longer than the integrated distance by more than this share of it comes from a source that is

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.heat.steps import HeatFlow
 from heat_igl.operators import Operators
 from heat_igl.plan import NEAR_RADIUS
 from heat_igl.runtime import SOURCE_HEAT
 from heat_igl.sources import SourceSegments, SourceSet, nearest_first, samples
-from heat_igl.steps import HeatFlow
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows import ExactSurface
 

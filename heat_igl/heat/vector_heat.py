@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, real_numbers, require_choice
 from heat_igl.heat.parts import SolverOptions, prepare
 from heat_igl.heat.solver import HeatMethodSolver
+from heat_igl.heat.steps import VectorHeatFlow
 from heat_igl.intrinsic import (
     PolarAngles,
     TangentFrames,
@@ -31,7 +32,6 @@ from heat_igl.mesh import MeshLike, as_mesh, as_simplices, tangent_surface
 from heat_igl.operators import Operators, Surface, edge_rotations, operators
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, warn_caller
 from heat_igl.sources import Sources, named_vertices, source_set
-from heat_igl.steps import VectorHeatFlow
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows import MeshTriangles, PathAngles, WindowEngine
 from heat_igl.windows.directions import axis_of_second_side, carried

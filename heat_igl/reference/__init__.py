@@ -10,6 +10,6 @@ Examples
 [4.0, 3.0, 5.0]
 """
 
-from heat_igl.lazy import attached
+from heat_igl.runtime.lazy import attached
 
 __all__, __getattr__, __dir__ = attached(__name__, __file__)

@@ -15,7 +15,7 @@ def divergence_of_descent(
 ):
     """Integrated divergence (n,) of -grad u / |grad u|, damped on faces with a low rate |grad log u| of decay.
 
-    `corners` (m, 3) and `numbers` (m, 5) are those of `heat_igl.steps.NormalizedDivergence`, u (n,) and
+    `corners` (m, 3) and `numbers` (m, 5) are those of `heat_igl.heat.steps.NormalizedDivergence`, u (n,) and
     the logarithm in their order. The field is 0 on faces on which no component of grad u reaches `smallest`. It follows
     the gradient of log u if `of_log`, on faces with no corner below `smallest`.
     """
