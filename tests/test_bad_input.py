@@ -254,7 +254,7 @@ VECTORS = heat_igl.VectorHeatSolver(BALL)
 WEST, SOLID = GRID.V[:, 0] < 0.6, np.ones((2, 2, 2), bool)
 AT, INSIDE = [[1, 0, 0]], SurfacePoints([7], [[0.2, 0.3, 0.5]])
 PULL_BACK, CLOUD = GeodesicSolver(BALL).distance_vjp(INSIDE)[1], heat_igl.PointCloud(BALL.V)
-HIDDEN = np.ma.masked_array([1, 2], mask=[True, False])
+HIDDEN, X = np.ma.masked_array([1, 2], mask=[True, False]), np.array([[1.0, 0, 0]])
 ERRORS = "ValueError|SourceError|MeshError|TypeError|ReferenceSolverError"
 # What is asked of a sphere of 42 vertices and 80 faces, and how it is refused.
 REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
@@ -404,6 +404,13 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: GeodesicSolver(m).distance_vjp(CURVE), "a curve is among the sources: place points on it"),
     (lambda _: GeodesicSolver(SPHERE, method="sweep").distance_vjp(0), "derivatives are those of paths"),
     (lambda _: GeodesicSolver(CLOUD).distance_vjp(0), "derivatives need a surface of triangles"),
+    # Fibres and sheets.
+    (lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=X[:, ::-1]), "sheets and normal go together"),
+    (
+        lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=2 * X, normal=1),
+        r"sheets\[0\] .* direction of its fibre",
+    ),
+    (lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=0 * X, normal=1), r"sheets\[0\] .* is no direction"),
     # Curves and waypoints.
     (lambda m: SignedHeatSolver(m).distance([]), "curves is empty"),
     (lambda m: SignedHeatSolver(m).distance(7), "curves must be a SurfaceCurve, OrientedPoints, a mask"),

@@ -1,7 +1,9 @@
 """Metrics that change from place to place: maps of space whose image is convex, bounds, activation times."""
 
+import igl
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 from surfaces import nearest_vertex
 
 from heat_igl import (
@@ -126,7 +128,10 @@ def test_sources_are_any_corner_of_their_simplices(mesh):
 def twisted_disk(n: int, k: float) -> tuple[Mesh, FloatArray, FloatArray]:
     """A disk, its image after a turn by k r^2 / 2 about the middle, and the metric (n, 3, 3) that it pulls back."""
     disk = shapes.disk(n)
-    x = disk.V[:, :2]
+    return disk, *turned(disk.V[:, :2], k)
+
+
+def turned(x: FloatArray, k: float) -> tuple[FloatArray, FloatArray]:
     z = (x[:, 0] + 1j * x[:, 1]) * np.exp(0.5j * k * (x**2).sum(axis=1))
     turn = np.exp(0.5j * k * (x**2).sum(axis=1))
     # Derivatives by x and y of the complex image.
@@ -134,7 +139,7 @@ def twisted_disk(n: int, k: float) -> tuple[Mesh, FloatArray, FloatArray]:
     J = np.stack([np.stack([dx.real, dy.real], axis=1), np.stack([dx.imag, dy.imag], axis=1)], axis=1)
     g = np.tile(np.eye(3), (len(x), 1, 1))
     g[:, :2, :2] = np.swapaxes(J, 1, 2) @ J
-    return disk, np.stack([z.real, z.imag, 0 * z.real], axis=1), g
+    return np.stack([z.real, z.imag, 0 * z.real], axis=1), g
 
 
 @pytest.mark.filterwarnings("ignore:the metric turns farther")
@@ -156,16 +161,8 @@ def test_a_metric_at_the_vertices_of_triangles(k, has_windows):
 def test_thin_triangles_that_turn():
     """Up to 1:102, with a metric per face, which is carried to the vertices; if not, it is 1.1 % off in the mean."""
     mesh, image, _ = twisted_disk(24, 10.0)
-    centre = mesh.V[mesh.F].mean(axis=1)
-    a, b = 10.0 * centre[:, 0], 10.0 * centre[:, 1]
-    # J = R (I + (-y, x) (a, b)^T), and R plays no part.
-    J = np.tile(np.eye(3), (mesh.n_faces, 1, 1))
-    J[:, 0, 0] -= centre[:, 1] * a
-    J[:, 0, 1] -= centre[:, 1] * b
-    J[:, 1, 0] += centre[:, 0] * a
-    J[:, 1, 1] += centre[:, 0] * b
     exact = straight(image, 7)
-    found = solver(mesh, np.swapaxes(J, 1, 2) @ J).distance(7)
+    found = solver(mesh, turned(mesh.V[mesh.F].mean(axis=1)[:, :2], 10.0)[1]).distance(7)
     assert np.abs(found - exact).mean() < 0.003 * exact.mean()
 
 
@@ -184,17 +181,27 @@ def test_fronts_that_run_against_the_order_of_distance(place):
 @pytest.mark.filterwarnings("ignore:the metric turns farther")
 def test_a_finer_mesh_is_not_worse():
     """Up to 1:38; with 20 visits for each vertex the largest error stayed at 6.6 %, and the mean at .17 and .20 %."""
-    mean, largest = [], []
+    errors = []
     for n in (32, 64):
         mesh, image, g = twisted_disk(n, 6.0)
         source = int(np.linalg.norm(mesh.V - [0.4, 0.3, 0], axis=1).argmin())
         exact = straight(image, source)
         error = np.abs(engine(mesh, g, source) - exact)[exact > 0] / exact[exact > 0]
-        mean.append(error.mean())
-        largest.append(error.max())
-    assert mean[1] < 0.4 * mean[0]
-    assert largest[1] < 0.6 * largest[0]
-    assert mean[1] < 0.0006
+        errors.append([error.mean(), error.max()])
+    assert (errors[1] < np.multiply([0.4, 0.6], errors[0])).all()
+    assert errors[1][0] < 0.0006
+
+
+@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_vertices_do_not_lower_each_other_for_ever(seed):
+    """Fibres 1:30 that no mesh resolves, against triangles cut into 16: .45 to .54 while circles kept their slopes."""
+    rng = np.random.default_rng(seed)
+    P = rng.random((300, 2))
+    mesh = Mesh(P, Delaunay(P).simplices)
+    g = fibre_metric(rng.standard_normal((mesh.n_faces, 3)) * [1, 1, 0], 1.0, 30.0)
+    finer = solver(Mesh(*igl.upsample(mesh.V, mesh.F, 2)), np.repeat(g, 16, axis=0)).distance(0)[: mesh.n_vertices]
+    assert 0.8 < np.median(solver(mesh, g).distance(0)[1:] / finer[1:]) < 1.4
 
 
 def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
@@ -203,7 +210,6 @@ def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
     with pytest.warns(AccuracyWarning, match=r"changes by a factor of 3\.\d or more at a tenth of the faces"):
         solver(mesh, g)
     resolved = twisted_disk(48, 3.0)
-    assert metric_operators(resolved[0], resolved[2]).n == resolved[0].n_vertices
     solver(resolved[0], resolved[2])
     GeodesicSolver(speed_operators(mesh, np.where(mesh.V[mesh.F].mean(axis=1)[:, 0] < 0, 1.0, 100.0)))
 
@@ -366,19 +372,6 @@ def test_wrong_tissue_is_refused(D, times, message):
         activation_times(mesh, D, 0, times)
     with pytest.raises(SourceError):
         activation_times(mesh, np.eye(3), [27])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"sheets": [[0, 1, 0]]}, "sheets and normal go together"),
-        ({"sheets": [[2, 0, 0]], "normal": 1}, r"sheets\[0\] = .* has the direction of its fibre"),
-        ({"sheets": [[0, 0, 0]], "normal": 1}, r"sheets\[0\] = .* is no direction"),
-    ],
-)
-def test_wrong_sheets_are_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        fibre_metric([[1, 0, 0]], 1, 2, **arguments)
 
 
 def test_a_wrong_metric_at_a_vertex_is_named():

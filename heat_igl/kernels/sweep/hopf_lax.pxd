@@ -10,6 +10,8 @@ cdef extern from *:
     double SETTLED, EQUAL
 
 cdef enum:
+    # Where the mesh resolves the metric, vertices settle in 2 to 11 visits.
+    MOST_VISITS = 40
     MOST_ROUNDS = 100
 
 
@@ -37,6 +39,8 @@ cdef class HopfLax(Facet):
     # The derivative of distance by the position of each vertex, where it is known.
     cdef double[:, ::1] slope
     cdef unsigned char[::1] is_sloped
+    # Whether a vertex was in a circle that did not settle: its slope is not asked for.
+    cdef unsigned char[::1] is_linear
     # The corner whose facet gave each vertex its distance, the place there, and what bounds the values through each
     # simplex.
     cdef int[::1] facet
@@ -55,6 +59,7 @@ cdef class HopfLax(Facet):
     cdef double across(self, int s, int c, double room) noexcept nogil
     cdef void sharpen(self) noexcept nogil
     cdef void arrange(self) noexcept nogil
+    cdef void open_circle(self, int u, int n_open) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
     cdef bint rests_on(self, int v, int u) noexcept nogil

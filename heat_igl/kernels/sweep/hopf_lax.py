@@ -17,7 +17,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.signals import is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, invert, mean_velocity, multiply
-from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, MOST_ROUNDS, SETTLED
+from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, MOST_ROUNDS, MOST_VISITS, SETTLED
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 from heat_igl.kernels.signals import raise_caught
@@ -240,7 +240,7 @@ class HopfLax(Facet):
         self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
         # Nearer than a source to itself is another one.
         self.fixed = (d == np.append(offset, np.inf)[label]).view(np.uint8)
-        self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
+        self.slope, self.is_sloped, self.is_linear = np.zeros((n, 3)), np.zeros(n, np.uint8), np.zeros(n, np.uint8)
         self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
         self.order = np.argsort(d, kind="stable").astype(np.int32)
         self.roots, self.state, self.stack = np.zeros(n, np.int32), np.zeros(n, np.uint8), np.zeros(4 * n, np.int32)
@@ -425,7 +425,10 @@ class HopfLax(Facet):
                 break
 
     def arrange(self) -> cython.void:
-        """Order vertices topologically: each behind the corners that it has its distance from, but for circles."""
+        """Order vertices topologically: each behind the corners that it has its distance from, but for circles.
+
+        By the second order, vertices of a circle may lower each other for ever. After many visits they lose it.
+        """
         v: cython.int
         size: cython.int = self.p + 1
         n_done: cython.int = 0
@@ -445,9 +448,12 @@ class HopfLax(Facet):
                         if c == self.facet[v] % size:
                             continue
                         u: cython.int = self.corners[self.facet[v] // size, c]
-                        if self.state[u] == 0 and self.place[v, k] > 0.0:
-                            self.stack[n_open] = u
-                            n_open += 1
+                        if self.place[v, k] > 0.0:
+                            if self.state[u] == 0:
+                                self.stack[n_open] = u
+                                n_open += 1
+                            elif self.state[u] == 1 and self.n_visits[u] > MOST_VISITS:
+                                self.open_circle(u, n_open)
                         k += 1
                     continue
                 n_open -= 1
@@ -455,6 +461,17 @@ class HopfLax(Facet):
                     self.state[v] = 2
                     self.order[n_done] = v
                     n_done += 1
+
+    def open_circle(self, u: cython.int, n_open: cython.int) -> cython.void:
+        """Take the second order from vertices that depend on u and on which u depends: those open above it."""
+        w: cython.int = -1
+        while w != u:
+            n_open -= 1
+            w = self.stack[n_open]
+            if self.state[w] == 1 and self.n_visits[w] > MOST_VISITS:
+                self.is_linear[w] = True
+                self.is_sloped[w] = False
+                self.pending[w], self.n_visits[w] = INFINITY, 0
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it."""
@@ -643,7 +660,7 @@ class HopfLax(Facet):
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
         """The derivative of the length of v - x by the position of v, at the best place x."""
         v: cython.int = self.corners[s, c]
-        self.is_sloped[v] = self.length(self.share) > 0.0
+        self.is_sloped[v] = self.length(self.share) > 0.0 and not self.is_linear[v]
         for k in range(3):
             self.slope[v, k] = 0.0
             for i in range(self.p):
