@@ -1,18 +1,18 @@
-"""Ctrl-C in compiled loops: they hold no interpreter lock, and Python sees signals between its instructions only."""
+"""Interrupting compiled loops: these run without the interpreter, which handles signals only between instructions."""
 
 import threading
 
 import cython
 from cython.cimports.cpython.exc import PyErr_CheckSignals
 
-# What the handler of a signal raised, until the loop that asked has ended.
+# Exceptions of signal handlers, kept until the interrupted loop has ended.
 _caught = []
-# What tells a thread to end, see `obey`.
+# Holds the event that ends loops on a thread, see `obey`.
 _thread = threading.local()
 
 
 def is_interrupted() -> cython.bint:
-    """Whether a loop is to end: on the main thread if the handler of a signal has raised, on others as they `obey`."""
+    """Whether a loop must end: a signal handler has raised (main thread), or the event of `obey` is set (others)."""
     with cython.gil:
         try:
             PyErr_CheckSignals()
@@ -24,11 +24,11 @@ def is_interrupted() -> cython.bint:
 
 
 def obey(stop) -> None:
-    """Let loops on this thread end once an event is set."""
+    """End loops on this thread once `stop`, an event, is set."""
     _thread.stop = stop
 
 
 def raise_caught() -> None:
-    """Raise, on the main thread, what the handler of a signal raised in a loop that has ended since, if it did."""
+    """Raise the exception of a signal handler that interrupted a loop, if there is one, on the main thread."""
     if _caught and threading.current_thread() is threading.main_thread():
         raise _caught.pop()

@@ -15,9 +15,8 @@ from heat_igl.typing import ArrayLike, BoolArray, IntArray
 class MeshPart:
     """Some faces of a mesh of n vertices, made by `MeshPart.of`.
 
-    `mesh` has these faces, on all n vertices: what is not reached in the part is not reached in this mesh. `inside`
-    (n,) are the vertices of the part, and others may not be sources; `faces` (k,) are its faces among those of the
-    `whole` mesh (m, 3) or (m, 4).
+    `mesh` has the faces of the part and all n vertices. `inside` (n,) marks the vertices of the part; others may not
+    be sources. `faces` (k,) are the numbers of its faces in the `whole` mesh (m, 3) or (m, 4).
     """
 
     mesh: Mesh
@@ -27,10 +26,10 @@ class MeshPart:
 
     @classmethod
     def of(cls, mesh: object, region: ArrayLike) -> MeshPart:
-        """The part of a mesh that a mask selects: faces (m,), or those all of whose vertices (n,) it selects.
+        """The faces that a mask (m,) selects, or a mask (n,) of all their vertices.
 
-        Where n is m, the mask is of vertices. A MeshError if `mesh` is no `Mesh`, or `region` no such mask, or if it
-        selects no face.
+        If n equals m, the mask is of vertices. A MeshError if `mesh` is no `Mesh`, if `region` is no such
+        mask, or if it selects no face.
         """
         if not isinstance(mesh, Mesh):
             raise MeshError(

@@ -1,4 +1,4 @@
-"""Packages whose names are loaded on first use, so that a call imports the modules that it needs and no others."""
+"""Lazy loading: names of a package import their module on first use."""
 
 from __future__ import annotations
 
@@ -18,10 +18,9 @@ def attached(
 ) -> tuple[list[str], Callable[[str], object], Callable[[], list[str]]]:
     """`__all__`, `__getattr__` and `__dir__` of a package (PEP 562), from the stub beside its ``__init__.py``.
 
-    The stub ``__init__.pyi``, which type checkers read as well, is the one list of the package's names: a line
-    ``from module import name as name`` for each. No name may be that of another module of the package, which would
-    take its place once it is imported. The error for a name that is not there suggests what `other_words` has for it,
-    or one like it.
+    The stub ``__init__.pyi`` lists the names, a line ``from module import name as name`` for each, for type checkers
+    too. A name must differ from all other modules of the package: importing a module would replace it. The error for
+    an unknown name suggests its entry in `other_words`, or a similar name.
     """
     stub = Path(file).with_suffix(".pyi").read_text(encoding="utf8")
     homes = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as \2$", stub, re.MULTILINE)}

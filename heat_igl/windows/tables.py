@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -210,8 +210,7 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> Tables:
     once, kept = each_face_once(triangulation)
     edges, number, face = HalfEdges.of(once).numbered(once.n)
     if once is not triangulation:
-        merged = once.history[-1]
-        assert isinstance(merged, Merged)
+        merged = cast(Merged, once.history[-1])
         in_given = merged._replace(face=kept[merged.face])
         triangulation = replace(triangulation, history=(*triangulation.history, in_given))
     return Tables(edges, number, kept[face], triangulation=triangulation)

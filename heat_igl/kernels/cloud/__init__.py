@@ -1,7 +1,7 @@
 """From points to a surface, in the order in which `mesh.neighbourhoods` and `mesh.cloud_triangles` call these kernels.
 
-Every point has its k nearest ones, row by row, the point first; points are sorted by the leaves of a tree, so that
-neighbours are near in memory. All kernels take rows, or a range of them, and share no state.
+A row holds a point and its k nearest points. Points are sorted by the leaves of a tree, so that neighbours are near in
+memory. Kernels work on a range of rows and share no state.
 
 `nearest_points`
     The k nearest points of each place, by boxes around points that follow each other.
@@ -9,15 +9,14 @@ neighbours are near in memory. All kernels take rows, or a range of them, and sh
     The tangent plane of each neighbourhood by principal components, and the quadric through it, onto which noisy points
     are moved.
 `empty_balls`
-    Where a neighbourhood is far from flat, the neighbours on the same sheet: those that share an empty ball.
+    The neighbours on the same sheet, for neighbourhoods far from flat: those that share an empty ball with the point.
 `local_delaunay`
-    The Delaunay triangles around each point in its plane, its star: the hull of the inverted neighbours. These keep
-    their distances and the directions of their projections.
+    The star of each point: the Delaunay triangles around it in its tangent plane, from the convex hull of the inverted
+    neighbours. Neighbours are projected so that they keep their distances.
 `agreeing`
-    In how many stars of its corners a triangle is. Those in all three never overlap.
+    Counts the stars of its corners that contain a triangle. Triangles in all three stars never overlap.
 `fitting_triangles`
-    Of the other triangles, one after the other, those that overlap none before them at a corner.
+    Adds the other triangles one by one, if they overlap no triangle at a common corner.
 `loop_filling`
-    Ears cut from loops of outer edges, in space, where no tangent plane shows a gap; first those between the fans of a
-    point.
+    Fills gaps by cutting ears from loops of outer edges in space, first those between the fans of a point.
 """
