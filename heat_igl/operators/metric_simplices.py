@@ -41,8 +41,8 @@ class MetricSimplices:
     tensors : (m, 1, 3, 3) float64 or None
         A metric of each simplex, unless there are velocities.
     velocity : (m, p + 1, 6) float64 or None
-        The inverse root of a metric at each corner, linear in between; across a triangle it is 1. Of the symmetric
-        matrix the entries on and above the diagonal, row by row.
+        The inverse root of a metric at each corner, linear in between; across a triangle it is the mean in its plane.
+        Of the symmetric matrix the entries on and above the diagonal, row by row.
     is_given : bool
         Whether tensors, or positions without tensors, are those that the user gave in space: then distance has
         derivatives by them.
@@ -78,25 +78,21 @@ class MetricSimplices:
         if p == 2:
             axes = plane_axes(mesh)[:, None]
             inside = inverse_root(axes @ (g[mesh.F] if at_vertices else g[:, None]) @ np.swapaxes(axes, 2, 3))
-            W = np.swapaxes(axes, 2, 3) @ inside @ axes
             normal = np.cross(axes[..., 0, :], axes[..., 1, :])
             across = normal[..., None] * normal[..., None, :]
+            W = _with_normal(np.swapaxes(axes, 2, 3) @ inside @ axes, across)
         else:
             W = inverse_root(g)[:, None]
         velocity: FloatArray | None
         if at_vertices:
-            velocity = W[:, 0][:, *_ABOVE][mesh.F] if across is None else (W + across)[..., *_ABOVE]
+            velocity = W[:, 0][:, *_ABOVE][mesh.F] if across is None else W[..., *_ABOVE]
         else:
-            planes = None
-            if across is not None:
-                # As fast across a triangle as in the mean in its plane.
-                W += np.trace(W, axis1=2, axis2=3)[..., None, None] / 2 * across
-                planes = across[:, 0][:, *_ABOVE]
+            planes = None if across is None else across[:, 0][:, *_ABOVE]
             velocity, fitted = _at_corners(mesh, W[:, 0][:, *_ABOVE], planes)
             least = min(least, fitted)
             if velocity is not None and across is not None:
                 inside = (np.eye(3) - across) @ _symmetric(velocity) @ (np.eye(3) - across)
-                velocity = (inside + across)[..., *_ABOVE]
+                velocity = _with_normal(inside, across)[..., *_ABOVE]
         velocity = None if velocity is None else np.ascontiguousarray(velocity)
         tensors = g[:, None] if velocity is None else None
         is_given = at_vertices or (p == 3 and velocity is None)
@@ -183,6 +179,11 @@ def inverse_root(g: FloatArray) -> FloatArray:
     """The symmetric matrices g^(-1/2), for g (..., p, p)."""
     sizes, axes = np.linalg.eigh(g)
     return np.asarray((axes / np.sqrt(sizes)[..., None, :]) @ np.swapaxes(axes, -1, -2))
+
+
+def _with_normal(W: FloatArray, across: FloatArray) -> FloatArray:
+    """Velocities W (..., 3, 3) in the planes of triangles, as fast across as in the mean: trust in slopes asks it."""
+    return np.asarray(W + np.trace(W, axis1=-2, axis2=-1)[..., None, None] / 2 * across)
 
 
 def _symmetric(above: FloatArray) -> FloatArray:

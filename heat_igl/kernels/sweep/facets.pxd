@@ -31,9 +31,9 @@ cdef inline void invert(const double* W, double* into) noexcept nogil:
         into[k] *= per
 
 
-cdef inline double mean_velocity(const double* W, int p) noexcept nogil:
-    # Over directions; across a triangle, p = 2, it is 1.
-    return (W[0] + W[3] + W[5] - (3 - p)) / p
+cdef inline double mean_velocity(const double* W) noexcept nogil:
+    # Over directions; that across a triangle is the mean in its plane.
+    return (W[0] + W[3] + W[5]) / 3.0
 
 
 

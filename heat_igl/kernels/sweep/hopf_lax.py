@@ -165,10 +165,10 @@ def measured(
                     for k in range(6):
                         W[k] += at_corners[s, i, k] / size
                     for x in range(3):
-                        e[0][x] += gradient[s, i, x] * mean_velocity(cython.address(at_corners[s, i, 0]), size - 1)
+                        e[0][x] += gradient[s, i, x] * mean_velocity(cython.address(at_corners[s, i, 0]))
                 multiply(W, e[0], e[1])
                 growth[s] = sqrt(e[1][0] * e[1][0] + e[1][1] * e[1][1] + e[1][2] * e[1][2])
-                growth[s] /= mean_velocity(W, size - 1)
+                growth[s] /= mean_velocity(W)
     return widths, growths, gradients
 
 
@@ -548,7 +548,7 @@ class HopfLax(Facet):
             at: cython.int = c if i == 0 else self.side[i - 1]
             for k in range(6):
                 self.W[i][k] = self.velocity[s, at, k]
-            self.s[i] = mean_velocity(self.W[i], self.p)
+            self.s[i] = mean_velocity(self.W[i])
         for i in range(self.p):
             for k in range(3):
                 self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
