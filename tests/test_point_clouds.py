@@ -30,7 +30,6 @@ from heat_igl.mesh.cloud_orientation import is_oriented_manifold, oriented
 from heat_igl.mesh.cloud_triangles import (
     glued_sides,
     pinched_vertices,
-    points_at_gaps,
     with_gaps_filled,
 )
 from heat_igl.mesh.neighbourhoods import one_sheet, point_tree, without_noise
@@ -637,7 +636,7 @@ def test_loops_of_outer_edges_are_filled_in_space(angle, width, n_loops):
     half = np.deg2rad(angle / 2)
     P = np.stack([np.abs(x) * np.cos(half), y, x * np.sin(half)], axis=1)
     F = mesh.F[~(np.hypot(x, y) < width * spacing)[mesh.F].any(axis=1)].astype(np.int32)
-    filled = with_gaps_filled(P, F, np.full(len(P), 3.1 * spacing), points_at_gaps(F, len(P)))
+    filled = with_gaps_filled(P, F, np.full(len(P), 3.1 * spacing))[0]
     assert heat_igl.Mesh(P, F).report().n_boundary_loops == 2
     assert heat_igl.Mesh(P, filled).report().n_boundary_loops == n_loops
     assert is_oriented_manifold(heat_igl.Mesh(P, filled))
@@ -647,7 +646,7 @@ def test_the_border_of_a_small_piece_is_no_gap():
     ball = heat_igl.shapes.icosphere(2)
     F = ball.F[(ball.V[:, 2] > 0.5)[ball.F].all(axis=1)].astype(np.int32)
     n = ball.n_vertices
-    filled = with_gaps_filled(ball.V, F, np.full(n, 10.0), points_at_gaps(F, n))
+    filled = with_gaps_filled(ball.V, F, np.full(n, 10.0))[0]
     np.testing.assert_array_equal(np.unique(filled, axis=0), np.unique(F, axis=0))
 
 
@@ -694,7 +693,7 @@ def test_fans_that_meet_in_a_point_are_joined(seed):
     pinched = pinched_vertices(F, n, glued_sides(F, n))
     np.testing.assert_array_equal(pinched, heat_igl.Mesh(V, F).report().nonmanifold_vertices)
     # Nothing else is near enough to be filled.
-    joined = with_gaps_filled(V, F, np.zeros(n), points_at_gaps(F, n))
+    joined = with_gaps_filled(V, F, np.zeros(n))[0]
     found = heat_igl.Mesh(V, joined).report()
     assert len(found.nonmanifold_vertices) < 0.1 * len(pinched)
     assert len(found.nonmanifold_edges) == 0
@@ -744,7 +743,7 @@ def test_principal_axes():
     P = np.random.default_rng(0).uniform(-1, 1, (41, 3)) * [1, 0.8, 0.2]
     index = np.argsort(np.linalg.norm(P - P[0], axis=1)).astype(np.int32)[None]
     square = np.square(P[index[0]] - P[0]).sum(axis=1)[None]
-    axes, _, bend = tangent_planes(P, index)
+    axes, bend = tangent_planes(P, index)
     weights = np.maximum(1 - square[0] / square[0, -1], 1e-3)
     expected, vectors = np.linalg.eigh(
         np.cov((P[index[0]] - P[0]).T / np.sqrt(square[0, -1]), aweights=weights, ddof=0)
@@ -831,7 +830,7 @@ def test_two_fans_are_joined_where_they_are_nearest():
     """Two squares with a corner in common: its neighbours are 1.33 apart on one side, and 1.56 on the other."""
     P = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1.5, 1.2, 0.3], [2, 2, 0], [1.2, 2, 0]], float)
     F = np.array([[0, 1, 2], [0, 2, 3], [2, 4, 5], [2, 5, 6]], np.int32)
-    joined = with_gaps_filled(P, F, np.zeros(7), points_at_gaps(F, 7))
+    joined = with_gaps_filled(P, F, np.zeros(7))[0]
     np.testing.assert_array_equal(joined[:4], F)
     assert np.sort(joined[4:], axis=1).tolist() == [[1, 2, 4]]
 
@@ -843,7 +842,7 @@ def test_beside_a_closed_fan_triangles_stay_only_where_they_are_the_connection()
     for F, expected in ((hexagon + flap + link, hexagon + link), (hexagon + flap, hexagon + flap)):
         given = np.array(F, np.int32)
         np.testing.assert_array_equal(pinched_vertices(given, 9, glued_sides(given, 9)), [0])
-        np.testing.assert_array_equal(with_gaps_filled(P, given, np.zeros(9), points_at_gaps(given, 9)), expected)
+        np.testing.assert_array_equal(with_gaps_filled(P, given, np.zeros(9))[0], expected)
 
 
 def test_edges_of_triangles_that_are_given_up_are_free_again():
@@ -851,14 +850,14 @@ def test_edges_of_triangles_that_are_given_up_are_free_again():
     P = np.zeros((13, 3))
     P[:9, :2] = [[0, 0], [1, -1], [2, 0], [2, 5], [0, 5], [-1, -1], [-2, 0], [-2, 5], [-1, 5]]
     P[9:] = [[2, 0, 1.5], [0, 0, 1.5], [-1, -5, 0], [0, 9, 0]]
-    loops, following = np.array([[0, 1, 2, 3, 4], [0, 5, 6, 7, 8]]), np.array([1, 2, 3, 4, 0, 6, 7, 8, 9, 5])
-    ends = np.stack([np.roll(loops, -1, axis=1).ravel(), loops.ravel()], axis=1).astype(np.int32)
-    opposite = np.array([9, 10, 12, 12, 12, 11, 11, 12, 12, 12], np.int32)
-    partner = np.full(20, -1)
-    partner[::2] = 2 * following + 1
+    loops = np.array([[0, 1, 2, 3, 4], [0, 5, 6, 7, 8]])
+    F = np.stack([[9, 10, 12, 12, 12, 11, 11, 12, 12, 12], np.roll(loops, -1, axis=1).ravel(), loops.ravel()], axis=1)
+    # Two triangles on each other have the edges of the ears at the common point, which cannot be cut then.
+    F = np.concatenate([F, [[9, 1, 4], [9, 1, 4], [9, 5, 8], [9, 5, 8]]]).astype(np.int32)
+    twin, of_next = np.full(F.size, -1, np.int32), 3 * np.roll(np.arange(10), -1) + 1
+    twin[2:30:3], twin[of_next], twin[30:] = of_next, range(2, 30, 3), [33, 34, 35, 30, 31, 32, 39, 40, 41, 36, 37, 38]
     largest = np.where(np.isin(np.arange(13), [3, 4, 7, 8]), 0.0, 10.0)
-    joints = np.zeros(13, np.int32)
-    filled, is_whole = filling_triangles(P, ends, opposite, partner, joints, largest, ends, -0.1, 0.99)
+    filled, is_whole = filling_triangles(P, F, twin, np.arange(13) < 9, largest, -0.1, 0.99)
     assert (filled.tolist(), is_whole.tolist()) == ([[0, 5, 6]], [False])
 
 
@@ -868,7 +867,7 @@ def test_several_fans_of_a_point_are_joined_in_one_round(seed):
     angle = np.sort(np.random.default_rng(seed).random(10)) * 2 * np.pi
     rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(10)], axis=1)
     P, F = np.concatenate([[[0, 0, 0]], rim]), np.array([[0, i, i + 1] for i in range(1, 10, 2)], np.int32)
-    joined = with_gaps_filled(P, F, np.zeros(11), points_at_gaps(F, 11))
+    joined = with_gaps_filled(P, F, np.zeros(11))[0]
     assert len(joined) == 9
     assert is_a_surface(joined, 11)
     assert is_oriented_manifold(heat_igl.Mesh(P, joined))

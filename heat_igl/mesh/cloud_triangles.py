@@ -10,18 +10,16 @@ points of parts that are too small for a surface are inserted into the nearest t
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from heat_igl.kernels.cloud.agreeing import agreement
 from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
-from heat_igl.kernels.cloud.loop_filling import filling_triangles
+from heat_igl.kernels.cloud.loop_filling import filling_triangles, torn_points
 from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.connectivity import ascending_rows, connected_components, group_by_label
-from heat_igl.mesh.neighbourhoods import K, Neighbourhoods, PointTree
-from heat_igl.runtime import over_rows
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.mesh.neighbourhoods import K, Neighbourhoods, PointTree, by_rows
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 # Largest radius of a circumscribed circle, in shares of the radius of the neighbourhood. Below one half, all points
 # inside the circle are known; a little more bridges the gaps of random points.
@@ -29,8 +27,6 @@ _LARGEST_RADIUS = 0.6
 # The same for gaps, in shares of the distance of the farthest neighbour: larger, since the sides of a gap are known to
 # belong to the surface.
 _LARGEST_GAP = 0.9
-# Points whose stars are found at a time.
-_BLOCK = 1 << 14
 # Sides, those of neighbours on them, and whether both run alike.
 GluedSides = tuple[IntArray, IntArray, BoolArray]
 # Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge.
@@ -87,16 +83,15 @@ def with_gaps_closed(
     apart : (a,) int64
         Points that neither the stars nor the gaps join to the largest part.
     """
-    P, n = tree.P, len(tree.P)
-    is_gap = points_at_gaps(F, n)
-    F = with_gaps_filled(P, F, near.reach, is_gap)
-    part = connected_components(F, n)
+    P = tree.P
+    F, is_gap = with_gaps_filled(P, F, near.reach)
+    part = connected_components(F, len(P))
     size = np.bincount(part)
     is_apart, is_part = part != np.argmax(size), (size > K)[part]
     # Stars are flat: there is more only where triangles came after them.
     is_doubtful = is_gap & (_angles(P, F[at_some_corner(is_gap, F)]) > _CROWDED)
     at_gap = np.flatnonzero(is_gap & is_part & (near.index[:, -1] < 0))
-    is_doubtful[_torn_points(F, tree.neighbours[0][at_gap, : _NEAREST + 1], is_part)] = True
+    is_doubtful[torn_points(F, tree.neighbours[0][at_gap, : _NEAREST + 1], is_part, _EDGES_AWAY)] = True
     others = np.flatnonzero(is_apart & is_part)
     if len(others):
         beside, distance = _nearest_of(tree, others, ~is_apart)
@@ -104,33 +99,6 @@ def with_gaps_closed(
         is_doubtful[others] |= (distance <= near.reach[beside]) & ~(is_other_sheet & has_side[others])
     F = _with_small_parts(tree, F, part, size)
     return F, np.flatnonzero(is_doubtful), np.flatnonzero(is_apart)
-
-
-def _torn_points(F: IntArray, nearest: IntArray, is_part: BoolArray) -> IntArray:
-    """Of the first points of the rows `nearest` (k, j), those from which one of the others is many edges away.
-
-    Beside another sheet, that is where a thin part is torn. Only others that belong to a part (n,) count.
-    """
-    # Triangles at most two edges from these points, which hold all shorter ways between two of them.
-    n, is_near = len(is_part), np.zeros(len(is_part), bool)
-    is_near[nearest] = True
-    is_near[F[at_some_corner(is_near, F)]] = True
-    a, b, c = F[at_some_corner(is_near, F)].T
-    ends = np.concatenate([a, b, c, b, c, a]), np.concatenate([b, c, a, a, b, c])
-    edges = sp.csr_array((np.ones(len(ends[0]), bool), ends), shape=(n, n))
-    points, others = nearest[:, 0], nearest[:, 1:].ravel()
-    row = np.repeat(np.arange(len(points)), nearest.shape[1] - 1)[is_part[others]]
-    others = others[is_part[others]]
-    reached = sp.csr_array((np.ones(len(points), bool), (np.arange(len(points)), points)), shape=(len(points), n))
-    for _ in range(_EDGES_AWAY):
-        rows, row = np.unique(row, return_inverse=True)
-        if not len(rows):
-            break
-        points, reached = points[rows], reached[rows]
-        reached = reached + reached @ edges
-        is_far = ~np.asarray(reached[row, others])
-        row, others = row[is_far], others[is_far]
-    return np.asarray(points[np.unique(row)])
 
 
 def _angles(P: FloatArray, F: IntArray) -> FloatArray:
@@ -149,22 +117,11 @@ def _triangles_of_stars(
     Also returns which points (n,) are settled: all around them there are triangles in three stars.
     """
     largest = _LARGEST_RADIUS * near.radius
-
-    def stars_of(rows: slice) -> tuple[IntArray, IntArray, IntArray]:
-        corners, sizes, is_closed = delaunay_stars(
-            P, near.axes, near.index, largest, least_cosine, rows.start, rows.stop
-        )
-        return corners, sizes, is_closed
-
-    corners, sizes, is_closed = map(np.concatenate, zip(*over_rows(stars_of, len(P), _BLOCK), strict=True))
-    first = np.zeros(len(P) + 1, np.int64)
-    np.cumsum(sizes, out=first[1:])
-
-    def agreement_of(rows: slice) -> tuple[IntArray, IntArray]:
-        count, is_settled = agreement(first, corners, is_closed, rows.start, rows.stop)
-        return count, is_settled
-
-    count, is_settled = map(np.concatenate, zip(*over_rows(agreement_of, len(P), _BLOCK), strict=True))
+    corners, sizes, is_closed = by_rows(
+        lambda rows: delaunay_stars(P, near.axes, near.index, largest, least_cosine, rows.start, rows.stop), len(P)
+    )
+    first = np.append(0, np.cumsum(sizes, dtype=np.int64))
+    count, is_settled = by_rows(lambda rows: agreement(first, corners, is_closed, rows.start, rows.stop), len(P))
     others = np.flatnonzero((count == 1) | (count == 2))
     rows = ascending_rows(corners[others])
     a, b, c = P[rows.T]
@@ -263,17 +220,12 @@ def glued_sides(F: IntArray, n: int) -> GluedSides:
     return first, twin[first].astype(np.int64), is_aligned[first] == 0
 
 
-def outer_sides(F: IntArray, n: int) -> IntArray:
-    """The sides 3 f + c (k,) of the triangles F (m, 3), on n points, without a neighbour."""
-    return np.flatnonzero(glue(F.astype(np.int64), np.zeros((n, 3)), 1.0)[1] < 0)
-
-
 def corner(sides: IntArray, turn: int | IntArray) -> IntArray:
     """The corner 3 f + c at the beginning, for 1, or the end, for 2, of sides, which are opposite to corner c."""
     return sides - sides % 3 + (sides + turn) % 3
 
 
-def with_gaps_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_gap: BoolArray) -> IntArray:
+def with_gaps_filled(P: FloatArray, F: IntArray, reach: FloatArray) -> tuple[IntArray, BoolArray]:
     """The triangles F (m, 3) int32, and others between fans of a point and in the loops of outer edges.
 
     Two parts of a surface that meet in one vertex alone are connected for distance, but not for vectors, which need a
@@ -288,96 +240,40 @@ def with_gaps_filled(P: FloatArray, F: IntArray, reach: FloatArray, is_gap: Bool
         Triangles that are a surface, oriented alike if it has two sides.
     reach : (n,) float64
         See `Neighbourhoods`.
+
+    Returns
+    -------
+    F : (k, 3) int32
     is_gap : (n,) bool
-        The points at gaps, see `points_at_gaps`.
+        The points on outer edges of the given triangles.
     """
     n = len(P)
-    is_around = at_some_corner(is_gap, F)
-    around, inside = F[is_around], F[~is_around]
-    sides, ends, partner, joints = _loops(P, around, is_gap)
-    edges = around[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    filled, is_whole = filling_triangles(
-        P,
-        ends,
-        around.ravel()[sides],
-        partner,
-        joints,
-        _LARGEST_GAP * reach,
-        edges[is_gap[edges].all(axis=1)],
-        _RIGHT_ANGLE,
-        _MOST_FOLDED,
-    )
+    vertex, twin, *_ = glue(F.astype(np.int64), np.zeros((n, 3)), 1.0)
+    sides, is_gap = np.flatnonzero(twin < 0), np.zeros(n, bool)
+    is_gap[vertex[corner(sides, 1)]] = is_gap[vertex[corner(sides, 2)]] = True
+    filled, is_whole = filling_triangles(P, F, twin, is_gap, _LARGEST_GAP * reach, _RIGHT_ANGLE, _MOST_FOLDED)
     part = connected_components(F, n)
     sizes, gains = (np.bincount(part[of[:, 0]], minlength=n) for of in (F, filled[is_whole]))
     filled = filled[~is_whole | (sizes >= _PER_FILLED * gains)[part[filled[:, 0]]]]
-    return _with_largest_fans(inside, np.concatenate([around, filled]), is_gap)
+    return _with_largest_fans(np.concatenate([F, filled]), is_gap), is_gap
 
 
-def points_at_gaps(F: IntArray, n: int) -> BoolArray:
-    """Which of n points lie on outer edges of the triangles F (m, 3)."""
-    vertex, twin, *_ = glue(F.astype(np.int64), np.zeros((n, 3)), 1.0)
-    sides = np.flatnonzero(twin < 0)
-    is_gap = np.zeros(n, bool)
-    is_gap[vertex[corner(sides, 1)]] = is_gap[vertex[corner(sides, 2)]] = True
-    return is_gap
-
-
-def _loops(P: FloatArray, F: IntArray, is_gap: BoolArray) -> tuple[IntArray, IntArray, IntArray, AnyArray]:
-    """Outer sides (k,) of the triangles F (m, 3) around gaps, and what `filling_triangles` takes of their loops.
-
-    These are the points (k, 2) at their ends, the partner (2 k,) of each end, and the number of further fans (n,).
-    """
-    first, second, _ = glued = glued_sides(F, len(P))
-    is_outer = np.ones(F.size, bool)
-    is_outer[first] = is_outer[second] = False
-    corners = F.ravel()
-    sides = np.flatnonzero(is_outer)
-    sides = sides[is_gap[corners[corner(sides, 1)]] & is_gap[corners[corner(sides, 2)]]]
-    at = np.stack([corner(sides, 1), corner(sides, 2)], axis=1)
-    ends, partner = corners[at], np.full(2 * len(sides), -1)
-    # A fan with an end has two: the side that begins at the point, which is even, and the one that ends there.
-    fans = np.argsort(_fans(F, glued)[at].ravel(), kind="stable").reshape(-1, 2)
-    fans = np.where(fans[:, :1] % 2 == 1, fans[:, ::-1], fans)
-    partner[fans] = fans[:, ::-1]
-    fans = fans[(fans % 2 == [0, 1]).all(axis=1)]
-    vertex = ends.ravel()[fans[:, 0]]
-    joints = np.maximum(np.bincount(vertex, minlength=len(P)) - 1, 0).astype(np.int32)
-    order = np.flatnonzero(joints[vertex])
-    order = order[np.argsort(vertex[order], kind="stable")]
-    for group in np.split(fans[order], np.flatnonzero(np.diff(vertex[order])) + 1) if len(order) else ():
-        begins, stops = (P[ends.ravel()[group[:, c] ^ 1]] for c in (0, 1))
-        following = group[_one_round(np.square(begins[:, None] - stops).sum(axis=2)), 1]
-        partner[group[:, 0]], partner[following] = following, group[:, 0]
-    return sides, ends, partner, joints
-
-
-def _one_round(cost: FloatArray) -> IntArray:
-    """What follows on each of k elements in a single round of all, the step (k, k) of lowest cost first."""
-    k = len(cost)
-    if k == 2:
-        return np.array([1, 0])
-    following, chain, is_followed = np.full(k, -1), np.arange(k), np.zeros(k, bool)
-    for step in np.argsort(cost, axis=None).tolist():
-        i, j = divmod(step, k)
-        is_last = np.count_nonzero(is_followed) == k - 1
-        if following[i] < 0 and not is_followed[j] and (chain[i] != chain[j] or is_last):
-            following[i], is_followed[j] = j, True
-            chain[chain == chain[j]] = chain[i]
-    return following
-
-
-def _with_largest_fans(inside: IntArray, around: IntArray, is_gap: BoolArray) -> IntArray:
-    """The triangles (m, 3), those around gaps last, but in the smaller ones of several fans at points (n,) of gaps.
+def _with_largest_fans(F: IntArray, is_gap: BoolArray) -> IntArray:
+    """The triangles F (m, 3), those around gaps last, but in the smaller ones of several fans at points (n,) of gaps.
 
     A triangle stays if parts or points would be cut off.
     """
-    n = len(is_gap)
+    n, inside = len(is_gap), F[:0]
     while True:
+        is_around = at_some_corner(is_gap, F)
+        inside, around = np.concatenate([inside, F[~is_around]]), F[is_around]
         fan, vertex = _fans(around, glued_sides(around, n)), around.ravel()
-        order = np.lexsort((-fan, np.bincount(fan)[fan], vertex))
-        largest = np.empty(n, np.int64)
+        size = np.bincount(fan)
+        of_fan, largest = np.empty(len(size), np.int64), np.empty(n, np.int64)
+        of_fan[fan] = vertex
         # Of several values written to one place, the last stays.
-        largest[vertex[order]] = fan[order]
+        order = np.lexsort((-np.arange(len(size)), size))
+        largest[of_fan[order]] = order
         stays = ((fan == largest[vertex]) | ~is_gap[vertex]).reshape(-1, 3).all(axis=1)
         if not stays.all():
             part = connected_components(np.concatenate([inside, around[stays]]), n)[around]
@@ -385,8 +281,5 @@ def _with_largest_fans(inside: IntArray, around: IntArray, is_gap: BoolArray) ->
         if stays.all():
             return np.concatenate([inside, around])
         # What is left of a fan may be several.
-        is_gap = np.zeros(n, bool)
+        F, is_gap = around[stays], np.zeros(n, bool)
         is_gap[around[~stays]] = True
-        around = around[stays]
-        is_around = at_some_corner(is_gap, around)
-        inside, around = np.concatenate([inside, around[~is_around]]), around[is_around]

@@ -79,8 +79,7 @@ class PointTree:
     def neighbours_of(self, chosen: slice | IntArray, k: int) -> tuple[AnyArray, FloatArray]:
         """The k nearest other points (b, k + 1) int32 of some, after the point itself, and the distance (b,)."""
         points = np.arange(len(self.P))[chosen]
-        blocks = over_rows(lambda rows: self.nearest(self.P[points[rows]], k + 1), len(points), _BLOCK)
-        index, distance = map(np.concatenate, zip(*blocks, strict=True))
+        index, distance = by_rows(lambda rows: self.nearest(self.P[points[rows]], k + 1), len(points))
         # Squares of distances may underflow, and then others are as near as the point itself.
         index[:, 0] = points
         return index, distance
@@ -89,10 +88,6 @@ class PointTree:
         """The k points (b, k) int32 nearest to places (b, 3), and the distance (b,) of the last."""
         index, distance = nearest_points(self.P, self.boxes, places, k)
         return index, distance
-
-    def moved(self, P: FloatArray) -> PointTree:
-        """The same points, in the same order, at other positions (n, 3)."""
-        return PointTree(P, self.order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,11 +131,10 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighb
     P, (index, reach) = tree.P, tree.neighbours
     if normals is not None:
         return Neighbourhoods(index, reach, reach, _axes_along(normals))
-    blocks = over_rows(lambda rows: tangent_planes(P, index[rows]), len(P), _BLOCK)
-    axes, radius, bend = map(np.concatenate, zip(*blocks, strict=True))
-    bent = np.flatnonzero(bend > _SEVERAL_SHEETS)
+    axes, bend = by_rows(lambda rows: tangent_planes(P, index[rows]), len(P))
+    radius, bent = reach, np.flatnonzero(bend > _SEVERAL_SHEETS)
     if len(bent):
-        index = index.copy()
+        index, radius = index.copy(), reach.copy()
         index[bent], radius[bent], axes[bent] = one_sheet(P, index[bent], axes[bent])
     return Neighbourhoods(index, radius, reach, axes)
 
@@ -174,18 +168,8 @@ def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[In
     directions = np.ascontiguousarray(_directions(_DIRECTIONS).T, np.float32)
     number = np.full(len(P), -1, np.int32)
     number[index[:, 0]] = np.arange(len(index))
-
-    def balls(rows: slice) -> tuple[FloatArray, FloatArray]:
-        normals, radii = roomiest_normals(P, index[rows], principal[rows], directions)
-        return normals, radii
-
-    normals, radii = map(np.concatenate, zip(*over_rows(balls, len(index), _BLOCK), strict=True))
-
-    def seen(rows: slice) -> tuple[IntArray, FloatArray]:
-        kept, radius = on_one_side(P, index[rows], number, normals, radii)
-        return kept, radius
-
-    found, radius = map(np.concatenate, zip(*over_rows(seen, len(index), _BLOCK), strict=True))
+    normals, radii = by_rows(lambda rows: roomiest_normals(P, index[rows], principal[rows], directions), len(index))
+    found, radius = by_rows(lambda rows: on_one_side(P, index[rows], number, normals, radii), len(index))
     return found, radius, _axes_along(normals)
 
 
@@ -221,42 +205,40 @@ def without_noise(tree: PointTree) -> PointTree:
     n = len(tree.P)
     if n <= 4 * K:
         return tree
-    sample = np.unique(np.linspace(0, n - 1, _SAMPLE).astype(np.int64))
+    # Evenly over the points, the first and the last among them.
+    sample = np.arange(min(n, _SAMPLE)) * (n - 1) // (min(n, _SAMPLE) - 1)
 
-    def of_sample(k: int, stride: int = 1) -> tuple[float, float]:
-        """Medians of the noise and of the thickness."""
-        _, noise, thickness = _onto_quadrics(tree.P, _nearest(tree, sample, k, stride))
-        return float(np.median(noise)), float(np.median(thickness))
+    def noise(k: int) -> float:
+        return float(np.median(_onto_quadrics(tree.P, _nearest(tree, sample, k))[1]))
 
-    few, of_few = of_sample(K // 2)
+    few = noise(K // 2)
     if few < _NOISE:
         return tree
-    noise, thickness = of_sample(K)
-    if few < noise * (_NOISE_NOT_DETAIL if of_few <= _NO_DISC else _THICK_NOISE_NOT_DETAIL):
+    is_disc = _thickness(tree, _nearest(tree, sample, K // 2)) <= _NO_DISC
+    if few < noise(K) * (_NOISE_NOT_DETAIL if is_disc else _THICK_NOISE_NOT_DETAIL):
         return tree
     moved = tree
-    for k, stride in _spreads(of_sample, {K // 2: of_few, K: thickness}, n):
+    for k, stride in _spreads(tree, sample):
         index = _nearest(moved, np.arange(n), k, stride)
         for _ in range(_PASSES):
-            moved = moved.moved(_onto_quadrics(moved.P, index)[0])
+            moved = PointTree(_onto_quadrics(moved.P, index)[0], tree.order)
     return moved
 
 
-def _spreads(
-    of_sample: Callable[[int, int], tuple[float, float]], found: dict[int, float], n: int
-) -> list[tuple[int, int]]:
-    """How many neighbours, and among every how many-th of n points, in the order in which they are taken.
+def _spreads(tree: PointTree, sample: IntArray) -> list[tuple[int, int]]:
+    """How many neighbours, and among every how many-th of the points, in the order in which they are taken.
 
-    As many as are flattest: more than `K` where noise thickens these, and fewer where the surface bends. Where as many
-    as are taken show no surface at all, they are taken among fewer points first. `found` has the thickness of
-    neighbourhoods of so many points.
+    As many as are flattest at the points of `sample`: more than `K` where noise thickens these, and fewer where the
+    surface bends. Where as many as are taken show no surface at all, they are taken among fewer points first.
     """
+    n = len(tree.P)
     k, stride, most = K, 1, min(_LARGEST_K, n // 4)
-    thickness = found[k]
+    found = {k: _thickness(tree, _nearest(tree, sample, k)) for k in (K // 2, K)}
+    thickness = found[K]
+    near = _nearest(tree, sample, most if thickness > _THICKNESS else K)
     while thickness > _THICKNESS and k < most:
         k = min(2 * k, most)
-        _, thickness = of_sample(k, 1)
-        found[k] = thickness
+        found[k] = thickness = _thickness(tree, near[:, : k + 1].copy())
     flattest = min(found, key=found.__getitem__)
     if found[flattest] <= _NO_SURFACE:
         if found[flattest] > _NO_DISC and flattest != k:
@@ -269,8 +251,13 @@ def _spreads(
         return [(flattest, 1)]
     while thickness > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
         stride *= 4
-        _, thickness = of_sample(k, stride)
+        thickness = _thickness(tree, _nearest(tree, sample, k, stride))
     return [(k, stride), (k, 1)]
+
+
+def _thickness(tree: PointTree, index: AnyArray) -> float:
+    """The median ratio of the two smaller variances of neighbourhoods, rows of `index` (b, k + 1)."""
+    return float(np.median(tangent_planes(tree.P, index)[1]))
 
 
 def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyArray:
@@ -278,29 +265,23 @@ def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyA
     if stride == 1:
         return tree.neighbours[0][chosen, : k + 1] if k <= K else tree.neighbours_of(chosen, k)[0]
     fewer = PointTree(np.ascontiguousarray(tree.P[::stride]), tree.order[::stride])
-
-    def fill(rows: slice) -> AnyArray:
-        near: AnyArray = stride * fewer.nearest(tree.P[chosen[rows]], k + 1)[0]
-        # The point itself comes first: if it is not among them, in place of the farthest.
-        is_other = near[:, 0] != chosen[rows]
-        near[is_other, 1:] = near[is_other, :-1]
-        near[:, 0] = chosen[rows]
-        return near
-
-    return np.concatenate(over_rows(fill, len(chosen), _BLOCK))
+    near: AnyArray = stride * by_rows(lambda rows: fewer.nearest(tree.P[chosen[rows]], k + 1), len(chosen))[0]
+    # The point itself comes first: if it is not among them, in place of the farthest.
+    is_other = near[:, 0] != chosen
+    near[is_other, 1:] = near[is_other, :-1]
+    near[:, 0] = chosen
+    return near
 
 
-def _onto_quadrics(P: FloatArray, index: AnyArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points (b, 3), moved onto quadrics that are fitted to their neighbours.
+def _onto_quadrics(P: FloatArray, index: AnyArray) -> tuple[FloatArray, FloatArray]:
+    """Points (b, 3), moved onto quadrics fitted to their neighbours, and the noise (b,) in shares of the spacing.
 
-    In each row of `index` (b, k + 1), the point comes first. Also returns the noise (b,) in shares of the spacing, and
-    the ratio (b,) of the two smaller variances.
+    In each row of `index` (b, k + 1), the point comes first.
     """
-    b, k = len(index), index.shape[1] - 1
-    moved, noise, thickness = np.empty((b, 3)), np.empty(b), np.empty(b)
+    moved, noise = by_rows(lambda rows: onto_quadrics(P, index[rows]), len(index))
+    return moved, noise * np.sqrt((index.shape[1] - 1) / np.pi)
 
-    def fill(rows: slice) -> None:
-        moved[rows], noise[rows], thickness[rows] = onto_quadrics(P, index[rows])
 
-    over_rows(fill, b, _BLOCK)
-    return moved, noise * np.sqrt(k / np.pi), thickness
+def by_rows(work: Callable[[slice], tuple[AnyArray, ...]], n: int) -> tuple[AnyArray, ...]:
+    """The arrays that `work` returns for slices of n rows, one after the other."""
+    return tuple(map(np.concatenate, zip(*over_rows(work, n, _BLOCK), strict=True)))

@@ -99,7 +99,7 @@ def side_by_side(work: Callable[[Item], Any], items: Sequence[Item]) -> None:
 def over_rows(work: Callable[[slice], Result], n: int, most: int) -> list[Result]:
     """The results of `work` on slices of at most `most` rows that make up n rows, in order, on all processors."""
     threads = n_threads()
-    size = max(min(most, -(-n // (_BLOCKS_PER_THREAD * threads))), 1)
+    size = max(min(most, -(-n // (_BLOCKS_PER_THREAD * threads)) if threads > 1 else n), 1)
     slices = [slice(begin, min(begin + size, n)) for begin in range(0, n, size)]
     waiting = deque(range(len(slices)))
     results: dict[int, Result] = {}

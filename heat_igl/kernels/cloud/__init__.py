@@ -18,5 +18,6 @@ memory. Kernels work on a range of rows and share no state.
 `fitting_triangles`
     Adds the other triangles one by one, if they overlap no triangle at a common corner.
 `loop_filling`
-    Fills gaps by cutting ears from loops of outer edges in space, first those between the fans of a point.
+    Fills gaps by cutting ears from loops of outer edges in space, first those between the fans of a point; says where
+    one of the nearest points is many edges away.
 """

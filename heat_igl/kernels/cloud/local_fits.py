@@ -20,23 +20,20 @@ def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[c
     -------
     axes : (b, 3, 3) float64
         Directions of most, less and least variance in rows, orthonormal.
-    radius : (b,) float64
-        Distance of the farthest neighbour.
     bend : (b,) float64
         Ratio of the two smaller variances.
     """
-    found, radii, bends = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0]), np.empty(index.shape[0])
+    found, bends = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0])
     bend: cython.double[::1] = bends
     axes: cython.double[:, :, ::1] = found
-    radius: cython.double[::1] = radii
     variances: cython.double[::1] = np.empty(3)
     work: cython.double[:, ::1] = np.empty((6, 3))
     local: cython.double[:, ::1] = np.empty((index.shape[1], 4))
     with cython.nogil:
         for row in range(index.shape[0]):
-            radius[row] = _principal_axes(P, index[row], local, work, axes[row], variances)
+            _principal_axes(P, index[row], local, work, axes[row], variances)
             bend[row] = variances[0] / max(variances[1], TINY)
-    return found, radii, bends
+    return found, bends
 
 
 def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][:, ::1]):
@@ -55,15 +52,12 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
         The new positions.
     deviation : (b,) float64
         Standard deviation of the neighbours from the quadric, in radii of the neighbourhood.
-    thickness : (b,) float64
-        Ratio of the two smaller variances of the neighbours.
     """
     b: cython.Py_ssize_t = index.shape[0]
     k: cython.Py_ssize_t = index.shape[1]
-    positions, deviations, ratios = np.empty((b, 3)), np.empty(b), np.empty(b)
+    positions, deviations = np.empty((b, 3)), np.empty(b)
     moved: cython.double[:, ::1] = positions
     deviation: cython.double[::1] = deviations
-    thickness: cython.double[::1] = ratios
     local: cython.double[:, ::1] = np.empty((k, 4))
     system: cython.double[:, ::1] = np.empty((6, 7))
     work: cython.double[:, ::1] = np.empty((6, 3))
@@ -82,10 +76,9 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
                 system[x, x] += DIAGONAL * k
             _eliminate(system)
             deviation[row] = sqrt(_weighted_squares(local, system) / (total * freedom))
-            thickness[row] = variances[0] / max(variances[1], TINY)
             for x in range(3):
                 moved[row, x] = P[index[row, 0], x] + radius * system[0, 6] * axes[2, x]
-    return positions, deviations, ratios
+    return positions, deviations
 
 
 @cython.cfunc

@@ -6,18 +6,62 @@ from cython.cimports.heat_igl.kernels.cloud.loop_filling import BEYOND, POINT
 from cython.cimports.libc.math import INFINITY, sqrt
 
 
+def torn_points(
+    F: cython.const[cython.int][:, ::1],
+    nearest: cython.const[cython.int][:, ::1],
+    is_part: cython.const[cython.uchar][::1],
+    edges_away: cython.Py_ssize_t,
+):
+    """Of the first points of the rows `nearest` (k, j), those from which one of the others is many edges away.
+
+    Beside another sheet, that is where a thin part is torn. Others that are in no part (n,) do not count.
+    """
+    n: cython.Py_ssize_t = is_part.shape[0]
+    torn = np.zeros(nearest.shape[0], np.bool_)
+    is_torn: cython.uchar[::1] = torn.view(np.uint8)
+    # The triangles at each point, one after the other, and the last row from which it was reached.
+    head: cython.int[::1] = np.full(n, -1, np.int32)
+    following: cython.int[:, ::1] = np.empty((F.shape[0], 3), np.int32)
+    row_of: cython.int[::1] = np.full(n, -1, np.int32)
+    reached: cython.int[::1] = np.empty(n, np.int32)
+    with cython.nogil:
+        for f in range(F.shape[0]):
+            for c in range(3):
+                following[f, c], head[F[f, c]] = head[F[f, c]], 3 * f + c
+        for row in range(nearest.shape[0]):
+            reached[0], row_of[nearest[row, 0]] = nearest[row, 0], row
+            begin: cython.Py_ssize_t = 0
+            end: cython.Py_ssize_t = 1
+            for step in range(edges_away + 1):
+                is_torn[row] = 0
+                for j in range(1, nearest.shape[1]):
+                    is_torn[row] |= row_of[nearest[row, j]] != row and is_part[nearest[row, j]]
+                if not is_torn[row] or step == edges_away:
+                    break
+                last: cython.Py_ssize_t = end
+                for at in range(begin, last):
+                    corner: cython.int = head[reached[at]]
+                    while corner >= 0:
+                        for c in range(3):
+                            v: cython.int = F[corner // 3, c]
+                            if row_of[v] != row:
+                                reached[end], row_of[v] = v, row
+                                end += 1
+                        corner = following[corner // 3, corner % 3]
+                begin = last
+    return np.asarray(nearest)[torn, 0]
+
+
 def filling_triangles(
     P: cython.const[cython.double][:, ::1],
-    ends: cython.const[cython.int][:, ::1],
-    opposite: cython.const[cython.int][::1],
-    partner: cython.const[cython.longlong][::1],
-    joints: cython.int[::1],
+    F: cython.const[cython.int][:, ::1],
+    twin: cython.const[cython.int][::1],
+    is_gap: cython.const[cython.uchar][::1],
     largest: cython.const[cython.double][::1],
-    edges: cython.const[cython.int][:, ::1],
     most_bent: cython.double,
     most_folded: cython.double,
 ):
-    """Triangles in the loops of outer edges.
+    """Triangles between the fans of a point, and in the loops of outer edges.
 
     Of each loop, the ear with the smallest circumscribed circle is cut off again and again, as long as one may be: a
     small gap is filled, and of a hole or of the border the notches. Before these come ears that join two fans of a
@@ -28,18 +72,14 @@ def filling_triangles(
     ----------
     P : (n, 3) float64
         Points.
-    ends : (k, 2) int32
-        Outer edges: sides of one triangle alone.
-    opposite : (k,) int32
-        The third corner of this triangle.
-    partner : (2 k,) int64
-        The end ``2 f + d`` of edge f at which a loop goes on that comes to the end ``2 e + c`` of edge e; -1 if none.
-    joints : (n,) int32
-        How many fans there are at each point beside the first. Triangles between them are counted down.
+    F : (m, 3) int32
+        All triangles at the points of gaps.
+    twin : (3 m,) int32
+        The side of another triangle on each side, which is opposite to the corner of its number; negative if outer.
+    is_gap : (n,) bool
+        The points of gaps, at the ends of outer edges.
     largest : (n,) float64
         Largest radius of circles through each point.
-    edges : (e, 2) int32
-        All edges between the points of loops: none gets another triangle.
     most_bent, most_folded : float
         Cosines of the angle to the neighbour at an edge, 1 where the two lie on each other: the largest of triangles
         that are cut first, and of those in loops of which nothing is left.
@@ -50,23 +90,31 @@ def filling_triangles(
     is_whole : (t,) bool
         Whether they are in a loop of which nothing is left, and join no fans.
     """
-    k: cython.Py_ssize_t = ends.shape[0]
+    n_sides: cython.Py_ssize_t = twin.shape[0]
+    k: cython.Py_ssize_t = np.count_nonzero(np.asarray(twin) < 0)
     found, whole = np.empty((k, 3), np.int32), np.empty(k, np.bool_)
     is_whole: cython.uchar[::1] = whole.view(np.uint8)
     triangles: cython.int[:, ::1] = found
-    seen: cython.uchar[::1] = np.zeros(k, np.uint8)
+    # Where a loop goes on that comes to end 2 h + d of the outer side h, its beginning for d = 0; -1 if nowhere.
+    partner: cython.int[::1] = np.full(2 * n_sides, -1, np.int32)
+    # How many fans there are at each point beside the first. Triangles between them are counted down.
+    joints: cython.int[::1] = np.zeros(P.shape[0], np.int32)
+    seen: cython.uchar[::1] = np.zeros(n_sides, np.uint8)
     ring: cython.int[:, ::1] = np.empty((2, k), np.int32)
+    fans: cython.int[:, ::1] = np.empty((3, k), np.int32)
     cost: cython.double[::1] = np.empty(k)
     # The edges at each lower end, one after the other.
     head: cython.int[::1] = np.full(P.shape[0], -1, np.int32)
-    link: cython.int[:, ::1] = np.empty((edges.shape[0] + k, 2), np.int32)
+    link: cython.int[:, ::1] = np.empty((n_sides + k, 2), np.int32)
     count: cython.Py_ssize_t = 0
     with cython.nogil:
-        for e in range(edges.shape[0]):
-            _enter(head, link, e, edges[e, 0], edges[e, 1])
-        for e in range(k):
-            if not seen[e]:
-                size: cython.Py_ssize_t = _loop(e, ends, opposite, partner, seen, ring)
+        _find_loops(P, F, twin, is_gap, partner, joints, head, link, fans)
+        for h in range(n_sides):
+            if twin[h] < h and is_gap[_at_end(F, 2 * h)] and is_gap[_at_end(F, 2 * h + 1)]:
+                _enter(head, link, h, _at_end(F, 2 * h), _at_end(F, 2 * h + 1))
+        for h in range(n_sides):
+            if partner[2 * h] >= 0 and not seen[h]:
+                size: cython.Py_ssize_t = _loop(h, F, partner, seen, ring)
                 if size >= 3:
                     cut: cython.Py_ssize_t = _fill(
                         P,
@@ -77,7 +125,7 @@ def filling_triangles(
                         largest,
                         head,
                         link,
-                        edges.shape[0] + count,
+                        n_sides + count,
                         most_bent,
                         most_folded,
                         triangles[count:],
@@ -90,29 +138,117 @@ def filling_triangles(
 
 
 @cython.cfunc
+@cython.inline
+@cython.nogil
+def _at_end(F: cython.const[cython.int][:, ::1], end: cython.Py_ssize_t) -> cython.int:
+    """The point at end 2 h + d of side h."""
+    h: cython.Py_ssize_t = end // 2
+    return F[h // 3, (h % 3 + 1 + end % 2) % 3]
+
+
+@cython.cfunc
+@cython.nogil
+def _find_loops(
+    P: cython.const[cython.double][:, ::1],
+    F: cython.const[cython.int][:, ::1],
+    twin: cython.const[cython.int][::1],
+    is_gap: cython.const[cython.uchar][::1],
+    partner: cython.int[::1],
+    joints: cython.int[::1],
+    head: cython.int[::1],
+    link: cython.int[:, ::1],
+    fans: cython.int[:, ::1],
+) -> cython.void:
+    """Find the partner of each end of an outer side: in its fan if that is the only one of its point, else in the next.
+
+    Also the number of further fans; `head` is left as it was.
+    """
+    for end in range(partner.shape[0]):
+        v: cython.int = _at_end(F, end)
+        side: cython.int = end // 2
+        if twin[side] >= 0 or not (is_gap[v] and is_gap[_at_end(F, end ^ 1)]):
+            continue
+        at: cython.int = end
+        while True:
+            # The other side of the triangle at the same point, and the same edge in the neighbour.
+            side = 3 * (at // 6) + (at // 2 % 3 + 2 - at % 2) % 3
+            at = 2 * side + 1 - at % 2
+            if twin[side] < 0:
+                break
+            at = 2 * twin[side]
+            at += _at_end(F, at) != v
+        partner[end] = at
+        if end % 2 == 0 and at % 2 == 1:
+            # A fan whose border runs through it; those of a point are linked.
+            joints[v] += head[v] >= 0
+            link[end // 2, 0], head[v] = head[v], end
+    for v in range(head.shape[0]):
+        k: cython.Py_ssize_t = 0
+        while head[v] >= 0:
+            fans[0, k], fans[1, k], fans[2, k] = head[v], partner[head[v]], k
+            head[v] = link[head[v] // 2, 0]
+            k += 1
+        if k > 1:
+            _in_one_round(P, F, partner, fans, k)
+
+
+@cython.cfunc
+@cython.nogil
+def _in_one_round(
+    P: cython.const[cython.double][:, ::1],
+    F: cython.const[cython.int][:, ::1],
+    partner: cython.int[::1],
+    fans: cython.int[:, ::1],
+    k: cython.Py_ssize_t,
+) -> cython.void:
+    """Make k fans of a point follow one another in a single round, the nearest ends first.
+
+    Rows of `fans` are their two ends and the chain to which each belongs.
+    """
+    first: cython.Py_ssize_t = 0
+    second: cython.Py_ssize_t = 0
+    for left in range(k, 0, -1):
+        shortest: cython.double = INFINITY
+        for i in range(k):
+            for j in range(k):
+                is_free: cython.bint = fans[0, i] >= 0 and fans[1, j] >= 0
+                if is_free and (left == 1 or fans[2, i] != fans[2, j]):
+                    a: cython.int = _at_end(F, fans[0, i] ^ 1)
+                    b: cython.int = _at_end(F, fans[1, j] ^ 1)
+                    square: cython.double = 0.0
+                    for x in range(3):
+                        square += (P[a, x] - P[b, x]) * (P[a, x] - P[b, x])
+                    if square < shortest:
+                        shortest, first, second = square, i, j
+        partner[fans[0, first]], partner[fans[1, second]] = fans[1, second], fans[0, first]
+        fans[0, first] = fans[1, second] = -1
+        chain: cython.int = fans[2, second]
+        for i in range(k):
+            if fans[2, i] == chain:
+                fans[2, i] = fans[2, first]
+
+
+@cython.cfunc
 @cython.nogil
 def _loop(
     start: cython.Py_ssize_t,
-    ends: cython.const[cython.int][:, ::1],
-    opposite: cython.const[cython.int][::1],
-    partner: cython.const[cython.longlong][::1],
+    F: cython.const[cython.int][:, ::1],
+    partner: cython.int[::1],
     seen: cython.uchar[::1],
     ring: cython.int[:, ::1],
 ) -> cython.Py_ssize_t:
-    """The points of the loop from an edge on, and the corners opposite to the edges; their number, 0 if it ends.
+    """The points of the loop from an outer side on, and the corners opposite to the sides; their number, 0 if it ends.
 
-    It goes against the triangle of the first edge, so that triangles in the loop run like those around it.
+    It goes against the triangle of the first side, so that triangles in the loop run like those around it.
     """
     size: cython.Py_ssize_t = 0
     at: cython.Py_ssize_t = 2 * start + 1
     while not seen[at // 2]:
-        e: cython.Py_ssize_t = at // 2
-        seen[e] = 1
-        ring[POINT, size], ring[BEYOND, size] = ends[e, at % 2], opposite[e]
+        h: cython.Py_ssize_t = at // 2
+        seen[h] = 1
+        ring[POINT, size], ring[BEYOND, size] = _at_end(F, at), F[h // 3, h % 3]
         size += 1
         at = partner[at ^ 1]
-        if at < 0:
-            return 0
     return size if at == 2 * start + 1 else 0
 
 
