@@ -119,8 +119,7 @@ def _around(
     scale: cython.double = 1.0 / radius
     per_square: cython.double = 1.0 / max(farthest, TINY)
     for j in range(index.shape[0]):
-        for x in range(3):
-            local[j, x] *= scale
+        local[j, 0], local[j, 1], local[j, 2] = local[j, 0] * scale, local[j, 1] * scale, local[j, 2] * scale
         local[j, 3] = max(1.0 - per_square * local[j, 3], LEAST_WEIGHT)
     return radius
 
@@ -129,23 +128,21 @@ def _around(
 @cython.nogil
 def _covariance(local: cython.double[:, ::1], work: cython.double[:, ::1]) -> cython.void:
     """The covariance in rows 0 to 2 of `work`."""
-    square: cython.double[9]
-    mean: cython.double[3]
-    total: cython.double = 0.0
-    a: cython.int
-    b: cython.int
-    for a in range(3):
-        mean[a] = square[3 * a] = square[3 * a + 1] = square[3 * a + 2] = 0.0
+    cython.declare(total=cython.double, mx=cython.double, my=cython.double, mz=cython.double, xx=cython.double)
+    cython.declare(xy=cython.double, xz=cython.double, yy=cython.double, yz=cython.double, zz=cython.double)
+    total = mx = my = mz = xx = xy = xz = yy = yz = zz = 0.0
     for j in range(local.shape[0]):
-        total += local[j, 3]
-        for a in range(3):
-            moment: cython.double = local[j, 3] * local[j, a]
-            mean[a] += moment
-            for b in range(3):
-                square[3 * a + b] += moment * local[j, b]
-    for a in range(3):
-        for b in range(3):
-            work[a, b] = square[3 * a + b] / total - mean[a] / total * (mean[b] / total)
+        x: cython.double = local[j, 3] * local[j, 0]
+        y: cython.double = local[j, 3] * local[j, 1]
+        z: cython.double = local[j, 3] * local[j, 2]
+        total, mx, my, mz = total + local[j, 3], mx + x, my + y, mz + z
+        xx, xy, xz = xx + x * local[j, 0], xy + x * local[j, 1], xz + x * local[j, 2]
+        yy, yz, zz = yy + y * local[j, 1], yz + y * local[j, 2], zz + z * local[j, 2]
+    mx, my, mz = mx / total, my / total, mz / total
+    work[0, 0], work[1, 1], work[2, 2] = xx / total - mx * mx, yy / total - my * my, zz / total - mz * mz
+    work[0, 1] = work[1, 0] = xy / total - mx * my
+    work[0, 2] = work[2, 0] = xz / total - mx * mz
+    work[1, 2] = work[2, 1] = yz / total - my * mz
 
 
 @cython.cfunc

@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.nearest_points import IN_A_BOX, PARTS, ROOM, ROUNDED_UP, TINY, WAITING
+from cython.cimports.heat_igl.kernels.cloud.nearest_points import IN_A_BOX, PARTS, ROOM, ROUNDED_UP, ROUNDING, TINY
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 
@@ -29,8 +29,10 @@ def tree_of_boxes(P: cython.const[cython.double][:, ::1]):
         for b in range(1, 2 * m):
             for x in range(3):
                 low: cython.double = box[b, x]
-                box[b, x] = 0.5 * low + 0.5 * box[b, 3 + x]
-                box[b, 3 + x] = 0.5 * box[b, 3 + x] - 0.5 * low
+                high: cython.double = box[b, 3 + x]
+                box[b, x] = 0.5 * low + 0.5 * high
+                # A point on a side of its box is in it, whatever the rounding of the middle.
+                box[b, 3 + x] = 0.5 * high - 0.5 * low + ROUNDING * (fabs(low) + fabs(high))
     return found
 
 
@@ -42,8 +44,7 @@ def nearest_points(
 ):
     """The k points nearest to places, by distance.
 
-    The distance to them changes by no more than the way from one place to the next: places that are sorted like the
-    points are found soonest.
+    Those of the place before are a bound of the distance: places that are sorted like the points are found soonest.
 
     Parameters
     ----------
@@ -63,18 +64,14 @@ def nearest_points(
     index: cython.int[:, ::1] = found
     distance: cython.double[::1] = distances
     square: cython.double[:, ::1] = np.empty((2, 4 * k + 2 * IN_A_BOX))
-    point: cython.int[:, ::1] = np.empty((2, 4 * k + 2 * IN_A_BOX), np.int32)
+    # Row 0 has the points nearest to the place before, and at first any.
+    point: cython.int[:, ::1] = np.tile(np.arange(4 * k + 2 * IN_A_BOX, dtype=np.int32), (2, 1))
     with cython.nogil:
         for i in range(places.shape[0]):
             bound: cython.double = 0.0
-            if i > 0:
-                bound = distance[i - 1] + sqrt(_squared_distance(places, i, places, i - 1))
-                bound = ROUNDED_UP * bound * bound
-            # Where squares underflow, the bound may be too low.
-            if i == 0 or _search(P, boxes, places, i, k, bound, square, point) < k:
-                for j in range(k):
-                    bound = max(bound, _squared_distance(P, j, places, i))
-                _search(P, boxes, places, i, k, bound, square, point)
+            for j in range(k):
+                bound = max(bound, _squared_distance(P, point[0, j], places, i))
+            _search(P, boxes, places, i, k, ROUNDED_UP * bound + TINY, square, point)
             for j in range(k):
                 index[i, j] = point[0, j]
             distance[i] = sqrt(square[0, k - 1])
@@ -94,8 +91,8 @@ def _search(
     point: cython.int[:, ::1],
 ) -> cython.Py_ssize_t:
     """Put the points nearest to place i into row 0 of `point`, those at squared distances up to `bound`; how many."""
-    box: cython.Py_ssize_t[WAITING]
-    away: cython.double[WAITING]
+    box: cython.Py_ssize_t[ROOM]
+    away: cython.double[ROOM]
     m: cython.Py_ssize_t = boxes.shape[0] // 2
     size: cython.Py_ssize_t = 0
     waiting: cython.Py_ssize_t = 1
@@ -118,7 +115,7 @@ def _search(
             distance: cython.double = _squared_distance(P, j, places, i)
             square[0, size], point[0, size] = distance, cython.cast(cython.int, j)
             size += distance <= bound
-        if size > 4 * k:
+        if size > 2 * k:
             size = _sort(square, point, size, k, bound)
             bound = square[0, k - 1]
     return _sort(square, point, size, k, bound)
@@ -166,12 +163,12 @@ def _away(
     i: cython.Py_ssize_t,
 ) -> cython.double:
     """Squared distance of place i from box b."""
-    beyond: cython.double[3]
-    for x in range(3):
-        beyond[x] = fabs(places[i, x] - boxes[b, x]) - boxes[b, 3 + x]
-        # Twice the positive part, without a branch.
-        beyond[x] += fabs(beyond[x])
-    return 0.25 * (beyond[0] * beyond[0] + beyond[1] * beyond[1] + beyond[2] * beyond[2])
+    x: cython.double = fabs(places[i, 0] - boxes[b, 0]) - boxes[b, 3]
+    y: cython.double = fabs(places[i, 1] - boxes[b, 1]) - boxes[b, 4]
+    z: cython.double = fabs(places[i, 2] - boxes[b, 2]) - boxes[b, 5]
+    # Twice the positive parts, without a branch.
+    x, y, z = x + fabs(x), y + fabs(y), z + fabs(z)
+    return 0.25 * (x * x + y * y + z * z)
 
 
 @cython.cfunc
