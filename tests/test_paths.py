@@ -77,20 +77,6 @@ def test_a_triangle_without_area_is_crossed():
     np.testing.assert_allclose(lengths(mesh, paths), expected, rtol=1e-6)  # it is given a height of 1e-6
 
 
-def test_vertices_in_one_place_are_passed():
-    mesh = shapes.grid(8)
-    V = mesh.V.copy()
-    V[40] = V[41]  # an edge of no length
-    collapsed = Mesh(V, mesh.F)
-    straight = np.hypot(V[:, 0], V[:, 1])
-    paths = shortest_paths(collapsed, np.arange(mesh.n_vertices), 0)
-    # Which side of both to pass, their angles do not tell, so the path may keep a bend there.
-    excess = lengths(collapsed, paths) - straight
-    assert excess.min() > -1e-12
-    assert excess.max() < mesh.edge_lengths.mean()
-    np.testing.assert_array_equal(ends(collapsed, paths)[1], 0)
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_paths_lead_through_vertices_in_one_place_and_needles(seed):
     rng = np.random.default_rng(seed)

@@ -58,5 +58,7 @@ def geodesic_errors(mesh: MeshLike, matches: Sources, truth: Sources) -> FloatAr
     if len(found) != len(right):
         raise ValueError(f"there are {len(found)} matches and {len(right)} entries of truth: give one for each")
     area = float(triangles.measures.sum())
+    if not area > 0:
+        raise MeshError("errors of matches are shares of the root of the area, and no face of the mesh has one")
     # From the right vertices: many points are mostly matched with few, and one search serves all of them.
     return np.asarray(pair_distances(triangles, np.stack([right, found], axis=1)) / np.sqrt(area))

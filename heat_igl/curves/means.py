@@ -10,7 +10,7 @@ from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.paths import shortest_paths
 from heat_igl.curves.places import Waypoints, checked_places
 from heat_igl.curves.straightest import Tracer
-from heat_igl.errors import AccuracyWarning, SourceError, is_number, names_guessed, real_numbers, shown
+from heat_igl.errors import AccuracyWarning, MeshError, SourceError, is_number, names_guessed, real_numbers, shown
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh, as_simplices
 from heat_igl.plan import ROUGH_FOR_MEANS
@@ -54,7 +54,7 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     Raises
     ------
     MeshError
-        If the mesh has no tangent frames, see `tangent_frames`.
+        If the mesh has no tangent frames, see `tangent_frames`, or the mean lies at a face without area.
     SourceError
         If `points` does not name points of the mesh, or they lie on different components.
     ValueError
@@ -115,6 +115,14 @@ class _Mean:
         self, mesh: Mesh, tracer: Tracer, faces: IntArray, barycentric: FloatArray, weight: FloatArray, power: float
     ) -> None:
         self._mesh = mesh
+        # The first corner at each vertex, if possible of a face with area: others have no axes.
+        self._corner = np.zeros(mesh.n_vertices, np.int64)
+        for corner in (np.arange(mesh.F.size), np.flatnonzero(np.repeat(mesh.measures > 0, 3))):
+            self._corner[mesh.F.ravel()[corner[::-1]]] = corner[::-1]
+        at_vertex = barycentric.max(axis=1) == 1
+        corner = self._corner[mesh.F[faces, barycentric.argmax(axis=1)]]
+        faces = np.where(at_vertex, corner // 3, faces)
+        barycentric = np.where(at_vertex[:, None], np.eye(3)[corner % 3], barycentric)
         self._faces, self._barycentric = faces, barycentric
         self._places = [SurfacePoints(np.array([f]), b[None]) for f, b in zip(faces, barycentric, strict=True)]
         self._weight, self._power = weight / weight.sum(), power
@@ -134,9 +142,8 @@ class _Mean:
             at_point = self._median_at_a_point(fields)
             if at_point is not None:
                 return at_point
-        corners = self._mesh.F.ravel()
         best = np.argsort(energy)[: _STARTS if self._is_rough else 1]
-        starts = [int(np.argmax(corners == vertex)) for vertex in best if energy[vertex] < np.inf]
+        starts = [int(self._corner[vertex]) for vertex in best if energy[vertex] < np.inf]
         ends = [self._descend(self._state(corner // 3, np.eye(3)[corner % 3])) for corner in starts]
         return min(ends, key=lambda end: end.energy).points
 
@@ -159,6 +166,8 @@ class _Mean:
             paths = [path.reversed() for path in shortest_paths(self._mesh, points, here)]
         else:
             paths = [self._solver.path([here, place]) for place in self._places]
+        if not self._mesh.measures[face] > 0:
+            raise MeshError(f"the mean lies at F[{face}] = {F[face].tolist()}, which has no area: repair this face")
         along, side = V[F[face, 1:]] - V[F[face, 0]]
         along /= np.linalg.norm(along)
         across = side - (side @ along) * along
@@ -185,9 +194,11 @@ class _Mean:
             shortest = _CONVERGED * float(at.distances.max())
             while np.hypot(*step) > shortest:
                 end = self._tracer.exp(at.points, step[None])
-                trial = self._state(int(end.faces[0]), end.barycentric[0])
-                if trial.energy < at.energy:
-                    break
+                face = int(end.faces[0])
+                if self._mesh.measures[face] > 0:
+                    trial = self._state(face, end.barycentric[0])
+                    if trial.energy < at.energy:
+                        break
                 step = step / 2
             else:
                 return at

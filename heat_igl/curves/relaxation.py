@@ -111,8 +111,8 @@ class _Relaxation:
 
     def __init__(self, given: MeshLike) -> None:
         self._mesh = mesh = as_simplices(given)
-        self._solver = GeodesicSolver(given, method="exact")
         self._tracer = Tracer(given)
+        self._solver = GeodesicSolver(given, method="exact")
         self._areas = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / 3, 3), mesh.n_vertices)
 
     def relaxed(self, sites: IntArray, rounds: int) -> CentroidalSites:
@@ -174,7 +174,7 @@ class _Relaxation:
         for i, (row, angle) in enumerate(zip(rows, angles, strict=True)):
             cell = labels == i
             area = self._areas[cell]
-            moment = area * row[cell] / area.sum()
+            moment = area * row[cell] / max(area.sum(), np.finfo(float).tiny)
             found[i] = moment @ np.cos(angle[cell]), moment @ np.sin(angle[cell])
         return found
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from heat_igl.curves.places import checked_places
-from heat_igl.errors import SourceError, is_number, real_numbers, shown
+from heat_igl.errors import MeshError, SourceError, is_number, real_numbers, shown
 from heat_igl.intrinsic import TangentFrames, checked_vectors, tangent_frames
 from heat_igl.kernels.paths import straightest
 from heat_igl.mesh import MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices, tangent_surface
@@ -22,6 +22,7 @@ kernel: Any = straightest
 _FEW = 500
 # Lines of more edges are refused: a tenth of a second each, and half a gigabyte if they are stored.
 _MOST_EDGES = 1e7
+_LOST = "is lost among faces without area: repair these faces"
 
 
 def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length: float) -> SurfaceCurve:
@@ -50,7 +51,7 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     Raises
     ------
     MeshError
-        If the mesh has no tangent frames, see `tangent_frames`.
+        If the mesh has no tangent frames, see `tangent_frames`, or the line is lost among faces without area.
     SourceError
         If `start` is not one vertex of a face or one point of the mesh.
     ValueError
@@ -87,11 +88,11 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     if not is_number(length) or not 0 <= length < np.inf:
         raise ValueError(f"length must be a finite number of at least 0, not {shown(length)}")
     distance = np.array([float(length)])
-    tracer.refuse_endless("length", distance)
+    mean_edge = tracer.mean_edges("length", begin.faces, distance)
     turn, size = tracer.directions("direction", begin, vector)
     if not size[0] > 0:
         raise ValueError(f"direction = {np.asarray(direction).tolist()} is 0 in the tangent plane: it needs a length")
-    return tracer.curve(begin, turn, distance)
+    return tracer.curve(begin, turn, distance, mean_edge)
 
 
 def exp_map(mesh: MeshLike, source: Sources, vectors: ArrayLike) -> SurfacePoints:
@@ -175,14 +176,16 @@ class Tracer:
         elif len(begin.faces) != k:
             raise SourceError(f"source must be one point, or one for each of the {k} vectors, not {len(begin.faces)}")
         turn, size = self.directions("vectors", begin, array)
-        self.refuse_endless("vectors", size)
+        mean_edge = self.mean_edges("vectors", begin.faces, size)
         faces, barycentric, lengths = self._room(k)
 
         def work(part: slice) -> None:
-            given = (begin.faces[part], begin.barycentric[part], turn[part], size[part])
+            given = (begin.faces[part], begin.barycentric[part], turn[part], size[part], mean_edge[part])
             kernel.trace(self._triangles, *given, faces[part], barycentric[part], lengths[part])
 
         over_rows(work, k, k) if k >= _FEW else work(slice(k))
+        if (lengths < 0).any():
+            raise MeshError(f"the line along vectors[{np.argmax(lengths < 0)}] {_LOST}")
         return SurfacePoints(*on_one_side(faces, barycentric, self._mesh.n_faces))
 
     @staticmethod
@@ -190,9 +193,16 @@ class Tracer:
         """Room for the ends of k geodesics, faces and barycentric coordinates, and for their lengths."""
         return np.empty(k, np.int64), np.empty((k, 3)), np.empty(k)
 
-    def refuse_endless(self, name: str, lengths: FloatArray) -> None:
-        """Raise ValueError for lengths (k,) that would take minutes to trace, which another unit is the reason of."""
-        edges = lengths / self._mesh.edge_lengths.mean()
+    def mean_edges(self, name: str, faces: IntArray, lengths: FloatArray) -> FloatArray:
+        """Mean length (k,) of the edges of the component of each face.
+
+        A ValueError for lengths (k,) that would take minutes to trace, which another unit is the reason of.
+        """
+        F, l = self._surface.F, self._triangles[0]
+        component = self._surface.components[F[:, 0]]
+        mean = np.bincount(component, l.mean(axis=1)) / np.maximum(np.bincount(component), 1)
+        mean = mean[component[faces]]
+        edges = lengths / mean
         if (edges > _MOST_EDGES).any():
             first = int(np.argmax(edges > _MOST_EDGES))
             raise ValueError(
@@ -200,6 +210,7 @@ class Tracer:
                 f"{edges[first]:.2g} mean edge lengths, and a line may have {_MOST_EDGES:.0e}: give it in the unit of "
                 "the mesh"
             )
+        return mean
 
     def starts(self, name: str, points: Sources, in_frame: bool = True) -> _Starts:
         """Starts of geodesics: vertices in the order given, or points in faces.
@@ -243,9 +254,12 @@ class Tracer:
             turn[at_vertex] = inside + np.choose(c, [np.zeros(len(c)), np.pi - angles[:, 1], angles[:, 0] - np.pi])
         return turn, size
 
-    def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:
+    def curve(self, start: _Starts, turn: FloatArray, length: FloatArray, mean_edge: FloatArray) -> SurfaceCurve:
         """Trace one geodesic."""
-        given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
-        faces, points = kernel.trace(self._triangles, *given, *self._room(1), True)
+        given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length, mean_edge)
+        ends = self._room(1)
+        faces, points = kernel.trace(self._triangles, *given, *ends, True)
+        if ends[2][0] < 0:
+            raise MeshError(f"the line from start {_LOST}")
         faces, points = on_one_side(faces, points, self._mesh.n_faces)
         return SurfaceCurve(faces, points[:, 0], points[:, 1], mesh=self._mesh)

@@ -26,7 +26,7 @@ from heat_igl.heat.curve_sides import (
 from heat_igl.heat.parts import SolverOptions, SolverParts, prepare
 from heat_igl.heat.solver import HeatMethodSolver
 from heat_igl.heat.steps import VectorHeatFlow
-from heat_igl.intrinsic import IntrinsicTriangulation, lay_out, oriented
+from heat_igl.intrinsic import IntrinsicTriangulation, Merged, lay_out, oriented
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, one_sided
 from heat_igl.operators import Operators, TriangleElements, divergence_matrix, edge_rotations, face_rotations, operators
@@ -270,6 +270,12 @@ def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, Int
     if surface is None or surface.faces is None or surface.uncovered is not None:
         raise MeshError(_shared_edge(mesh))
     faces = surface.faces
+    if isinstance(copies := next(iter(faces.history), None), Merged):
+        first = int(np.argmin(np.diff(copies.face) > 0)) + 1
+        raise MeshError(
+            f"F[{first}] has the corners of F[{copies.face[first]}] ({mesh.n_faces - len(faces.F)} faces are copies of "
+            "others): a curve across them has no one left and right; remove the copies"
+        )
     if not faces.aligned.all():
         first = int(np.argmin(faces.aligned)) // 3
         if not oriented(faces).aligned.all():
@@ -445,8 +451,8 @@ class NormalIntegration:
         A factor for all is left out.
         """
         ones = np.ones(len(pieces.faces))
-        scale = SOURCE_HEAT / pieces.integrals(ones).max()
-        return self._heat_flow.solve((scale * pieces.integrals(ones if values is None else values))[:, None])[:, 0]
+        start = pieces.integrals(ones if values is None else values) / pieces.integrals(ones).max()
+        return self._heat_flow.solve(SOURCE_HEAT * start[:, None])[:, 0]
 
     def _extended(self, values: FloatArray, pieces: Pieces, heat: FloatArray) -> FloatArray:
         """A function (n,) that takes `values` (q,) on the curves, and elsewhere that at the nearest place on them.

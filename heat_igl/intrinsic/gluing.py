@@ -127,11 +127,15 @@ def intrinsic_triangulation(mesh: Mesh, margin: float | None = None) -> Intrinsi
 
 
 def lengths_to_divide_by(mesh: Mesh) -> FloatArray:
-    """The length (m, 3) of the edge opposite each corner, at least 1e-12 mean edge lengths.
+    """The length (m, 3) of the edge opposite each corner, at least 1e-12 mean edge lengths of the component.
 
     Not mollified: mollification gives a flat triangle some height, and would bend lines across it.
     """
-    return np.asarray(np.maximum(igl.edge_lengths(mesh.V, mesh.F), 1e-12 * mesh.edge_lengths.mean()))
+    l = igl.edge_lengths(mesh.V, mesh.F)
+    component = mesh.components[mesh.F[:, 0]]
+    mean = np.bincount(component, l.mean(axis=1)) / np.maximum(np.bincount(component), 1)
+    mean[mean == 0.0] = l.mean()
+    return np.asarray(np.maximum(l, 1e-12 * mean[component, None]))
 
 
 def each_face_once(triangulation: IntrinsicTriangulation) -> tuple[IntrinsicTriangulation, IntArray]:

@@ -139,7 +139,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     ValueError
         If `speed` is not a positive number for each face.
     MeshError
-        If a tetrahedron has no volume.
+        If a tetrahedron has no volume, or an edge no length.
 
     Notes
     -----
@@ -163,6 +163,8 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
         )
     remedy = "remove faces that cannot be crossed"
     _raise_at_first(~((s > 0) & np.isfinite(s)), "speed", s, "must be positive and finite", remedy)
+    if not mesh.edge_lengths.all():
+        check_measures(mesh)
     largest = _LARGEST**0.5
     outside = (s < 1 / largest) | (s > largest)
     _raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")

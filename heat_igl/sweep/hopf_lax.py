@@ -22,6 +22,8 @@ from heat_igl.typing import AnyArray, FloatArray
 # Simplices of which it is asked how far the metric turns.
 _SAMPLE = 1000
 _ROUNDING = 1e-12
+# Determinants of singular tensors over their squared traces are rounding.
+_FLAT = 1e-15
 
 
 class HopfLaxEngine(SimplexEngine):
@@ -70,6 +72,11 @@ class HopfLaxEngine(SimplexEngine):
             once = np.cross(w[:, None], x[one])
             turned = x[one] + once + np.cross(w[:, None], once) / np.maximum(1 + cosine, _ROUNDING)[:, None, None]
             first, two = (axes @ g @ np.swapaxes(axes, 1, 2) for axes, g in ((x[one], first), (turned, two)))
+            # Triangles without area know no metric in their plane.
+            flat = ~np.all(
+                [np.linalg.det(g) > _FLAT * np.trace(g, axis1=1, axis2=2) ** 2 for g in (first, two)], axis=0
+            )
+            first[flat] = two[flat] = np.eye(2)
         stretch = np.maximum(np.linalg.eigvals(np.linalg.solve(first, two)).real, _ROUNDING)
         ratio = np.sqrt(stretch.max(axis=1) / stretch.min(axis=1))
         return float(np.quantile(ratio.reshape(-1, size).max(axis=1), 0.9))

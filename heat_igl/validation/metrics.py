@@ -187,7 +187,7 @@ def _norms(mesh: Mesh, distance: FloatArray, truth: FloatArray) -> tuple[float, 
     corners = mesh.F.shape[1]
     area = np.bincount(mesh.F.ravel(), np.repeat(mesh.measures / corners, corners), mesh.n_vertices)[compared]
     error = np.abs(distance[compared] - truth[compared]) / truth[compared].max()
-    weight = area / area.sum()
+    weight = area / area.sum() if area.any() else np.full(len(area), 1 / len(area))
     return float(weight @ error), float(np.sqrt(weight @ error**2)), float(error.max())
 
 

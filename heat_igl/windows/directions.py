@@ -394,15 +394,15 @@ def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
 def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None:
     """The edges of the mesh at a vertex with their polar angles, the scale of these, and whether it is on the boundary.
 
-    None if the faces there are not one oriented fan.
+    None if the faces there are not one oriented fan, or lie in one point.
     """
     F = mesh.F[np.unique(np.flatnonzero(mesh.F.ravel() == source) // 3)]
     if not len(F):
         return None
     used, numbers = np.unique(F, return_inverse=True)
-    star = intrinsic_triangulation(Mesh(mesh.V[used], numbers.reshape(-1, 3)))
     centre = int(np.searchsorted(used, source))
     try:
+        star = intrinsic_triangulation(Mesh(mesh.V[used], numbers.reshape(-1, 3)))
         polar = polar_angles(star)
     except MeshError:
         return None

@@ -68,13 +68,17 @@ class Invariants:
         """
         distance = np.ascontiguousarray(distance, np.float64)
         nearest = distance if than is None else np.minimum(distance, than)
+
+        def found(slack: float) -> str | None:
+            return (
+                self._at_sources(distance, sources, cutoff, slack)
+                or self._elsewhere(distance, sources)
+                or self._along_edges(nearest, cutoff, slack)
+                or self._below_lines(distance, sources, slack)
+            )
+
         slack = ROUNDING * checking.largest_finite(nearest)
-        return (
-            self._at_sources(distance, sources, cutoff, slack)
-            or self._elsewhere(distance, sources)
-            or self._along_edges(nearest, cutoff, slack)
-            or self._below_lines(distance, sources, slack)
-        )
+        return found(slack) and found(slack + self._rounding_of_lengths(sources))
 
     def _at_sources(self, distance: FloatArray, sources: SourceSet, cutoff: float, slack: float) -> str | None:
         """Above what a source itself, or a straight line in its face, gives the vertices there."""
@@ -119,6 +123,15 @@ class Invariants:
         if stray.any():
             return f"finite at vertex {int(np.argmax(stray))}, whose component holds no source"
         return None
+
+    def _rounding_of_lengths(self, sources: SourceSet) -> float:
+        """By how much lengths are off in the components of sources: thin triangles are widened, places are rounded."""
+        searched = self._has_source(sources)[self._components[self._F[:, 0]]]
+        if self._V is None:
+            return ROUNDING * float(self._l[searched].mean())
+        corners = self._V[self._F[searched]]
+        edges = np.linalg.norm(np.diff(corners, axis=1), axis=2)
+        return float(ROUNDING * edges.mean() + 4 * np.spacing(np.abs(corners).max()))
 
     def _has_source(self, sources: SourceSet) -> BoolArray:
         """Mask of the components that hold a source."""
