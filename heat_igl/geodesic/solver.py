@@ -289,15 +289,12 @@ class GeodesicSolver(BatchedSolver):
     def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:
         self._triangles = triangles
         if chosen.engine == "sweep":
-            sweep = _sweep_engine(triangles)
-            if isinstance(self._domain, PointCloud):
-                # Whatever the triangles are, their own error is a multiple of what a sweep adds.
-                measures = SurfaceMeasures(triangles.surface.unfolding.n_used, 0.0, 0.0, has_holes=False)
-            else:
-                measures = sweep.measures
+            # Whatever the triangles between points are, their own error is a multiple of what a sweep adds.
+            sweep = None if isinstance(self._domain, PointCloud) else _sweep_engine(triangles)
+            measures = sweep.measures if sweep else SurfaceMeasures(triangles.surface.unfolding.n_used, 0.0, 0.0, False)
             chosen = sweep_plan(measures, chosen)
             if chosen.engine == "sweep":
-                return chosen, sweep
+                return chosen, sweep or _sweep_engine(triangles)
         # All other engines are held to bounds where they are made.
         domain = self._domain.triangles if isinstance(self._domain, PointCloud) else self._domain
         # Noisy points are measured where they were moved to.

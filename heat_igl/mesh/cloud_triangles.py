@@ -206,8 +206,7 @@ def _fans(F: IntArray, glued: GluedSides) -> IntArray:
     """The fan (3 m,) of each corner: corners of a vertex are in one fan if edges join their triangles."""
     first, second, runs_alike = glued
     ends = [np.stack([corner(first, e), corner(second, np.where(runs_alike, e, 3 - e))], axis=1) for e in (1, 2)]
-    fan: IntArray = components(np.concatenate(ends), F.size)
-    return fan
+    return np.asarray(components(np.concatenate(ends), F.size))
 
 
 def glued_sides(F: IntArray, n: int) -> GluedSides:

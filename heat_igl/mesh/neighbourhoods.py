@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -68,8 +68,7 @@ class PointTree:
     @cached_property
     def boxes(self) -> FloatArray:
         """The boxes around them, see `tree_of_boxes`."""
-        boxes: FloatArray = tree_of_boxes(self.P)
-        return boxes
+        return np.asarray(tree_of_boxes(self.P))
 
     @cached_property
     def neighbours(self) -> tuple[AnyArray, FloatArray]:
@@ -175,12 +174,16 @@ def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[In
 
 def _axes_along(normals: FloatArray) -> FloatArray:
     """Orthonormal axes (n, 3, 3) whose last rows are the unit vectors `normals` (n, 3)."""
-    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    x = np.cross(normals, least)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    return np.stack([x, np.cross(normals, x), normals], axis=1)
+    x, y, z = normals.T
+    sign = np.copysign(1.0, z)
+    # A rotation of the coordinate axes that takes the third, or its opposite, to the normal.
+    a = -1 / (sign + z)
+    b = a * x * y
+    axes = [1 + sign * a * x * x, sign * b, -sign * x, b, sign + a * y * y, -y, x, y, z]
+    return np.stack(axes, axis=1).reshape(-1, 3, 3)
 
 
+@cache
 def _directions(m: int) -> FloatArray:
     """About m / 2 unit vectors, which with their opposites are spread evenly: the same whatever axes are turned over.
 
@@ -214,8 +217,10 @@ def without_noise(tree: PointTree) -> PointTree:
     few = noise(K // 2)
     if few < _NOISE:
         return tree
-    is_disc = _thickness(tree, _nearest(tree, sample, K // 2)) <= _NO_DISC
-    if few < noise(K) * (_NOISE_NOT_DETAIL if is_disc else _THICK_NOISE_NOT_DETAIL):
+    share = few / noise(K)
+    if share < _THICK_NOISE_NOT_DETAIL:
+        return tree
+    if share < _NOISE_NOT_DETAIL and _thickness(tree, _nearest(tree, sample, K // 2)) <= _NO_DISC:
         return tree
     moved = tree
     for k, stride in _spreads(tree, sample):
@@ -234,11 +239,10 @@ def _spreads(tree: PointTree, sample: IntArray) -> list[tuple[int, int]]:
     n = len(tree.P)
     k, stride, most = K, 1, min(_LARGEST_K, n // 4)
     found = {k: _thickness(tree, _nearest(tree, sample, k)) for k in (K // 2, K)}
-    thickness = found[K]
-    near = _nearest(tree, sample, most if thickness > _THICKNESS else K)
-    while thickness > _THICKNESS and k < most:
+    near = _nearest(tree, sample, most if found[K] > _THICKNESS else K)
+    while found[k] > _THICKNESS and k < most:
         k = min(2 * k, most)
-        found[k] = thickness = _thickness(tree, near[:, : k + 1].copy())
+        found[k] = _thickness(tree, near[:, : k + 1].copy())
     flattest = min(found, key=found.__getitem__)
     if found[flattest] <= _NO_SURFACE:
         if found[flattest] > _NO_DISC and flattest != k:
@@ -249,9 +253,9 @@ def _spreads(tree: PointTree, sample: IntArray) -> list[tuple[int, int]]:
                 AccuracyWarning,
             )
         return [(flattest, 1)]
-    while thickness > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
+    while found[k] > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
         stride *= 4
-        thickness = _thickness(tree, _nearest(tree, sample, k, stride))
+        found[k] = _thickness(tree, _nearest(tree, sample, k, stride))
     return [(k, stride), (k, 1)]
 
 

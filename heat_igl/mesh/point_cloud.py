@@ -139,10 +139,9 @@ class PointCloud:
         is_new = np.ones(len(P), bool)
         is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
         # The sort is stable: the first of equal points has the smallest index.
-        distinct = np.sort(order[is_new])
         original = np.empty(len(P), np.int64)
-        original[order] = np.searchsorted(distinct, order[is_new])[np.cumsum(is_new) - 1]
-        return distinct, original
+        original[order] = order[is_new][np.cumsum(is_new) - 1]
+        return np.unique(original, return_inverse=True)
 
     @property
     def has_copies(self) -> bool:

@@ -1,6 +1,7 @@
 cdef extern from *:
     """
-    #define TURN 6.283185307179586476925286766559
+    // What measures angles grows by so much in a turn, and by half in half a turn.
+    #define TURN 4.0
     #define ROUNDING 1e-9
     """
     double TURN

@@ -3,7 +3,7 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.cloud.fitting_triangles import ROUNDING, TURN
-from cython.cimports.libc.math import atan2
+from cython.cimports.libc.math import fabs
 
 
 def fitting_triangles(
@@ -74,13 +74,15 @@ def _direction(
     i: cython.Py_ssize_t,
     j: cython.Py_ssize_t,
 ) -> cython.double:
-    """Angle of point j around point i in the tangent plane of i."""
+    """What grows with the angle of point j around point i in the tangent plane of i, and needs no arctangent."""
     x: cython.double = 0.0
     y: cython.double = 0.0
     for c in range(3):
         x += (P[j, c] - P[i, c]) * axes[i, 0, c]
         y += (P[j, c] - P[i, c]) * axes[i, 1, c]
-    return atan2(y, x)
+    size: cython.double = fabs(x) + fabs(y)
+    angle: cython.double = y / size if size > 0.0 else 0.0
+    return 2.0 - angle if x < 0.0 else angle
 
 
 @cython.cfunc
