@@ -16,6 +16,7 @@ from heat_igl import (
 )
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.typing import FloatArray
+from heat_igl.validation.zoo import FAMILIES
 from heat_igl.windows import ExactSurface
 
 
@@ -109,6 +110,7 @@ MESHES = {
     "torus": lambda: shapes.torus(30, 20),
     "two arms": lambda: two_arms(8),
     "moebius": lambda: moebius_strip(30, 4),
+    "ribbon": lambda: FAMILIES["ribbon"](700024),
     "book": lambda: shapes.book(4, 6),
     **{f"star {seed}": lambda seed=seed: rough_star(seed) for seed in range(4)},
     **{f"field {seed}": lambda seed=seed: rough_field(seed) for seed in range(4)},
@@ -126,6 +128,14 @@ def places(mesh: Mesh, k: int) -> SurfacePoints:
 
 def assert_exact(mesh: Mesh, targets, sources, distance: FloatArray) -> None:
     paths = shortest_paths(mesh, targets, sources)
+    # A search for one target alone ends before it knows the distances of vertices that lie farther.
+    for i in range(0, len(paths), 17):
+        one = (
+            int(targets[i])
+            if isinstance(targets, np.ndarray)
+            else SurfacePoints(targets.faces[[i]], targets.barycentric[[i]])
+        )
+        paths[i] = shortest_paths(mesh, one, sources)[0]
     np.testing.assert_allclose(lengths(mesh, paths), distance, rtol=1e-12, atol=1e-14)
     assert_connected(mesh, *paths)
     for path in paths:

@@ -227,11 +227,14 @@ class PathTracer:
     def is_too_far(
         self, begin: cython.pointer[cython.const[LineEnd]], line: cython.pointer[cython.const[Line]]
     ) -> cython.bint:
-        """Whether the ends of the half-edge that a line leaves over are farther from the source than it allows."""
+        """Whether the ends of the half-edge that a line leaves over are farther from the source than it allows.
+
+        A search that ended with the distance of `begin` knows of farther vertices only that they are farther.
+        """
         h: cython.int = line.ray.h
         left: cython.double = begin.distance - line.walked + _ASTRAY * begin.distance
-        at_head: cython.double = self.distance[self.vertex[previous_half_edge(h)]]
-        at_tail: cython.double = self.distance[self.vertex[next_half_edge(h)]]
+        at_head: cython.double = min(self.distance[self.vertex[previous_half_edge(h)]], begin.distance)
+        at_tail: cython.double = min(self.distance[self.vertex[next_half_edge(h)]], begin.distance)
         return at_head > left + line.ray.x or at_tail > left + self.length[h] - line.ray.x
 
     def go_over(self, line: cython.pointer[cython.const[Line]]) -> cython.void:
