@@ -133,7 +133,7 @@ def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolA
             to, turns = to[to], turns ^ turns[to]
         is_turned ^= turns[group]
         weight = np.where(turns[a] != turns[b], -weight, weight)
-        to = np.unique(to, return_inverse=True)[1]
+        to = (np.cumsum(to == np.arange(n)) - 1)[to]
         group, size = to[group], np.bincount(to, size).astype(np.int64)
         a, b = to[a], to[b]
 
