@@ -7,31 +7,20 @@ import numpy as np
 import pytest
 import surfaces
 from conftest import mean_error
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 from surfaces import arcs
 
 import heat_igl
-from heat_igl import (
-    AccuracyWarning,
-    GeodesicSolver,
-    HeatMethodSolver,
-    MeshError,
-    PointCloud,
-    cli,
-    read_point_cloud,
-    shapes,
-)
+from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, MeshError, PointCloud, cli, shapes
 from heat_igl.drawing.scene import discs
 from heat_igl.geodesic import SolverChoice
 from heat_igl.io import ply
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.local_fits import tangent_planes
-from heat_igl.kernels.cloud.loop_filling import filling_triangles
+from heat_igl.kernels.cloud.loop_filling import filling_triangles, torn_points
 from heat_igl.mesh.cloud_orientation import is_oriented_manifold, oriented
-from heat_igl.mesh.cloud_triangles import (
-    glued_sides,
-    pinched_vertices,
-    with_gaps_filled,
-)
+from heat_igl.mesh.cloud_triangles import glued_sides, pinched_vertices, with_gaps_filled
 from heat_igl.mesh.neighbourhoods import one_sheet, point_tree, without_noise
 from heat_igl.validation.zoo import SHAPES as ZOO
 
@@ -394,6 +383,17 @@ def test_gaps_at_which_a_sheet_is_torn_are_doubtful():
     assert (is_near & (way > 5 * straight)).any(axis=1).all()
 
 
+def test_torn_points_are_more_than_four_edges_from_another_of_a_part():
+    F, rng = heat_igl.shapes.grid(12).F.astype(np.int32), np.random.default_rng(0)
+    nearest, is_part = rng.integers(0, 169, (200, 3), np.int32), rng.random(169) < 0.8
+    graph = csr_array((np.ones(F.size), (F.ravel(), np.roll(F, 1, axis=1).ravel())), shape=(169, 169))
+    far = (dijkstra(graph, directed=False, unweighted=True)[nearest[:, :1], nearest[:, 1:]] > 4) & is_part[
+        nearest[:, 1:]
+    ]
+    np.testing.assert_array_equal(torn_points(F, nearest, is_part, 4), nearest[far.any(axis=1), 0])
+    assert 0 < far.any(axis=1).sum() < 200
+
+
 @pytest.mark.filterwarnings("ignore:the points do not tell their surface")
 @pytest.mark.parametrize("name", ["cliff", "pill", "elbow", "two spheres 1 to 10", "plate", "gear"])
 def test_a_cloud_that_falls_into_parts_says_so(name):
@@ -496,10 +496,10 @@ def written(folder, kind: str, P: np.ndarray, N: np.ndarray):
 @pytest.mark.parametrize("kind", ["ply", "obj", "xyz", "npy"])
 def test_formats(tmp_path, kind):
     P = sphere(40).astype(np.float32).astype(np.float64)
-    cloud = read_point_cloud(written(tmp_path, kind, P, P))
+    cloud = heat_igl.read_point_cloud(written(tmp_path, kind, P, P))
     np.testing.assert_array_equal(cloud.P, P)
     np.testing.assert_allclose(cloud.normals, P, atol=1e-6)
-    assert read_point_cloud(written(tmp_path, kind, P, 0 * P)).normals is None
+    assert heat_igl.read_point_cloud(written(tmp_path, kind, P, 0 * P)).normals is None
 
 
 @pytest.mark.parametrize("kind", ["ply", "xyz", "npy"])
@@ -511,7 +511,7 @@ def test_missing_normals_of_a_file_leave_all_out(tmp_path, kind, missing):
     with pytest.warns(
         AccuracyWarning, match="1 of 40 normals are 0 or not finite, the first that of point 7"
     ) as caught:
-        cloud = read_point_cloud(path)
+        cloud = heat_igl.read_point_cloud(path)
     assert cloud.normals is None
     assert caught[0].filename == __file__
     np.testing.assert_array_equal(cloud.P, P)
@@ -522,17 +522,17 @@ def test_colours_are_no_normals(tmp_path, kind):
     P = sphere(40)
     colours = np.random.default_rng(0).integers(0, 256, (40, 3))
     for columns in (colours, colours / 255, np.full((40, 3), 128)):
-        assert read_point_cloud(written(tmp_path, kind, P, columns)).normals is None
+        assert heat_igl.read_point_cloud(written(tmp_path, kind, P, columns)).normals is None
     # Normals of a plane lie in the range of colours.
     upwards = np.tile([0, 0, 1], (40, 1))
-    np.testing.assert_array_equal(read_point_cloud(written(tmp_path, kind, P, upwards)).normals, upwards)
+    np.testing.assert_array_equal(heat_igl.read_point_cloud(written(tmp_path, kind, P, upwards)).normals, upwards)
 
 
 def test_faces_of_a_mesh_are_ignored(tmp_path):
     mesh = shapes.icosphere(1)
     for name in ("mesh.ply", "mesh.obj"):
         heat_igl.write_mesh(tmp_path / name, mesh)
-        np.testing.assert_array_equal(read_point_cloud(tmp_path / name).P, mesh.V)
+        np.testing.assert_array_equal(heat_igl.read_point_cloud(tmp_path / name).P, mesh.V)
 
 
 @pytest.mark.parametrize(
@@ -552,13 +552,13 @@ def test_faces_of_a_mesh_are_ignored(tmp_path):
 def test_bad_files(tmp_path, name, text, message):
     (tmp_path / name).write_text(text)
     with pytest.raises(MeshError, match=message):
-        read_point_cloud(tmp_path / name)
+        heat_igl.read_point_cloud(tmp_path / name)
 
 
 def test_attributes_of_points_go_to_ply(tmp_path):
     cloud = PointCloud(sphere(40), sphere(40))
     heat_igl.write_point_cloud(tmp_path / "a.ply", cloud, distance=np.append(np.inf, np.arange(39.0)))
-    again = read_point_cloud(tmp_path / "a.ply")
+    again = heat_igl.read_point_cloud(tmp_path / "a.ply")
     np.testing.assert_array_equal(again.P, cloud.P)
     _, others = ply.read_vertices(tmp_path / "a.ply", (tmp_path / "a.ply").read_bytes())
     assert others["distance"].tolist() == [np.inf, *range(39)]
@@ -579,7 +579,7 @@ def test_the_command_line_takes_clouds(tmp_path, kind, capsys):
     path, out = written(tmp_path, kind, P, P), tmp_path / "out.npy"
     points = ["--points"] if kind in ("ply", "obj") else []
     assert cli.run(["distance", str(path), "--source=3", f"--output={out}", "--json=-", *points]) == 0
-    expected = heat_igl.geodesic_distance(read_point_cloud(path), 3)
+    expected = heat_igl.geodesic_distance(heat_igl.read_point_cloud(path), 3)
     np.testing.assert_array_equal(np.load(out), expected)
     assert json.loads(capsys.readouterr().out)["point_cloud"]["n_vertices"] == 40
     assert cli.run(["info", str(path), *points]) == 0
