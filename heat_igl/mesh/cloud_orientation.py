@@ -14,18 +14,14 @@ from heat_igl.mesh.cloud_triangles import (
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-# Share of the triangles that may be left out for the others to be oriented alike. Clouds of scans had up to 0.0012; at
-# 0.002 and 0.004, on thin and narrow parts of two coarse meshes, distance became up to four times as wrong.
-_MOST_LEFT_OUT = 1.5e-3
-# Cosine of the angle at an edge, -1 where the two triangles are flat, below which nothing tells a wrong join.
+# Cosine of the angle at an edge, -1 where the two triangles are flat, below which nothing tells a wrong join. With
+# -0.99 errors on 25 surfaces are the same in the mean; with -0.5 wrong joins at a narrow part count as flat.
 _FLAT = -0.9
-# The same below which neighbours belong to one sheet: with -0.9 some wrong joins of camelhead spread.
-_NO_FOLD = -0.99
-# Weights of edges on folds, which join sheets wrongly more often than flat ones: powers of half of 1 - cosine, at least
-# the second number. No power is best: on the vertices of cheburashka, cow, camelhead, teapot, truck and a gearbox, 100,
-# 100, 100, 87, 72 and 64 % of the triangles are oriented as on the mesh with 2, and 88, 100, 100, 88, 76 and 67 % with
-# 4; 6 is within 1 % of both in the mean, and 1 and 3 are down to 58 % on the teapot.
-_POWER, _LEAST_WEIGHT = 2, 1e-3
+# Power of half of 1 - cosine that weighs edges on folds, which join sheets wrongly more often than flat ones. No power
+# is best: on the vertices of cheburashka, cow, camelhead, teapot, truck and a gearbox, 100, 100, 100, 87, 72 and 64 %
+# of the triangles are oriented as on the mesh with 2, and 88, 100, 100, 88, 76 and 67 % with 4; 6 is within 1 % of both
+# in the mean, and 1 and 3 are down to 58 % on the teapot.
+_POWER = 2
 
 
 def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[IntArray, IntArray]:
@@ -37,14 +33,13 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
     two at a time, in the relative orientation that more of the edges between them want, weighted by flatness. The
     strongest joins for the sizes of the groups come first: a narrow bridge between two sheets is among the last, and
     does not turn a part of a sheet around, as it may in a spanning tree of the flattest edges (Hoppe et al. 1992). Of
-    each pair that still contradicts, one triangle is left out. All stay where that would tear the surface: where these
-    are many, or most of them flat, as on a surface with one side. Then as many neighbours as possible are oriented
-    alike.
+    each pair that still contradicts, one triangle is left out. All stay where most of these are flat, as on a surface
+    with one side, which that would tear. Then as many neighbours as possible are oriented alike.
     """
     is_turned, part, pairs, folds = _turned(P, F)
     left_out = _in_pairs(pairs, len(F))
     # On a surface with one side, neighbours contradict each other where it is flat.
-    if 0 < len(left_out) <= _MOST_LEFT_OUT * len(F) and np.median(folds) > _FLAT:
+    if len(left_out) and np.median(folds) > _FLAT:
         stays = np.ones(len(F), bool)
         stays[left_out] = False
         F, is_turned, part, pairs, folds = F[stays], is_turned[stays], part[stays], pairs[:0], folds[:0]
@@ -65,9 +60,9 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
     contradicts, folds = np.zeros(len(pairs), bool), np.zeros(len(pairs))
     if (part[0] == part[1]).any():
         folds = _folds(P, F, pairs, runs_alike)
-        weight = np.maximum((1 - folds) / 2, 0) ** _POWER + _LEAST_WEIGHT
+        weight = ((1 - folds) / 2) ** _POWER
         # Flat edges join first, but for those around a surface with one side.
-        is_flat = folds < _NO_FOLD
+        is_flat = folds < _FLAT
         sheet, is_turned = _parts(pairs[is_flat], runs_alike[is_flat], len(F))
         group = np.where(sheet[0] == sheet[1], 2 * len(F) + np.arange(len(F)), sheet.min(axis=0))
         group = np.unique(group, return_inverse=True)[1]
