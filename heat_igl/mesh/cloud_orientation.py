@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.cloud_triangles import (
-    FOLDED_BACK,
-    corner,
-    glued_sides,
-    pinched_vertices,
-)
+from heat_igl.mesh.cloud_triangles import FOLDED_BACK, corner, glued_sides, pinched_vertices
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 

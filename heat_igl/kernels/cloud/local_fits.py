@@ -163,26 +163,33 @@ def _turn(local: cython.double[:, ::1], axes: cython.double[:, ::1]) -> cython.v
 @cython.cfunc
 @cython.nogil
 def _normal_equations(local: cython.double[:, ::1], system: cython.double[:, ::1]) -> cython.void:
-    """The matrix (6, 6) of least squares for the terms 1, x, y, xx, xy, yy of z; z in column 6."""
-    term: cython.double[8]
-    moment: cython.double[48]
+    """The upper half of the matrix (6, 6) of least squares for the terms 1, x, y, xx, xy, yy of z; z in column 6."""
+    # Weighted sums of the products of x and y up to the fourth degree, and of those up to the second with z.
+    term: cython.double[22]
+    moment: cython.double[22]
     a: cython.int
     b: cython.int
-    for a in range(48):
-        moment[a] = 0.0
-    term[0], term[7] = 1.0, 0.0
+    for a in range(22):
+        term[a] = moment[a] = 0.0
     for j in range(local.shape[0]):
         x: cython.double = local[j, 0]
         y: cython.double = local[j, 1]
-        term[1], term[2], term[3], term[4], term[5], term[6] = x, y, x * x, x * y, y * y, local[j, 2]
+        term[0], term[1], term[2] = local[j, 3], local[j, 3] * x, local[j, 3] * y
+        term[3], term[4], term[5] = term[1] * x, term[1] * y, term[2] * y
+        term[6], term[7], term[8], term[9] = term[3] * x, term[3] * y, term[5] * x, term[5] * y
+        term[10], term[11], term[12] = term[6] * x, term[6] * y, term[7] * y
+        term[13], term[14] = term[8] * y, term[9] * y
         for a in range(6):
-            weighted: cython.double = local[j, 3] * term[a]
-            # Eight columns, of which the last is none, fill vectors.
-            for b in range(8):
-                moment[8 * a + b] += weighted * term[b]
+            term[15 + a] = term[a] * local[j, 2]
+        for a in range(22):
+            moment[a] += term[a]
     for a in range(6):
-        for b in range(7):
-            system[a, b] = moment[8 * a + b]
+        for b in range(a, 6):
+            # Terms of one degree follow one another, by the power of y.
+            degree: cython.int = (a > 0) + (a > 2) + (b > 0) + (b > 2)
+            power: cython.int = a + b - (a > 0) - 2 * (a > 2) - (b > 0) - 2 * (b > 2)
+            system[a, b] = moment[degree * (degree + 1) // 2 + power]
+        system[a, 6] = moment[15 + a]
 
 
 @cython.cfunc
