@@ -16,7 +16,7 @@ from heat_igl.errors import MeshError, is_number, require_choice, shown
 Engine = Literal["windows", "sweep", "lines", "hopf-lax", "heat"]
 Method = Literal["auto", "windows", "exact", "sweep"]
 DistanceMethod = Literal["auto", "windows", "exact", "sweep", "heat"]
-DomainKind = Literal["triangles", "points", "tetrahedra", "separate simplices"]
+DomainKind = Literal["triangles", "points", "tetrahedra", "varying metric", "separate simplices"]
 
 #: How far around points and curves distance is taken from windows, in mean edge lengths: the cost grows with the
 #: square. Mean error from points inside faces of the cow, the fandisk and the camel's head: 1.63, 0.75 and 0.77 % at 2;
@@ -116,6 +116,8 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
         if kind == "tetrahedra":
             return Plan("lines", None, "shortest paths through tetrahedra are straight lines that bend around edges")
         return Plan("hopf-lax", None, "the metric changes between simplices, and the Hopf-Lax formula converges there")
+    if kind == "varying metric" and method == "auto" and tolerance > 0:
+        return Plan("hopf-lax", None, "the metric varies within triangles, where the Hopf-Lax formula is nearer")
     if method == "sweep":
         return Plan("sweep", None, "a sweep was asked for")
     if method == "auto" and kind == "points":
@@ -123,6 +125,16 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
     if method == "exact" or tolerance == 0:
         return Plan("windows", 0.0, "exact distance was asked for")
     return Plan("windows", float(tolerance), "windows are exact, which holds every tolerance, and need no factor")
+
+
+def hopf_lax_is_nearer(variation: float, curvature: float) -> bool:
+    """Whether the Hopf-Lax formula is nearer than windows on triangles with one length for each edge.
+
+    The error of windows, to which the metric of a triangle is the same everywhere, grows with its variation: the mean
+    square of how far lengths differ from corner to corner, as a share. That of the Hopf-Lax formula, to which fronts
+    are those of the plane, grows with the mean curvature at vertices, in radians (docs/metrics_theory.md).
+    """
+    return bool(variation > curvature + np.finfo(float).eps)
 
 
 def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:

@@ -7,23 +7,23 @@
     python scripts/metrics_table.py faces [--edge 20]          # a metric per face
     python scripts/metrics_table.py grids [--rows 48]          # pixels and voxels, beside fast marching
     python scripts/metrics_table.py smooth [--rows 48]         # tensors that change smoothly in bodies
+    python scripts/metrics_table.py choice [cow.obj ...]       # windows beside the Hopf-Lax formula
     python scripts/metrics_table.py polygons cow.obj --sources 8   # on the duals of these meshes, or their polygons
 
-metrics and bodies: the mean of |d - exact| / exact over vertices and ``--sources`` in percent, "-" where a method does
-not apply; "heat" is the paper's method. For bodies also how much too long the worst value is, by how much it is below
-the straight line, and seconds to make the solver and for a query.
-walls: bodies cut out of even or random tetrahedra. "finer" is the same solver on tetrahedra halved twice (cut into 64),
-or once on more than 3000 vertices: an upper bound, nearer unless it misses a way. The number of edges around which
-paths bend; the mean of |d - finer| / finer, and by how much d is longer and shorter at most; by how much the worst is
-below the straight line; milliseconds for a query, and their ratio to those of heat.
-layers and faces: Delaunay triangles of random points in the unit square, rotated; sources in the first layer. The
-reference is the shortest way through points on the borders, ``--border`` for each edge, or on all edges. Mean and
-largest of |d - reference| / reference, and those of the reference with half as many points.
+metrics and bodies: mean of |d - exact| / exact over ``--sources`` in percent, "-" where a method does not apply; "heat"
+is the paper's method. Of bodies also how much too long the worst value is and how much below the straight line, and
+seconds to make the solver and for a query.
+walls: bodies cut out of even or random tetrahedra, against the same solver on tetrahedra halved twice, or once on more
+than 3000 vertices: "finer" is an upper bound. Edges around which paths bend; the mean of |d - finer| / finer, the
+largest differences, and how much the worst is below the straight line; milliseconds for a query, and those of heat.
+layers and faces: Delaunay triangles of random points, rotated, against shortest ways through ``--border`` points on
+each edge of a border, or on all edges; mean and largest error, also of the reference with half as many points.
 grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels as rows, at their centres, from one of
-them. Beside the default: scikit-fmm (by pip), whose front begins as a circle of 2.5 pixels, and pykonal if it is
-installed. Mean and largest error in percent, and seconds of one query with its preparation.
-smooth: a cylinder that is twisted, and a cube with a speed that grows linearly, with tensors per tetrahedron and at the
-vertices; the same of fim-python, if it is installed, which takes those per tetrahedron.
+them, beside scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and
+largest error in percent, and seconds of one query with its preparation.
+smooth: a twisted cylinder and discs, and a cube with a speed that grows linearly, with tensors per simplex and at the
+vertices; the same of fim-python, if it is installed, which takes those per simplex.
+choice: what `hopf_lax_is_nearer` compares, and mean errors in closed form or against triangles cut into 4 or 16.
 polygons: the mean error of heat on triangles of the polygons, and on those around virtual vertices, each from exact
 distance on the same surface. docs/metrics_theory.md has the tables.
 """
@@ -38,6 +38,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise, product
 from typing import Any
 
+import igl
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -58,7 +59,10 @@ from heat_igl import (
 )
 from heat_igl.mesh import PolygonFans
 from heat_igl.operators import MetricSimplices, Operators
-from heat_igl.sweep import LineEngine
+from heat_igl.operators.metric import in_space
+from heat_igl.operators.suitability import mean_angle_defect
+from heat_igl.sources import source_set
+from heat_igl.sweep import HopfLaxEngine, LineEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.closed_forms import around_the_edge, by_fermat, straight
 from heat_igl.validation.zoo import carved, compact, tetrahedra
@@ -74,6 +78,7 @@ METHODS = {
     "sweep": ours("sweep"),
     "windows": ours("windows"),
 }
+Field = tuple[str, Mesh, Callable[[FloatArray], FloatArray], int, FloatArray]
 # Cells across layers, and across a mesh with a metric per face.
 ACROSS, FINE = 30, 18
 # A body of more vertices is halved once for its reference.
@@ -534,7 +539,7 @@ def cylinder(rings: int, rng: Random) -> Mesh:
     return tetrahedra(V)
 
 
-def smooth(rows: int, rng: Random) -> Iterator[tuple[str, Mesh, Callable[[FloatArray], FloatArray], int, FloatArray]]:
+def smooth(rows: int, rng: Random) -> Iterator[Field]:
     """Names, meshes, metrics (k, 3, 3) at places (k, 3), a source, and exact distances."""
     for k in (2.0, 4.0):
         for rings in (rows // 12, rows // 6, rows // 4):
@@ -552,7 +557,7 @@ def smooth(rows: int, rng: Random) -> Iterator[tuple[str, Mesh, Callable[[FloatA
         for cells in (rows // 6, rows // 4, 5 * rows // 12):
             mesh = moved_inside(shapes.box(cells), rng, 0.25 / cells)
             source = int(np.linalg.norm(mesh.V - place, axis=1).argmin())
-            metric = lambda x, c=c: np.eye(3) / (1 + (c - 1) * x[:, 2, None, None]) ** 2  # noqa: E731
+            metric = isotropic(lambda x, c=c: 1 + (c - 1) * x[:, 2])
             name = f"speeds 1 : {c}, from {'the middle' if place else 'a slow corner'}"
             yield name, mesh, metric, source, hyperbolic(mesh.V, source, c)
 
@@ -576,6 +581,49 @@ def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         ):
             row[method] = timed(exact, query, mesh, g, source)
         yield row
+
+
+def choices(options: argparse.Namespace, rng: Random) -> Iterator[Field]:
+    yield from (field for field in smooth(options.rows, rng) if not field[1].is_tetrahedral)
+    for cells in (options.rows // 4, options.rows // 2, options.rows):
+        mesh, source = plane(cells, rng), (cells // 2) * (cells + 2)
+        for c in (1.5, 3.0, 20.0):
+            metric = isotropic(lambda x, c=c: 1 + (c - 1) * x[:, 1])
+            yield f"speeds growing linearly, 1 : {c:g}", mesh, metric, source, hyperbolic(mesh.V, source, c)
+        z = 0.1 ** (mesh.V[:, 1] + 1j * mesh.V[:, 0]) / np.log(10)  # unrolled
+        yield (
+            "speeds growing exponentially, 1 : 10",
+            mesh,
+            isotropic(lambda x: 10 ** x[:, 1]),
+            source,
+            np.abs(z - z[source]),
+        )
+    surfaces = {"square": plane(24, rng), "sphere": shapes.icosphere(4), "torus": shapes.torus(24, 60, 0.4)}
+    for (name, mesh), c in product((surfaces | named(options.meshes)).items(), (0.01, 0.1, 0.5)):
+        mesh = Mesh(mesh.V / np.ptp(mesh.V, axis=0).max(), mesh.F)
+        finer = Mesh(*igl.upsample(mesh.V, mesh.F, 1 if len(mesh.F) > MANY else 2))
+        metric = isotropic(lambda x, c=c: 1 + c * np.sin(9 * x[:, 0] + 2) * np.cos(8 * x[:, 1]))
+        exact = GeodesicSolver(metric_operators(finer, metric(finer.V))).distance(7)[: mesh.n_vertices]
+        yield f"{name}, speeds in waves, 1 : {(1 + c) / (1 - c):.3g}", mesh, metric, 7, exact
+
+
+def isotropic(speed: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
+    return lambda x: np.eye(3) / speed(x)[:, None, None] ** 2
+
+
+def on_choice(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
+    for name, mesh, metric, source, exact in choices(options, rng):
+        for where, g in (("vertex", metric(mesh.V)), ("face", metric(mesh.V[mesh.F].mean(axis=1)))):
+            domain = metric_operators(mesh, g)
+            if domain.surface is None:
+                continue
+            simplices = MetricSimplices.in_metric(mesh, g, 0.0, at_vertices=where == "vertex")
+            one = GeodesicSolver(domain, method="exact").distance(source)
+            other = HopfLaxEngine(simplices).distance(source_set(source, mesh.n_vertices, None))
+            off = [np.abs(excess(d, exact)).mean() for d in (one, other)]
+            row: Row = {"field": f"{name}, per {where}", "n": mesh.n_vertices, "windows": off[0], "hopf": off[1]}
+            row |= {"variation": simplices.variation, "curvature": mean_angle_defect(in_space(mesh))}
+            yield row | {"chosen": "windows" if domain.simplices is None else "Hopf-Lax"}
 
 
 # Polygons, on triangles of theirs and around virtual vertices.
@@ -669,6 +717,10 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
     "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}"} | errors_and_seconds(
         fim="fim-python", face="per simplex", vertex="at the vertices"
     )),
+    "choice": (on_choice, {
+        "metric": "{field}", "vertices": "{n}", "variation": "{variation:.2g}", "curvature": "{curvature:.2g}",
+        "windows, %": "{windows:.2g}", "Hopf-Lax, %": "{hopf:.2g}", "chosen": "{chosen}",
+    }),
     "polygons": (on_polygons, {
         "": "{mesh}", "triangles without virtual vertices, %": "{triangles:.2g}",
         "with virtual vertices (default), %": "{virtual:.2g}",

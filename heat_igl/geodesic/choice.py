@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Any, get_args
 
 from heat_igl.errors import require_choice
@@ -48,12 +48,6 @@ class SolverChoice:
         if given and method not in (None, "heat"):
             raise ValueError(f"{given[0]} is an option of the heat method, but the method is {method}: leave one away")
         return cls(method or ("heat" if given else "auto"), tolerance, heat)  # type: ignore[arg-type]
-
-    def changed(self, **options: Any) -> SolverChoice:
-        """The same choice with other options."""
-        own = {name: value for name, value in options.items() if name not in _OPTIONS_OF_HEAT}
-        of_heat = {name: value for name, value in options.items() if name in _OPTIONS_OF_HEAT}
-        return replace(self, heat=replace(self.heat, **of_heat), **own)
 
     def on(self, mesh: MeshLike | Operators, region: ArrayLike | None = None) -> Solver:
         """The solver on a mesh, or on operators."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property, reduce
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, cast, get_args
 
 import igl
 import numpy as np
@@ -163,8 +163,8 @@ class GeodesicSolver(BatchedSolver):
     method : {"auto", "windows", "exact", "sweep"}
         "windows" and "exact" find the polyhedral distance. "sweep" unfolds two triangles at a time: 0.06 to 0.3 % mean
         error on scans, without a bound, in a fraction of the time on large meshes. "auto" is windows on triangles, and
-        a sweep on a `PointCloud`. Tetrahedra are passed by straight lines, and simplices that see their common edges at
-        different lengths by the Hopf-Lax formula. `plan` says what was taken, and why.
+        a sweep on a `PointCloud`. Tetrahedra are passed by straight lines, and metrics that vary by the Hopf-Lax
+        formula. `plan` says what was taken, and why.
     tolerance : float
         Largest error over the distance. Windows are exact, which holds every tolerance.
     region : (n,) or (m,) array_like of bool, optional
@@ -247,15 +247,10 @@ class GeodesicSolver(BatchedSolver):
         """The plan for the domain, and the engine that it names."""
         domain, method, tolerance = self._domain, self._method, self._tolerance
         if isinstance(domain, Mesh) and domain.is_tetrahedral:
-            flat = np.flatnonzero(domain.measures <= 0)
-            if len(flat):
-                raise MeshError(
-                    f"F[{flat[0]}] = {domain.F[flat[0]].tolist()} has no volume ({len(flat)} of {domain.n_faces} "
-                    "faces): remove these faces"
-                )
-            from heat_igl.operators import MetricSimplices
+            from heat_igl.operators import MetricSimplices, check_measures
             from heat_igl.sweep import LineEngine
 
+            check_measures(domain)
             return distance_plan("tetrahedra", method, tolerance), LineEngine(MetricSimplices.in_space(domain))
         if isinstance(domain, Operators):
             if domain.simplices is not None:
@@ -263,7 +258,10 @@ class GeodesicSolver(BatchedSolver):
 
                 if domain.simplices.V is not None:
                     return distance_plan("tetrahedra", method, tolerance), LineEngine(domain.simplices)
-                return distance_plan("separate simplices", method, tolerance), HopfLaxEngine(domain.simplices)
+                chosen = distance_plan("varying metric" if domain.surface else "separate simplices", method, tolerance)
+                if chosen.engine == "hopf-lax":
+                    self._triangles = OperatorTriangles(domain) if domain.surface else None
+                    return chosen, HopfLaxEngine(domain.simplices)
             if domain.surface is None:
                 raise MeshError("distance is measured along simplices, and these operators know none: give the mesh")
             chosen = distance_plan("triangles", method, tolerance)
@@ -356,8 +354,8 @@ class GeodesicSolver(BatchedSolver):
         ValueError
             If `cutoff` is not positive.
         """
-        limit = checked_cutoff(cutoff)
-        distance: FloatArray = self._with_copies(self._engine.distance(self._source_set(sources), limit, n_threads()))
+        limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
+        distance: FloatArray = self._with_copies(self._asked(chosen).distance(chosen, limit, n_threads()))
         distance[distance > limit] = np.inf
         return distance
 
@@ -380,8 +378,8 @@ class GeodesicSolver(BatchedSolver):
         LabelledDistance
             `distance` (n,) and `labels` (n,).
         """
-        limit = checked_cutoff(cutoff)
-        found = self._engine.labelled(self._source_set(sources), limit, n_threads())
+        limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
+        found = self._asked(chosen).labelled(chosen, limit, n_threads())
         distance, labels = map(self._with_copies, found)
         distance[distance > limit] = np.inf
         labels[np.isinf(distance)] = -1
@@ -440,12 +438,13 @@ class GeodesicSolver(BatchedSolver):
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
         Arguments and errors as for `distance`; a ValueError also if the engine is a sweep, and for what has no
-        derivative, see `differentiable_surface`. Both are those of the exact paths. Of the Hopf-Lax
-        formula, the derivative is that of its fixed point, which ``phi`` is to rounding: `SimplexDerivative`.
+        derivative, see `differentiable_surface`. Both are those of the exact paths, also in a metric per face for which
+        triangles have one length for each edge. Of the Hopf-Lax formula elsewhere, the derivative is that of its fixed
+        point, which ``phi`` is to rounding: `SimplexDerivative`.
         """
         from heat_igl.sweep.simplex_engine import SimplexEngine
 
-        if isinstance(self._engine, SimplexEngine):
+        if isinstance(self._engine, SimplexEngine) and not getattr(self._domain, "metric", None):
             answer = self._engine.derivative(self._source_set(sources))
             return answer.distance, answer
         from heat_igl.geodesic.derivatives import DistanceDerivative, differentiable_surface
@@ -463,10 +462,21 @@ class GeodesicSolver(BatchedSolver):
         distance = engine.distance(chosen, np.inf, n_threads())
         return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_faces)
 
+    def _asked(self, sources: SourceSet) -> Engine:
+        """The engine for these sources: points and curves in a varying metric are those of windows."""
+        is_in_faces = self._plan.engine == "hopf-lax" and not sources.on_vertices_alone
+        return self._unfolded if is_in_faces else self._engine
+
+    @cached_property
+    def _unfolded(self) -> GuardedEngine:
+        return guarded_windows(cast(Triangles, self._triangles), None, _sweep_engine)
+
     def _windows(self, what: str) -> GuardedEngine:
-        """The engine, if it finds paths."""
+        """The engine that finds paths, if there is one."""
         if isinstance(self._engine, GuardedEngine):
             return self._engine
+        if self._plan.engine == "hopf-lax" and self._triangles is not None:
+            return self._unfolded
         if self._triangles is None:
             raise MeshError(f"{what} paths on triangles that fit together, and the engine here is {self._plan.engine}")
         raise ValueError(f"{what} paths, which a sweep does not find: make the solver with method='windows'")
@@ -530,7 +540,7 @@ class GeodesicSolver(BatchedSolver):
         return chosen
 
     def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[None]]:
-        rows = [self._engine.distance(sources, cutoff) for sources in source_sets]
+        rows = [self._asked(sources).distance(sources, cutoff) for sources in source_sets]
         return self._with_copies(np.stack(rows)), [None] * len(rows)
 
 

@@ -179,17 +179,22 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
     index = np.full(inside.shape, -1)
     index[inside] = np.arange(n)
     # Corner (i, j, ...) is the first one of cell (i, j, ...).
-    shape = tuple(size + 1 for size in inside.shape)
-    offsets = np.indices((2,) * dimension).reshape(dimension, -1).T
-    corners = np.ravel_multi_index(tuple(np.moveaxis(cells[:, None] + offsets, 2, 0)), shape)
-    used, corners = np.unique(corners, return_inverse=True)
-    corners = n + corners.reshape(n, -1)
-    sides = _sides(dimension)[cells.sum(axis=1) % 2]
-    outer = np.take_along_axis(corners, sides.reshape(n, -1), axis=1).reshape(sides.shape)
-    centre = np.broadcast_to(np.arange(n)[:, None, None], (*sides.shape[:2], 1))
-    F = np.concatenate([centre, outer], axis=2).reshape(-1, dimension + 1)
-    V = np.concatenate([cells, np.stack(np.unravel_index(used, shape), axis=1) - 0.5]) * np.asarray(steps)
-    return ImageDomain(Mesh(V[:, ::-1], F), index)
+    used = np.zeros([size + 1 for size in inside.shape], bool)
+    offsets = np.ndindex((2,) * dimension)
+    places = [tuple(slice(k, k + size) for k, size in zip(o, inside.shape, strict=True)) for o in offsets]
+    for place in places:
+        used[place] |= inside
+    number = n - 1 + np.cumsum(used).reshape(used.shape)
+    corners = [number[place][inside] for place in places]
+    even, odd = _sides(dimension)
+    is_odd = cells.sum(axis=1) % 2 == 1
+    F = np.empty((n, len(even), dimension + 1), np.int64)
+    F[:, :, 0] = np.arange(n)[:, None]
+    # A corner at a time: a million voxels have twelve million tetrahedra.
+    for side, k in np.ndindex(even.shape):
+        F[:, side, k + 1] = np.where(is_odd, corners[odd[side, k]], corners[even[side, k]])
+    V = np.concatenate([cells, np.argwhere(used) - 0.5]) * np.asarray(steps)
+    return ImageDomain(Mesh(V[:, ::-1], F.reshape(-1, dimension + 1)), index)
 
 
 def _sides(dimension: int) -> IntArray:
@@ -200,18 +205,13 @@ def _sides(dimension: int) -> IntArray:
     """
     if dimension == 2:
         return np.tile([[0, 1], [1, 3], [3, 2], [2, 0]], (2, 1, 1))
-    cut = np.empty((2, _FACES_PER_CELL[3], 3), np.int64)
-    for odd in range(2):
-        triangles = []
-        for axis in range(3):
-            one, other = (4 >> (axis + step) % 3 for step in (1, 2))
-            for level in (0, 4 >> axis):
-                square = [level, level + one, level + one + other, level + other]
-                if (bin(level).count("1") + odd) % 2:
-                    square = square[1:] + square[:1]
-                triangles += [[square[0], square[1], square[2]], [square[0], square[2], square[3]]]
-        cut[odd] = triangles
-    return cut
+    cut: list[IntArray] = []
+    for odd, axis, level in np.ndindex(2, 3, 2):
+        one, other = (4 >> (axis + step) % 3 for step in (1, 2))
+        square = level * (4 >> axis) + np.array([0, one, one + other, other])
+        square = square if level == odd else np.roll(square, -1)
+        cut += [square[[0, 1, 2]], square[[0, 2, 3]]]
+    return np.reshape(cut, (2, -1, 3))
 
 
 def _mask(mask: ArrayLike) -> BoolArray:

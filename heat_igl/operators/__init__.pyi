@@ -17,6 +17,7 @@ from heat_igl.operators.metric_derivatives import SideLengths as SideLengths
 from heat_igl.operators.metric_simplices import MetricSimplices as MetricSimplices
 from heat_igl.operators.suitability import is_rough_or_narrow as is_rough_or_narrow
 from heat_igl.operators.suitability import share_on_large_triangles as share_on_large_triangles
+from heat_igl.operators.triangles import check_measures as check_measures
 from heat_igl.operators.triangles import cotan_operators as cotan_operators
 from heat_igl.operators.triangles import edge_length_operators as edge_length_operators
 from heat_igl.operators.triangles import fan_operators as fan_operators

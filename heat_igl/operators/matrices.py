@@ -166,9 +166,8 @@ class Operators:
         The triangles, for exact distance near sources and for unfolding; None if distance is not measured along
         triangles. The three steps never read it.
     simplices : MetricSimplices or None
-        Tetrahedra, or triangles that do not fit together, for the engines that pass through them; else None.
-    contrast : float
-        Largest ratio between faces of the length in the metric per length in space; 1 without a metric.
+        Tetrahedra, or triangles in metrics that do not fit together or vary within them, for the engines that pass
+        through them; else None.
     metric : MetricSides or None
         The lengths of triangles in a metric, to be differentiated; None without one, and for `simplices`.
     drawn_on : Surface or None
@@ -205,7 +204,6 @@ class Operators:
     surface: Surface | None = None
     longest_distances: FloatArray | None = None
     simplices: MetricSimplices | None = None
-    contrast: float = 1.0
     metric: MetricSides | None = None
     drawn_on: Surface | None = None
     fans: PolygonFans | None = None

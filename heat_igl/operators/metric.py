@@ -16,15 +16,17 @@ from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
 from heat_igl.operators.metric_simplices import MetricSimplices
+from heat_igl.operators.suitability import mean_angle_defect
 from heat_igl.operators.triangles import check_measures, edge_length_operators, intrinsic_operators, longest_sides
+from heat_igl.plan import hopf_lax_is_nearer
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
 # Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
 # for its length.
 _ONE_LENGTH = 0.1
-# Share that has to remain of the length by which two sides of a triangle are longer than the third: with the mean of
-# two lengths for each side, and with lengths integrated in a smooth metric, for which the Hopf-Lax formula is better.
-_SLACK, _SMOOTH_SLACK = 0.03, 0.5
+# Share that has to remain of the length by which two sides of a triangle are longer than the third, with the mean of
+# two lengths for each side, or with lengths integrated in a smooth metric.
+_SLACK = 0.03
 # Squared lengths in a metric per squared length; areas are their squares.
 _LARGEST = 1e120
 # Asymmetry of a metric, and a negative direction across a triangle, that are taken for rounding.
@@ -57,20 +59,15 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
         For `GeodesicSolver` and `HeatMethodSolver`; all lengths are those of the metric.
 
         Triangles: where faces see their common edges at the same length, within 10 %, they are an intrinsic
-        triangulation with these lengths (the mean of both). Edges are flipped, and every method works. If lengths are
-        30 times as long in one place as in another, `HeatMethodSolver` takes exact windows by default: one time step
-        cannot suit both.
+        triangulation with these lengths (the mean of both, or integrals along the edges of a metric at the vertices).
+        Edges are flipped, and every method works. Distance from vertices is that of windows, or of the Hopf-Lax
+        formula where the metric varies within triangles by more than the surface is curved.
 
-        Where faces differ by more anywhere, as at a jump of the speed, no unfolding is straight: there is no `surface`,
-        flips end at such edges, sources are vertices, and `GeodesicSolver` takes the Hopf-Lax formula on
-        the triangles: those after flips if most edges have one length.
+        Where faces differ by more anywhere, as at a jump of the speed, or the metric changes too far along an edge, no
+        unfolding is straight: there is no `surface`, flips end at such edges, sources are vertices, and distance is
+        that of the Hopf-Lax formula, per face on the triangles after flips if most edges have one length.
 
-        With a metric at the vertices, the length of an edge is the integral along it. Where these are the sides of
-        triangles much like those in the metric of each face, they are an intrinsic triangulation; if there is a face
-        where they are not, since the metric changes too far along an edge, distance is that of the Hopf-Lax formula.
-
-        Tetrahedra: in one metric for all, distance is exact as in space. In any other, it is that of the Hopf-Lax
-        formula.
+        Tetrahedra: in one metric for all, distance is exact as in space, else that of the Hopf-Lax formula.
 
         This is of first order, sharpened to second where the metric and the distance are smooth. Where tensors per
         face are those of a smooth field, their velocities are carried to the vertices first.
@@ -128,11 +125,9 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     Returns
     -------
     Operators
-        For `GeodesicSolver` and `HeatMethodSolver`, with every length a travel time. Where speeds of neighbours
-        differ by at most 10 %, the mean is taken for the edge between them, and triangles with these travel
-        times are an intrinsic triangulation, on which every method works. Where they jump, and on tetrahedra,
-        `GeodesicSolver` takes the Hopf-Lax formula on each simplex (`HopfLaxEngine`), right at any contrast;
-        then sources are vertices.
+        For `GeodesicSolver` and `HeatMethodSolver`, with every length a travel time, as those of `metric_operators`:
+        windows in a speed that is the same everywhere, else the Hopf-Lax formula, right at any contrast. Where speeds
+        of neighbours jump by more than 10 %, and on tetrahedra, sources are vertices.
 
     Raises
     ------
@@ -271,26 +266,36 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Lapl
 
     No unit vector is shorter than `least` in it.
     """
-    # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T: edges times C have the lengths of the metric.
-    p = mesh.F.shape[1] - 1
-    if p == 3:
+    if mesh.is_tetrahedral:
         return _TetrahedronOperators(mesh, MetricSimplices.in_metric(mesh, g, least), g)
-    factor = np.linalg.cholesky(g)
     corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
-    # Relative to the first corner: digits would be lost far from the origin.
-    corners = (corners - corners[:, :1]) @ factor
-    lengths = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3)
-    own = lengths[:, [1, 2, 0], [2, 0, 1]]
+    along = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    own = np.sqrt(((along @ g) * along).sum(axis=2))
     sides = _common_lengths(mesh, own)
-    if sides is not None:
-        domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
-        return replace(domain, contrast=_contrast(g))
-    return _refracting(mesh, own, g, least, laplacian)
+    if sides is None:
+        return _refracting(mesh, own, g, least, laplacian)
+    # Triangles without area know no metric in their plane.
+    has_area = bool((mesh.measures > 0).all())
+    return _unfolded(mesh, sides, _of_faces(mesh, g, least) if has_area else None, laplacian)
 
 
-def _contrast(g: FloatArray) -> float:
-    """Ratio of the lengths in metrics (m, p, p), each the geometric mean over all directions."""
-    return float(np.exp(np.ptp(np.linalg.slogdet(g)[1]) / (2 * g.shape[1])))
+def _unfolded(mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian) -> Operators:
+    """The operators of triangles with the lengths `sides` (m, 3), and with `simplices` where these are nearer."""
+    domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
+    if simplices is not None and not hopf_lax_is_nearer(simplices.variation, mean_angle_defect(in_space(mesh))):
+        simplices = None
+    return replace(domain, simplices=simplices)
+
+
+def in_space(mesh: Mesh) -> IntrinsicTriangulation:
+    """The triangles with the lengths of space."""
+    return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets)
+
+
+def _of_faces(mesh: Mesh, g: FloatArray, least: float) -> MetricSimplices:
+    """Triangles with a metric g (m, 2, 2) in the plane of each."""
+    axes = plane_axes(mesh)
+    return MetricSimplices.in_metric(mesh, np.swapaxes(axes, 1, 2) @ g @ axes, least)
 
 
 def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:
@@ -302,9 +307,8 @@ def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Laplac
     axes = plane_axes(mesh)
     inside = axes @ mean @ np.swapaxes(axes, 1, 2)
     sides = simplices.measured[2][:, ::-1]  # opposite each corner
-    if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1]), _SMOOTH_SLACK):
-        domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
-        return replace(domain, contrast=_contrast(inside))
+    if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1])):
+        return _unfolded(mesh, sides, simplices, laplacian)
     # For heat: what each face says alone.
     domain = operators_in_metric(mesh, inside, least, laplacian)
     return replace(domain, surface=None, simplices=simplices)
@@ -319,13 +323,13 @@ def _common_lengths(mesh: Mesh, own: FloatArray) -> FloatArray | None:
     if (longest - shortest > _ONE_LENGTH * longest).any():
         return None
     mean = (np.bincount(of_side.ravel(), own.ravel()) / np.bincount(of_side.ravel()))[of_side]
-    return np.asarray(mean) if _keeps_shape(mean, own, _SLACK) else None
+    return np.asarray(mean) if _keeps_shape(mean, own) else None
 
 
-def _keeps_shape(sides: FloatArray, was: FloatArray, share: float) -> bool:
+def _keeps_shape(sides: FloatArray, was: FloatArray) -> bool:
     """Whether of triangles with sides `was` (m, 3), those with these sides keep a share of the slack."""
     slack, was_slack = (a.sum(axis=1) - 2 * longest_sides(a) for a in (sides, was))
-    return bool((slack >= share * was_slack).all())
+    return bool((slack >= _SLACK * was_slack).all())
 
 
 def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:
@@ -342,14 +346,13 @@ def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, lapl
     if fits or not (mesh.measures > 0).all():
         simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, least)
     else:
-        axes = plane_axes(mesh)
-        simplices = MetricSimplices.in_metric(mesh, np.swapaxes(axes, 1, 2) @ g @ axes, least)
-    return replace(domain, simplices=simplices, contrast=_contrast(g))
+        simplices = _of_faces(mesh, g, least)
+    return replace(domain, simplices=simplices)
 
 
 def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
     """The triangles with lengths of their own, cut apart at the edges that they see at two lengths."""
-    apart = from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets)
+    apart = in_space(mesh)
     twin = apart.twin.copy()
     glued = np.flatnonzero(twin >= 0)
     one, other = sides.ravel()[glued], sides.ravel()[twin[glued]]
@@ -376,11 +379,6 @@ class _TetrahedronOperators(Operators):
     def longest_distances(self) -> FloatArray | None:
         """Of each component."""
         return self._made.longest_distances
-
-    @property
-    def contrast(self) -> float:
-        """Largest ratio of lengths."""
-        return self._made.contrast
 
     @cached_property
     def _made(self) -> Operators:
@@ -421,7 +419,6 @@ def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Ope
         longest_distance=np.nan,
         is_surface=False,
         simplices=simplices,
-        contrast=_contrast(g),
     )
     return _with_shortest_edges(domain, mesh, pairs, lengths)
 
@@ -479,13 +476,9 @@ def _symmetric(g: FloatArray) -> FloatArray:
 def _least_length(smallest: FloatArray, g: FloatArray) -> float:
     """The root of the least of the smallest eigenvalues (k,) of tensors (k, p, p); an error unless doubles hold all."""
     _raise_at_first(~(smallest > 0), "metric", g, "must be positive definite on its face")
-    _raise_at_first(
-        (smallest < 1 / _LARGEST) | (np.abs(g).max(axis=(1, 2)) > _LARGEST),
-        "metric",
-        g,
-        f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}, or squares leave the range of "
-        "doubles: take another unit",
-    )
+    outside = (smallest < 1 / _LARGEST) | (np.abs(g).max(axis=(1, 2)) > _LARGEST)
+    needed = f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}"
+    _raise_at_first(outside, "metric", g, needed, "squares leave the range of doubles, take another unit")
     return float(np.sqrt(smallest.min()))
 
 

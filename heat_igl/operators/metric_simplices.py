@@ -126,6 +126,12 @@ class MetricSimplices:
         mean = np.ascontiguousarray(lengths**2)
         return mean[:, None], mean, lengths, np.ones(len(mean))
 
+    @property
+    def variation(self) -> float:
+        """How far lengths of edges differ between the metrics of the corners of a simplex: mean square of the share."""
+        squares, mean, _, _ = self.measured
+        return float((np.ptp(np.sqrt(squares), axis=1) ** 2 / mean).mean())
+
     def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:
         """The tensors (..., 3, 3) of chosen simplices (...) at corners (...)."""
         if self.tensors is not None:

@@ -141,10 +141,10 @@ def is_rough_or_narrow(domain: Operators) -> bool:
     n_outer = np.count_nonzero(domain.boundary & domain.referenced)
     if NARROW * n < n_outer < ONE_CELL_WIDE * n:
         return True
-    return _mean_angle_defect(triangulation) * triangulation.n_used > ROUGH_FOR_HEAT * n
+    return mean_angle_defect(triangulation) * triangulation.n_used > ROUGH_FOR_HEAT * n
 
 
-def _mean_angle_defect(triangulation: IntrinsicTriangulation) -> float:
+def mean_angle_defect(triangulation: IntrinsicTriangulation) -> float:
     """Mean of |2 pi - sum of angles| over inner vertices, or over a thousand of them."""
     F, n = triangulation.F, triangulation.n
     chosen = np.zeros(n, bool)
