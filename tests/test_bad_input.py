@@ -162,6 +162,7 @@ def source_cases() -> Iterator[Case]:
     for empty in ([], (), np.empty(0), np.empty(0, int)):
         yield source_case(f"empty {type(empty).__name__}", empty, "sources is empty")
     yield source_case("mask that selects nothing", np.zeros(n, bool), "selects no vertex")
+    yield source_case("mask of integers", np.eye(n, dtype=np.uint8)[7], "sources are 42 integers .* must be boolean")
     for length in (1, n - 1, n + 1):
         yield source_case(f"mask of {length}", np.ones(length, bool), f"has {length} entries.*has 42 vertices")
 

@@ -321,6 +321,8 @@ class _Builder:
             self.add(points_beside(self._mesh, cast(ArrayLike, sources), "sources"))
         else:
             vertices = named_vertices(sources, self._n)
+            if len(vertices) == self._n > 2 and vertices.max() <= 1:
+                raise SourceError(f"sources are {self._n} integers 0 and 1: a mask must be boolean, so astype(bool)")
             self._vertices.append((vertices, self._counted(len(vertices))))
 
     def _counted(self, k: int) -> IntArray:
