@@ -299,7 +299,6 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         r"positions must have shape \(k, 3\), a row for each, or .*, not \(2, 4\)",
     ),
     (lambda _: curve_on(GRID, [[0, 0, 0], [1, np.nan, 0]]), r"positions\[1\] = \[1.0, nan, 0.0\] is not finite"),
-    (lambda _: curve_on(GRID, [["a", 0, 0], [1, 0, 0]]), "positions must be real numbers"),
     (lambda _: curve_on(GRID, [[0.5, 0.5, 0], [0.5, 0.5, 0]]), "all in one place"),
     (
         lambda _: curve_on(GRID, [[0.5, 0.5, 0], [0.5, 0.5, 2]]),
@@ -365,7 +364,6 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: VECTORS.extend(0, [1.0, 2.0]), "values must be one number for each of the 1 sources"),
     (lambda m: trace_geodesic(m, 3, [0, 0], 0.1), r"direction = \[0, 0\] is 0 in the tangent plane"),
     (lambda m: trace_geodesic(m, 3, [1, 0], -1), "length must be a finite number of at least 0, not -1"),
-    (lambda m: trace_geodesic(m, 3, [1, 0], np.nan), "length must be .* not nan"),
     # What a method or a domain does not give.
     *(
         (lambda m, e=e: GeodesicSolver(m, tolerance=e), "tolerance must be at least 0 and less than 1, not")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conformance import on_sphere
 from conftest import mean_error
 
 import heat_igl
@@ -344,11 +345,13 @@ def test_heat_is_held_to_the_bounds(monkeypatch):
         assert (np.abs(found[i] - found[j]) <= 1.041 * np.linalg.norm(mesh.V[i] - mesh.V[j], axis=1)).all()
 
 
-@pytest.mark.parametrize("kind", ["helix", "spiral ramp", "handles", "spiky sphere", "random tetrahedra", "CAD plate"])
+@pytest.mark.parametrize(
+    "kind", ["helix", "spiral ramp", "handles", "spiky sphere", "random tetrahedra", "CAD plate", "points"]
+)
 def test_heat_says_when_it_is_wrong(kind):
     """Kinds on which heat was off by more than 5 % in silence; more members are in scripts/accuracy.py."""
     for seed in range(3):
-        mesh = FAMILIES[kind](seed)
+        mesh = FAMILIES[kind](seed) if kind != "points" else heat_igl.PointCloud(on_sphere(20 + seed))
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             solver = HeatMethodSolver(mesh)

@@ -294,14 +294,16 @@ def prepare_mesh(
 
         # The order of elimination takes a third of the time and needs no more than the pattern of L.
         on_laplacian = analyse if known is None and n_threads() > 1 else None
+        usual = None
         if isinstance(mesh, PointCloud):
-            domain = point_cloud_operators(mesh, options.laplacian, on_laplacian)
-            if options.default_time_step:
-                options = replace(options, t_coef=_t_coef_of_points(mesh.triangles))
+            domain, usual = (
+                point_cloud_operators(mesh, options.laplacian, on_laplacian),
+                _t_coef_of_points(mesh.triangles),
+            )
         else:
             domain = operators(mesh, options.laplacian, on_laplacian)
         seconds = time.perf_counter() - start
-        return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V)
+        return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V, usual)
 
 
 def _t_coef_of_points(triangles: Mesh) -> float:
@@ -316,15 +318,17 @@ def prepare(
     known: Callable[[], Analysis | None] = lambda: None,
     seconds_operators: float = 0.0,
     V: FloatArray | None = None,
+    t_coef: float | None = None,
 ) -> SolverParts:
     """The parts of a solver on `domain`: resolve the options, then factor the matrices.
 
     `known` is called, when it is needed, for an order of elimination, which is taken if it fits. Positions V (n, 3) are
-    for the check of answers against straight lines.
+    for the check of answers against straight lines. `t_coef` is the default of the domain, if it has its own.
     """
     damped = options.damps(domain)
     fitted = damped and domain.lengths is not None
-    step, requested = time_step(options, domain, fitted)
+    chosen = replace(options, t_coef=t_coef) if options.default_time_step else options
+    step, requested = time_step(chosen, domain, fitted)
     check_large_step(options, domain)
     t_damping = step if damped else None
     begun = time.perf_counter()
