@@ -110,7 +110,7 @@ class AnswerCheck(NamedTuple):
         Whether the answer was raised to straight lines after that.
     compared : Comparison or None
         How far the answer is from that of another engine; None if it was not compared, see `Comparisons`: never if the
-        field has length 1 or a time step was asked for, and on polygons.
+        field has length 1 or a time step was asked for, and from points and curves on polygons.
     """
 
     shortfall: float
@@ -177,6 +177,8 @@ class Comparisons:
 
     def compare(self, distance: FloatArray, sources: SourceSet, is_doubtful: bool) -> Comparison | None:
         """Compare an answer (n,) if it `is_doubtful`, or others of its kind may be wrong; else None."""
+        if self._domain.fans is not None and not sources.on_vertices_alone:
+            return None  # the other engine's triangles are those of the fans
         near = self._near.setdefault(_kind(sources), np.zeros(self._domain.n_components, np.int64))
         components = self._components(sources)
         if not is_doubtful and (near[components] >= _ENOUGH).all():

@@ -354,7 +354,7 @@ def prepare(
         seconds_analysis=analysed - begun,
         seconds_factorization=factored - analysed,
     )
-    is_comparable = (domain.surface is not None and domain.fans is None) or domain.simplices is not None
+    is_comparable = domain.surface is not None or domain.simplices is not None
     return SolverParts(
         options=options,
         operators=domain,

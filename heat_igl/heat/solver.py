@@ -266,8 +266,8 @@ class HeatMethodSolver(BatchedSolver):
         AccuracyWarning
             If heat underflowed on the way, so that distances beyond are too short; if the answer is off by more than
             3.5 % in the mean or 12.5 % of the largest distance at a vertex, compared with another engine, as the first
-            three from such sources are; and on polygons, if it leaves bounds that need no reference by so much that it
-            is wrong (see `AnswerCheck`).
+            three from such sources are; from points and curves on polygons, if it leaves bounds that need no reference
+            by so much that it is wrong (see `AnswerCheck`).
         """
         limit = checked_cutoff(cutoff)
         chosen = self._source_set(sources)
