@@ -129,12 +129,12 @@ class _Bends(Ray):
         to_a: cython.double = self.d[a]
         to_b: cython.double = self.d[b]
         # The way to one end continues along the edge unless it is hidden at the other end.
-        a_reaches: cython.bint = self.value(a, cython.address(self.positions[b, 0])) >= to_b * (1 - GAIN)
-        b_reaches: cython.bint = self.value(b, cython.address(self.positions[a, 0])) >= to_a * (1 - GAIN)
+        a_reaches: cython.bint = self.value(a, cython.address(self.body.positions[b, 0])) >= to_b * (1 - GAIN)
+        b_reaches: cython.bint = self.value(b, cython.address(self.body.positions[a, 0])) >= to_a * (1 - GAIN)
         self.at[i, 0], self.at[i, 4] = to_a, to_b
         for j in range(1, 4):
             for k in range(3):
-                x[k] = self.positions[a, k] + 0.25 * j * self.length[i] * self.tangent[i, k]
+                x[k] = self.body.positions[a, k] + 0.25 * j * self.length[i] * self.tangent[i, k]
             from_a: cython.double = self.value(a, x)
             from_b: cython.double = self.value(b, x)
             a_is_seen: cython.bint = a_reaches or self.is_lit_from(a, x, 0.25 * j)
@@ -201,7 +201,7 @@ class _Bends(Ray):
             source, value = self.sources[self.label[v]], self.offset[self.label[v]]
         squared: cython.double = 0.0
         for k in range(3):
-            self.x[k] = self.positions[source, k]
+            self.x[k] = self.body.positions[source, k]
             squared += (x[k] - self.x[k]) * (x[k] - self.x[k])
         return value + sqrt(squared)
 
@@ -212,7 +212,7 @@ class _Bends(Ray):
         away: cython.double = 0.0
         along: cython.double = 0.0
         for k in range(3):
-            off: cython.double = x[k] - self.positions[self.edges[i, 0], k]
+            off: cython.double = x[k] - self.body.positions[self.edges[i, 0], k]
             away += off * off
             along += off * self.tangent[i, k]
         squared: cython.double = max(away - along * along, 0.0)
@@ -237,7 +237,7 @@ class _Bends(Ray):
                 if through < best:
                     best, self.share = through, 0.25 * j
         for k in range(3):
-            self.x[k] = self.positions[self.edges[i, 0], k] + self.share * self.length[i] * self.tangent[i, k]
+            self.x[k] = self.body.positions[self.edges[i, 0], k] + self.share * self.length[i] * self.tangent[i, k]
         return best
 
     @cython.cfunc
@@ -246,7 +246,7 @@ class _Bends(Ray):
         """Distance of v from `x`."""
         squared: cython.double = 0.0
         for k in range(3):
-            squared += (self.positions[v, k] - self.x[k]) * (self.positions[v, k] - self.x[k])
+            squared += (self.body.positions[v, k] - self.x[k]) * (self.body.positions[v, k] - self.x[k])
         return sqrt(squared)
 
     @cython.cfunc
@@ -267,8 +267,8 @@ class _Bends(Ray):
         has_a: cython.bint = self.share > 1 - NUDGE
         has_b: cython.bint = self.share < NUDGE
         for c in range(4):
-            has_a = has_a or self.corners[t, c] == self.edges[self.sought, 0]
-            has_b = has_b or self.corners[t, c] == self.edges[self.sought, 1]
+            has_a = has_a or self.body.corners[t, c] == self.edges[self.sought, 0]
+            has_b = has_b or self.body.corners[t, c] == self.edges[self.sought, 1]
         return has_a and has_b
 
     @cython.cfunc
@@ -291,11 +291,11 @@ class _Bends(Ray):
         while next_one < size:
             u: cython.int = self.queue[next_one]
             next_one += 1
-            value: cython.double = self.around(i, cython.address(self.positions[u, 0]))
+            value: cython.double = self.around(i, cython.address(self.body.positions[u, 0]))
             old: cython.double = self.d[u]
             is_better: cython.bint = value < old * (1 - GAIN)
             # Farther along, ways are shorter around another edge.
-            if not is_better and (self.beyond > self.reach[u] or value > old + _SLACK * self.reach[u]):
+            if not is_better and (self.beyond > self.body.reach[u] or value > old + _SLACK * self.body.reach[u]):
                 continue
             if not self.is_hidden_from_before(i, u):
                 continue
@@ -313,8 +313,8 @@ class _Bends(Ray):
     @cython.nogil
     def push_around(self, v: cython.int, size: cython.int, stamp: cython.int) -> cython.int:
         """Put the neighbours of v that the search has not come to at the end of the queue; returns its size."""
-        for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
-            u: cython.int = self.neighbours[k]
+        for k in range(self.body.first_neighbour[v], self.body.first_neighbour[v + 1]):
+            u: cython.int = self.body.neighbours[k]
             if self.seen[u] != stamp:
                 self.seen[u] = stamp
                 self.queue[size] = u
@@ -340,15 +340,15 @@ class _Bends(Ray):
             j: cython.int = (k + 1) % 3
             m: cython.int = (k + 2) % 3
             across: cython.double = self.tangent[i, j] * self.outward[i, m] - self.tangent[i, m] * self.outward[i, j]
-            y: cython.double = self.before[i, k] - self.positions[self.edges[i, 0], k]
-            off: cython.double = self.positions[v, k] - self.positions[self.edges[i, 0], k]
+            y: cython.double = self.before[i, k] - self.body.positions[self.edges[i, 0], k]
+            off: cython.double = self.body.positions[v, k] - self.body.positions[self.edges[i, 0], k]
             before_out += y * self.outward[i, k]
             before_side += y * across
             out += off * self.outward[i, k]
             side += off * across
-        near: cython.double = self.beside * self.reach[v]
+        near: cython.double = self.beside * self.body.reach[v]
         below: cython.double = out - self.wall[i] * sqrt(out * out + side * side)
-        self.is_below = below > _LEVEL * self.reach[v]
+        self.is_below = below > _LEVEL * self.body.reach[v]
         if below > near:
             return False
         if not self.has_before[i]:

@@ -25,14 +25,7 @@ cdef class Body:
 
 
 cdef class Ray:
-    cdef const int[:, ::1] corners
-    cdef const int[::1] first
-    cdef const int[::1] incident
-    cdef const double[:, ::1] positions
-    cdef int[:, ::1] behind
-    cdef int[::1] first_neighbour
-    cdef int[::1] neighbours
-    cdef double[::1] reach
+    cdef Body body
     cdef const int[::1] sources
     cdef const double[::1] offset
     cdef double[::1] d

@@ -127,15 +127,7 @@ class Ray:
     """
 
     def __init__(self, body: Body, sources, offset, d, begin, label):
-        self.corners, self.first, self.incident, self.positions = (
-            body.corners,
-            body.first,
-            body.incident,
-            body.positions,
-        )
-        self.behind, self.first_neighbour, self.neighbours = body.behind, body.first_neighbour, body.neighbours
-        self.reach = body.reach
-        self.sources, self.offset, self.d, self.begin, self.label = sources, offset, d, begin, label
+        self.body, self.sources, self.offset, self.d, self.begin, self.label = body, sources, offset, d, begin, label
 
     def is_there(self, t: cython.int) -> cython.bint:  # noqa: ARG002
         """Whether the line has arrived once it is in tetrahedron t."""
@@ -148,21 +140,21 @@ class Ray:
     def sees(self, v: cython.int, goal: cython.pointer[cython.const[cython.double]]) -> cython.bint:
         """Whether the line from v to a point stays in the tetrahedra."""
         self.goal = goal
-        for k in range(self.first[v], self.first[v + 1]):
-            if self.is_there(self.incident[k] // 4):
+        for k in range(self.body.first[v], self.body.first[v + 1]):
+            if self.is_there(self.body.incident[k] // 4):
                 return True
         begin: cython.int = self.cone(v)
         if begin >= 0:
             return self.arrives_from(v, begin)
         # Along faces and edges, several tetrahedra are as good to begin with, and some may end at a wall.
-        for k in range(self.first[v], self.first[v + 1]):
-            t: cython.int = self.incident[k] // 4
-            o: cython.int = self.incident[k] % 4
-            a: cython.int = self.corners[t, (o + 1) % 4]
-            b: cython.int = self.corners[t, (o + 2) % 4]
+        for k in range(self.body.first[v], self.body.first[v + 1]):
+            t: cython.int = self.body.incident[k] // 4
+            o: cython.int = self.body.incident[k] % 4
+            a: cython.int = self.body.corners[t, (o + 1) % 4]
+            b: cython.int = self.body.corners[t, (o + 2) % 4]
             self.aim(v, t, -1, 0.0, -1)
-            is_through: cython.bint = _leaves(self, v, a, b, self.corners[t, (o + 3) % 4], _ON_SIDE) != 0
-            if is_through and self.arrives_from(v, self.incident[k]):
+            is_through: cython.bint = _leaves(self, v, a, b, self.body.corners[t, (o + 3) % 4], _ON_SIDE) != 0
+            if is_through and self.arrives_from(v, self.body.incident[k]):
                 return True
         return False
 
@@ -193,17 +185,17 @@ class Ray:
         From tetrahedron to tetrahedron around v, through the side that the line lies farthest behind. That ends at the
         boundary, and where the line runs along a side.
         """
-        k: cython.int = self.incident[self.first[v]]
+        k: cython.int = self.body.incident[self.body.first[v]]
         self.aim(v, k // 4, -1, 0.0, -1)
         for _turns in range(_MOST_TURNS):
             side: cython.int = self.worst_side(k)
             if side < 0:
                 return k if side == -1 else -1
-            t: cython.int = self.behind[k // 4, side]
+            t: cython.int = self.body.behind[k // 4, side]
             if t < 0:
                 return -1
             for i in range(4):
-                if self.corners[t, i] == v:
+                if self.body.corners[t, i] == v:
                     k = 4 * t + i
         return -1
 
@@ -214,10 +206,10 @@ class Ray:
         """
         t: cython.int = k // 4
         o: cython.int = k % 4
-        a: cython.int = self.corners[t, (o + 1) % 4]
-        b: cython.int = self.corners[t, (o + 2) % 4]
-        c: cython.int = self.corners[t, (o + 3) % 4]
-        sign: cython.double = 1.0 if _volume(self, self.corners[t, o], a, b, c) > 0 else -1.0
+        a: cython.int = self.body.corners[t, (o + 1) % 4]
+        b: cython.int = self.body.corners[t, (o + 2) % 4]
+        c: cython.int = self.body.corners[t, (o + 3) % 4]
+        sign: cython.double = 1.0 if _volume(self, self.body.corners[t, o], a, b, c) > 0 else -1.0
         of_a: cython.double = sign * _side(self, b, c)
         of_b: cython.double = sign * _side(self, c, a)
         of_c: cython.double = sign * _side(self, a, b)
@@ -240,25 +232,25 @@ class Ray:
         negative, and the beginning is moved towards one corner of t if `toward` names it.
         """
         for i in range(3):
-            p: cython.double = (1 - nudge) * self.positions[v, i]
+            p: cython.double = (1 - nudge) * self.body.positions[v, i]
             q: cython.double = self.goal[i]
             for c in range(4):
                 part: cython.double = 0.25 if toward < 0 else 0.7 if c == toward else 0.1
-                p += part * nudge * self.positions[self.corners[t, c], i]
+                p += part * nudge * self.body.positions[self.body.corners[t, c], i]
             if into >= 0:
                 q *= 1 - nudge
                 for c in range(4):
-                    q += 0.25 * nudge * self.positions[self.corners[into, c], i]
+                    q += 0.25 * nudge * self.body.positions[self.body.corners[into, c], i]
             self.p[i], self.w[i] = p, q - p
 
     def enters(self, t: cython.int, o: cython.int) -> cython.bint:
         """Find the triangle through which the line, which begins inside t, leaves it; opposite corner o at first."""
         self.t = t
         for i in range(o, o + 4):
-            self.a = self.corners[t, (i + 1) % 4]
-            self.b = self.corners[t, (i + 2) % 4]
-            self.c = self.corners[t, (i + 3) % 4]
-            self.sign = _leaves(self, self.corners[t, i % 4], self.a, self.b, self.c, 0.0)
+            self.a = self.body.corners[t, (i + 1) % 4]
+            self.b = self.body.corners[t, (i + 2) % 4]
+            self.c = self.body.corners[t, (i + 3) % 4]
+            self.sign = _leaves(self, self.body.corners[t, i % 4], self.a, self.b, self.c, 0.0)
             if self.sign != 0:
                 return True
         return False
@@ -266,13 +258,13 @@ class Ray:
     def cross(self) -> cython.int:
         """Go through abc; returns the fourth vertex of the tetrahedron behind it, or -1 on the boundary."""
         for i in range(4):
-            u: cython.int = self.corners[self.t, i]
+            u: cython.int = self.body.corners[self.t, i]
             if u != self.a and u != self.b and u != self.c:
                 break
-        self.t = self.behind[self.t, i]
+        self.t = self.body.behind[self.t, i]
         if self.t >= 0:
             for i in range(4):
-                u = self.corners[self.t, i]
+                u = self.body.corners[self.t, i]
                 if u != self.a and u != self.b and u != self.c:
                     return u
         return -1
@@ -298,12 +290,12 @@ class Ray:
 @cython.nogil
 def _side(ray: Ray, a: cython.int, b: cython.int) -> cython.double:
     """On which side the edge ab passes the line: the determinant of w, a - p and b - p."""
-    ax: cython.double = ray.positions[a, 0] - ray.p[0]
-    ay: cython.double = ray.positions[a, 1] - ray.p[1]
-    az: cython.double = ray.positions[a, 2] - ray.p[2]
-    bx: cython.double = ray.positions[b, 0] - ray.p[0]
-    by: cython.double = ray.positions[b, 1] - ray.p[1]
-    bz: cython.double = ray.positions[b, 2] - ray.p[2]
+    ax: cython.double = ray.body.positions[a, 0] - ray.p[0]
+    ay: cython.double = ray.body.positions[a, 1] - ray.p[1]
+    az: cython.double = ray.body.positions[a, 2] - ray.p[2]
+    bx: cython.double = ray.body.positions[b, 0] - ray.p[0]
+    by: cython.double = ray.body.positions[b, 1] - ray.p[1]
+    bz: cython.double = ray.body.positions[b, 2] - ray.p[2]
     return ray.w[0] * (ay * bz - az * by) + ray.w[1] * (az * bx - ax * bz) + ray.w[2] * (ax * by - ay * bx)
 
 
@@ -335,9 +327,11 @@ def _volume(ray: Ray, o: cython.int, a: cython.int, b: cython.int, c: cython.int
     for i in range(3):
         j: cython.int = (i + 1) % 3
         k: cython.int = (i + 2) % 3
-        at: cython.double = ray.positions[o, i]
-        found += (ray.positions[a, i] - at) * (
-            (ray.positions[b, j] - ray.positions[o, j]) * (ray.positions[c, k] - ray.positions[o, k])
-            - (ray.positions[b, k] - ray.positions[o, k]) * (ray.positions[c, j] - ray.positions[o, j])
+        at: cython.double = ray.body.positions[o, i]
+        found += (ray.body.positions[a, i] - at) * (
+            (ray.body.positions[b, j] - ray.body.positions[o, j])
+            * (ray.body.positions[c, k] - ray.body.positions[o, k])
+            - (ray.body.positions[b, k] - ray.body.positions[o, k])
+            * (ray.body.positions[c, j] - ray.body.positions[o, j])
         )
     return found

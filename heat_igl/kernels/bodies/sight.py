@@ -101,8 +101,8 @@ class _Sight(Ray):
     def take(self, v: cython.int, label: cython.int) -> cython.void:
         """Give v the straight line from a source, and wake those around it that may have use for this source."""
         self.d[v], self.begin[v], self.label[v] = self.line(v, label), self.offset[label], label
-        for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
-            u: cython.int = self.neighbours[k]
+        for k in range(self.body.first_neighbour[v], self.body.first_neighbour[v + 1]):
+            u: cython.int = self.body.neighbours[k]
             if self.label[u] != label or not self.has_line(u, label):
                 self.is_waiting[u] = True
 
@@ -115,9 +115,9 @@ class _Sight(Ray):
         if nearest >= 0:
             below = self.line(v, nearest)
         before: cython.int = nearest
-        for k in range(self.first_neighbour[centre] - 1, self.first_neighbour[centre + 1]):
-            at_centre: cython.bint = k < self.first_neighbour[centre]
-            label: cython.int = self.label[centre if at_centre else self.neighbours[k]]
+        for k in range(self.body.first_neighbour[centre] - 1, self.body.first_neighbour[centre + 1]):
+            at_centre: cython.bint = k < self.body.first_neighbour[centre]
+            label: cython.int = self.label[centre if at_centre else self.body.neighbours[k]]
             if label >= 0 and label != before:
                 before = label
                 value: cython.double = self.line(v, label)
@@ -133,7 +133,7 @@ class _Sight(Ray):
         source: cython.int = self.sources[label]
         squared: cython.double = 0.0
         for k in range(3):
-            off: cython.double = self.positions[v, k] - self.positions[source, k]
+            off: cython.double = self.body.positions[v, k] - self.body.positions[source, k]
             squared += off * off
         return self.offset[label] + sqrt(squared)
 
@@ -151,10 +151,10 @@ class _Sight(Ray):
     def sees_source(self, v: cython.int, label: cython.int) -> cython.bint:
         """Whether the straight line from v to a source stays in the tetrahedra."""
         source: cython.int = self.sources[label]
-        if self.first[v] == self.first[v + 1] or self.first[source] == self.first[source + 1]:
+        if self.body.first[v] == self.body.first[v + 1] or self.body.first[source] == self.body.first[source + 1]:
             return False
         self.sought = label
-        return self.sees(v, cython.address(self.positions[source, 0]))
+        return self.sees(v, cython.address(self.body.positions[source, 0]))
 
     @cython.cfunc
     @cython.nogil
@@ -162,7 +162,7 @@ class _Sight(Ray):
         """As `Ray.is_there`: at the source."""
         source: cython.int = self.sources[self.sought]
         for c in range(4):
-            if self.corners[t, c] == source:
+            if self.body.corners[t, c] == source:
                 return True
         return False
 
@@ -176,7 +176,7 @@ class _Sight(Ray):
     @cython.nogil
     def arrives_from(self, v: cython.int, begin: cython.int) -> cython.bint:
         """As `Ray.arrives_from`; a line that touches a wall is moved to all sides, one of which is inside."""
-        into: cython.int = self.incident[self.first[self.sources[self.sought]]] // 4
+        into: cython.int = self.body.incident[self.body.first[self.sources[self.sought]]] // 4
         if self.turns[self.sought]:
             into = -1
         for toward in range(-1, 4 if self.is_concave else 0):
