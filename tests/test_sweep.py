@@ -47,6 +47,8 @@ def test_the_error_on_the_sphere_converges():
         mesh = shapes.icosphere(k)
         truth = arcs(mesh.V, 7)
         errors.append(relative_error(swept(mesh, 7), truth).mean())
+        # A source that begins after the front has come changes nothing.
+        np.testing.assert_array_equal(swept(mesh, OffsetSources([7, 20], [0, 1.01 * truth[20]])), swept(mesh, 7))
     assert errors[2] < 4e-4
     assert np.log2(errors[0] / errors[2]) / 2 > 1
 

@@ -137,11 +137,17 @@ class SweepEngine(TriangleEngine):
     def _bounds(self) -> Bounds:
         return Bounds(self._triangles.surface)
 
-    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:  # noqa: ARG002
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from."""
         query = Query.of(sources, self._triangles)
         points = self._points(query)
         near = self._near(query)
+        if near is not None:
+            # A vertex where others come before it begins wins nowhere, and leaves no trace.
+            wins = near.distance[sources.vertices] >= query.sources.vertex_offset
+            if not wins.all():
+                kept = {name: getattr(sources, name)[wins] for name in ("vertices", "vertex_offset", "vertex_label")}
+                return self.labelled(replace(sources, **kept), cutoff, threads)
         distance, origin = self._swept(query, points, near)
         distance = query.with_begin(distance)
         labels = replace(sources, points=points).labels[origin]
