@@ -14,9 +14,9 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 # Ends of curves nearer to each other than this share of the mean edge length meet.
 _SAME_PLACE = 1e-6
-# The zero curve of an integrated distance runs within a quarter of an edge of the curves. It counts as the closing of a
-# gap where it is farther than this from all of them, in mean edge lengths.
-_IN_GAP = 1.0
+#: The zero curve of an integrated distance runs within a quarter of an edge of the curves. It counts as the closing of
+#: a gap where it is farther than this from all of them, in mean edge lengths.
+IN_GAP = 1.0
 # Farther than any distance, and not infinite, so that none of it is 0.
 _FAR = 1e300
 # If a vertex sees the nearest place of a segment almost along the segment, rounding decides the side.
@@ -70,11 +70,14 @@ def _on_boundary(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> BoolAr
 
 
 def zero_curve_in_gaps(mesh: Mesh, phi: FloatArray, distance: FloatArray, h: float) -> SurfaceCurve | None:
-    """The zero curve of `phi` (n,) where it is far from the curves that `distance` (n,) is from; None if nowhere."""
+    """The zero curve of `phi` (n,) where it is far from the curves that `distance` (n,) is from; None if nowhere.
+
+    Distances may be ``inf`` beyond `IN_GAP` edges and the longest edge: no corner of a face near the curves is farther.
+    """
     faces, start, end, _ = level_segments(mesh, phi, 0.0)
     # Where no distance is known, it is large.
     middle = np.einsum("sc,sc->s", (start + end) / 2, np.minimum(distance, _FAR)[mesh.F[faces]])
-    kept = (middle > _IN_GAP * h) & (start != end).any(axis=1)
+    kept = (middle > IN_GAP * h) & (start != end).any(axis=1)
     return SurfaceCurve(faces[kept], start[kept], end[kept]) if kept.any() else None
 
 

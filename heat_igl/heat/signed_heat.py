@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, require_choice
 from heat_igl.heat.curve_sides import (
+    IN_GAP,
     has_gaps,
     left_of_closed,
     left_of_nearest,
@@ -226,12 +227,15 @@ class SignedHeatSolver:
             if (is_known | (size == 0) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
             return size, np.where(is_known, left, self._integration.distance(chosen, level) < 0)
-        size, phi = self._integration.distance_beside(lambda: self._from(sources), chosen, level)
-        left, is_known = left_of_nearest(self._faces, chosen, size)
-        closing = zero_curve_in_gaps(self._mesh, phi, size, self._domain.mean_edge_length)
+        h = self._domain.mean_edge_length
+        # Beside the curves, sides and gaps are told by the distance; all of it is found once, from the closing as well.
+        reach = IN_GAP * h + float(self._mesh.edge_lengths.max())
+        near, phi = self._integration.distance_beside(lambda: self._from(sources, reach), chosen, level)
+        left, is_known = left_of_nearest(self._faces, chosen, near)
+        closing = zero_curve_in_gaps(self._mesh, phi, near, h)
         self._warn_if_unsure(chosen, closing, np.flatnonzero(is_known & (left != (phi < 0))), int(is_known.sum()))
         left = np.where(is_known, left, phi < 0)
-        return size if closing is None else np.minimum(size, self._from([closing])), left
+        return self._from(sources if closing is None else [sources, closing]), left
 
     def _warn_if_unsure(
         self, chosen: OrientedSet, closing: SurfaceCurve | None, contradicted: IntArray, n_beside: int
@@ -254,11 +258,11 @@ class SignedHeatSolver:
                 AccuracyWarning,
             )
 
-    def _from(self, sources: Sources) -> FloatArray:
-        """Exact distance (n,) from sources without a side."""
+    def _from(self, sources: Sources, cutoff: float = np.inf) -> FloatArray:
+        """Exact distance (n,) from sources without a side, ``inf`` beyond a cutoff."""
         places = source_set(sources, self.n_vertices, self._mesh.F, originals=self._mesh.originals)
         require_resolved(places, self._domain.mean_edge_length)
-        return self._exact.distance(places, threads=n_threads())
+        return self._exact.distance(places, cutoff, n_threads())
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:
