@@ -40,6 +40,7 @@ from heat_igl.operators import cotan_operators, intrinsic_operators, operators, 
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo import joined
 from heat_igl.windows import exact_distance
+from heat_igl.windows.guards import edge_paths
 
 
 def delaunay(mesh: Mesh):
@@ -207,14 +208,13 @@ def test_triangles_laid_out_have_their_lengths(bunny):
     assert (x.item(), y.item()) == pytest.approx((0, 4))
 
 
-def test_spokes_are_the_edges_at_a_vertex(cow):
-    triangulation = intrinsic_triangulation(cow)
-    vertices = np.array([11, 5, 700])
-    which, ends, lengths = triangulation.spokes(vertices)
-    for i, v in enumerate(vertices):
-        edges = cow.edges[(cow.edges == v).any(axis=1)]
-        assert set(ends[which == i].tolist()) == set(edges[edges != v].tolist())
-    np.testing.assert_allclose(lengths, np.linalg.norm(cow.V[vertices[which]] - cow.V[ends], axis=1), rtol=1e-12)
+def test_paths_along_edges_have_each_edge_of_two_triangulations_once(cow):
+    given = intrinsic_triangulation(cow)
+    flipped = intrinsic_delaunay(given)
+    found = list(zip(*edge_paths(flipped, given).around(np.arange(cow.n_vertices)), strict=True))
+    triples = [(t.tail(t.edges), t.head(t.edges), t.l.ravel()[t.edges]) for t in (given, flipped)]
+    wanted = {triple for a, b, l in triples for triple in [*zip(a, b, l, strict=True), *zip(b, a, l, strict=True)]}
+    assert sorted(found) == sorted(wanted)
 
 
 def steep() -> Mesh:

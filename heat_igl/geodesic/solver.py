@@ -17,7 +17,7 @@ from heat_igl.operators import Operators
 from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod, Method, Plan, SurfaceMeasures, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
 from heat_igl.sources import OffsetSources, Sources, SourceSet, named_vertices, require_resolved, source_set
-from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 from heat_igl.windows import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
 
 if TYPE_CHECKING:
@@ -215,6 +215,7 @@ class GeodesicSolver(BatchedSolver):
         self._part = None if region is None else MeshPart.of(self._domain, region)
         if self._part is not None:
             self._domain = self._part.mesh
+        self._mesh = None if isinstance(self._domain, Operators) else self._domain
         self._triangles: Triangles | None = None
         self._engine: Engine
         self._plan, self._engine = self._prepared()
@@ -273,16 +274,6 @@ class GeodesicSolver(BatchedSolver):
             return self._on_triangles(triangles, chosen)
         chosen = distance_plan("triangles", method, tolerance)
         return self._on_triangles(MeshTriangles(domain), chosen)
-
-    @cached_property
-    def _originals(self) -> IntArray | None:
-        """The vertex (n,) whose values each takes, where some are copies."""
-        domain = self._domain
-        return None if isinstance(domain, Operators) or not domain.has_copies else domain.originals
-
-    def _with_copies(self, values: AnyArray) -> AnyArray:
-        """Values (..., n) in which copies have those of their originals."""
-        return values if self._originals is None else values[..., self._originals]
 
     def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:
         self._triangles = triangles
@@ -356,7 +347,8 @@ class GeodesicSolver(BatchedSolver):
         """
         limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
         distance: FloatArray = self._with_copies(self._asked(chosen).distance(chosen, limit, n_threads()))
-        distance[distance > limit] = np.inf
+        if limit < np.inf:
+            distance[distance > limit] = np.inf
         return distance
 
     def _nearer(self, vertex: int, than: FloatArray) -> FloatArray:

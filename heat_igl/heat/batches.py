@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence, Sized
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.heat.checking import AnswerCheck  # loads the sweep
+    from heat_igl.mesh import Mesh, PointCloud
 
 
 class LabelledDistance(NamedTuple):
@@ -54,6 +56,8 @@ class LabelledDistance(NamedTuple):
 class BatchedSolver(ABC):
     """A solver for k sets of sources at a time, asked for any number of them."""
 
+    _mesh: Mesh | PointCloud | None = None
+
     @property
     @abstractmethod
     def n_vertices(self) -> int:
@@ -76,6 +80,15 @@ class BatchedSolver(ABC):
 
         What is beyond the cutoff may be left ``inf``.
         """
+
+    @cached_property
+    def _originals(self) -> IntArray | None:
+        """The vertex (n,) whose values each takes, where seams were merged or points are equal."""
+        return None if self._mesh is None or not self._mesh.has_copies else self._mesh.originals
+
+    def _with_copies(self, values: AnyArray) -> AnyArray:
+        """Values (..., n) in which copies have those of their originals."""
+        return values if self._originals is None else values[..., self._originals]
 
     def _complaint(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck | None) -> str | None:  # noqa: ARG002
         """The text of a warning about an answer (n,), if one is due; in the order of the sets, on one thread."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,9 +13,9 @@ from heat_igl.operators import Operators
 from heat_igl.plan import Plan, sweep_plan
 from heat_igl.sources import SourceSet
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows import Engine, OperatorTriangles, WindowEngine, contradicted
-from heat_igl.windows.guards import Bounds, raise_to_lines, source_places
+from heat_igl.windows.guards import edge_paths, raise_to_lines, source_places
 
 # Mean shortfall from which on all distances are raised to straight lines.
 _RAISED = 0.005
@@ -43,7 +44,7 @@ _ENOUGH, _NEAR_IN_MEAN, _NEAR_AT_WORST = 3, 0.02, 0.06
 _ROUNDING = 1e-9
 _BY_SWEEP = Plan("sweep", None, "heat is compared with a sweep")
 # Differences along an edge are reduced to its length where they are larger by this share of it. On scans few are, and
-# it takes 2 to 10 % of a query; without a share it takes up to 70 %.
+# it takes 3 to 20 % of a query; without a share it takes 9 to 28 %.
 _STEEP = 0.04
 
 
@@ -181,7 +182,7 @@ class Comparisons:
             return None  # the other engine's triangles are those of the fans
         near = self._near.setdefault(_kind(sources), np.zeros(self._domain.n_components, np.int64))
         components = self._components(sources)
-        if not is_doubtful and (near[components] >= _ENOUGH).all():
+        if not is_doubtful and near[components].min() >= _ENOUGH:
             return None
         engine = self._engine or self._made()
         other = engine.distance(sources)[: len(distance)]
@@ -210,6 +211,8 @@ class Comparisons:
 
     def _components(self, sources: SourceSet) -> IntArray:
         """The components (c,) that sources lie in."""
+        if self._domain.n_components == 1:
+            return np.zeros(1, np.int64)
         surface, vertices = self._domain.source_surface, [sources.vertices]
         if surface is not None and surface.given_faces is not None:
             vertices += [surface.given_faces[places.faces, 0] for places in (sources.points, sources.segments)]
@@ -234,82 +237,59 @@ class Checker:
 
     def __init__(self, domain: Operators, V: FloatArray | None) -> None:
         surface, simplices, referenced = domain.source_surface, domain.simplices, domain.referenced[: domain.n_given]
-        if V is None and simplices is not None and simplices.place is not None:
-            # As far apart as no path is shorter.
-            V = simplices.least * simplices.place
+        if V is None and simplices is not None:
+            V = simplices.spread
         self._V = None if V is None else np.ascontiguousarray(V, np.float64)
-        self._F = None if surface is None else surface.given_faces
-        self._bounds = None if surface is None else Bounds(surface)
-        self._referenced = referenced
-        vertices = _sample(np.flatnonzero(referenced), _MOST_VERTICES)
-        self._vertices = vertices
-        self._positions = None if V is None else np.ascontiguousarray(V[vertices])
+        self._surface, self._F = surface, None if surface is None else surface.given_faces
+        self._referenced, self._uses_all = referenced, bool(referenced.all())
+        self._vertices = _sample(np.flatnonzero(referenced), _MOST_VERTICES)
         faces = None if surface is None else surface.faces
-        nowhere = np.empty(0, np.int64)
-        self._i, self._j, self._length = nowhere, nowhere, np.empty(0)
+        ends, length = np.empty((0, 2)), np.empty(0)
         if faces is not None:
             edges = _sample(faces.edges, _MOST_EDGES)
-            self._i, self._j, self._length = faces.tail(edges), faces.head(edges), faces.l.ravel()[edges]
+            ends, length = np.column_stack([faces.tail(edges), faces.head(edges)]), faces.l.ravel()[edges]
         elif simplices is not None:
             pairs, lengths = simplices.edges
-            edges = _sample(np.arange(len(lengths)), _MOST_EDGES)
-            (self._i, self._j), self._length = np.ascontiguousarray(pairs[edges].T), lengths[edges]
+            ends, length = _sample(pairs, _MOST_EDGES), _sample(lengths, _MOST_EDGES)
+        self._edges = checking.EdgePaths(ends.astype(np.int32), length, domain.n)
 
-    def check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck:
-        """Check one answer (n,). A RuntimeError where it is no number."""
-        distance = np.ascontiguousarray(distance)
+    def check(self, distance: FloatArray, sources: SourceSet, holds: bool) -> AnswerCheck:
+        """Check one answer (n,). A RuntimeError where it is no number.
+
+        If it `holds`, move the answer inside the bounds that it violates, in place: its mean error falls by a third on
+        shapes on which heat is poor. Of many sources, straight lines are only taken where the answer is far below them:
+        it takes a while to find the nearest source of every vertex.
+        """
         if np.isnan(distance).any():
             raise contradicted(f"nan at vertex {np.isnan(distance).argmax()}")
-        with np.errstate(invalid="ignore"):  # infinite at both ends
-            difference = np.abs(distance[self._i] - distance[self._j])
-        is_known = np.isfinite(difference)
-        excess = np.maximum(np.where(is_known, difference, 0.0) - self._length, 0.0)
-        total = self._length[is_known].sum()
-        steepness = excess.sum() / total if total > 0 else 0.0
-        steepest = int(self._i[excess.argmax()]) if excess.any() else -1
+        steepness, steepest = self._edges.steepness(distance)
         shortfall, largest, shortest = np.nan, np.nan, -1
-        places = self._places(sources)
-        if places is not None and self._positions is not None:
-            positions, offsets = places
-            step = len(self._vertices) * len(positions) // _MOST_LINES + 1
-            vertices, start = self._vertices[::step], offsets.min()
-            line = checking.straight_lines(np.ascontiguousarray(self._positions[::step]), positions, offsets)
-            is_known = np.isfinite(distance[vertices]) & (line > start)
-            vertices, line = vertices[is_known], line[is_known]
-            missing = np.maximum(line - distance[vertices], 0.0)
-            shortfall = (missing / (line - start)).sum() / max(len(line), 1)
-            farthest = distance[vertices].max(initial=start) - start
-            largest = missing.max() / farthest if farthest > 0 else 0.0
-            shortest = int(vertices[missing.argmax()]) if missing.any() else -1
-        return AnswerCheck(float(shortfall), float(largest), shortest, float(steepness), steepest)
-
-    def hold_to_bounds(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck) -> AnswerCheck:
-        """Move an answer (n,) inside the bounds that it violates, in place: its mean error falls by a third on shapes
-        on which heat is poor.
-
-        Of many sources, straight lines are only taken where the answer is far below them: it takes a while to find the
-        nearest source of every vertex.
-        """
-        if self._bounds is not None:
-            self._bounds.shorten(distance, share=_STEEP)
         places = source_places(self._V, self._F, sources)
-        if (
-            places is None
-            or self._V is None
-            or not (check.shortfall > _RAISED or len(sources.offsets) <= _VERY_FEW_SOURCES)
-        ):
-            return check
-        return check._replace(raised=raise_to_lines(distance, self._V, *places))
+        used = None if places is None else self._used(sources, *places)
+        if used is not None:
+            step = len(self._vertices) * len(used[0]) // _MOST_LINES + 1
+            shortfall, most, shortest, farthest = checking.shortfall(distance, self._vertices, step, self._V, *used)
+            largest = most / farthest if farthest > 0 else 0.0
+        if holds and self._paths is not None:
+            self._paths.shorten(distance, share=_STEEP)
+        is_worth_it = shortfall > _RAISED or len(sources.offsets) <= _VERY_FEW_SOURCES
+        raised = holds and is_worth_it and raise_to_lines(distance, self._V, self._F, sources)
+        return AnswerCheck(shortfall, largest, shortest, steepness, steepest, raised)
 
-    def _places(self, sources: SourceSet) -> tuple[FloatArray, FloatArray] | None:
-        """As `source_places`; from a vertex that no face uses there is no distance to check."""
-        places = source_places(self._V, self._F, sources)
-        if places is None:
-            return None
+    @cached_property
+    def _paths(self) -> Any:
+        return None if self._surface is None else edge_paths(self._surface.unfolding, self._surface.faces)
+
+    def _used(
+        self, sources: SourceSet, places: FloatArray, offsets: FloatArray
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """Those that a face uses of `source_places`, None if there are none: from others there is no distance."""
+        if self._uses_all:
+            return places, offsets
         used = np.append(self._referenced[sources.vertices], np.ones(len(sources.points.faces), bool))
-        return (places[0][used], places[1][used]) if used.any() else None
+        return (places[used], offsets[used]) if used.any() else None
 
 
-def _sample(items: IntArray, most: int) -> IntArray:
+def _sample(items: AnyArray, most: int) -> AnyArray:
     """Every item, or some of more than `most`, evenly."""
     return np.ascontiguousarray(items[:: -(-len(items) // most)]) if len(items) else items

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.plan import Plan
 from heat_igl.runtime import LOWEST_HEAT, warn_caller
 from heat_igl.sources import Sources, SourceSet, require_resolved, source_set
-from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 
 # A known distance that is longer than the integrated distance by more than this share of it comes from a source that is
 # not the nearest: integrated distance is wrong by less, by 1 to 4 % in the mean. It decides on the far corners of faces
@@ -95,7 +94,6 @@ class HeatMethodSolver(BatchedSolver):
     (2, 2562)
     """
 
-    _mesh: Mesh | PointCloud | None = None
     _parts: SolverParts
     _part: MeshPart | None = None
 
@@ -273,7 +271,8 @@ class HeatMethodSolver(BatchedSolver):
         chosen = self._source_set(sources)
         (distance,), (check,) = self._answers([chosen])
         _warn(self._complaint(distance, chosen, check))
-        distance[distance > limit] = np.inf
+        if limit < np.inf:
+            distance[distance > limit] = np.inf
         return np.asarray(distance)
 
     def _source_set(self, sources: Sources) -> SourceSet:
@@ -297,24 +296,13 @@ class HeatMethodSolver(BatchedSolver):
         checks = [self._checked(*pair) for pair in zip(distances, source_sets, strict=True)]
         return self._with_copies(distances), checks
 
-    @cached_property
-    def _originals(self) -> IntArray | None:
-        """The vertex (n,) whose values each takes, where seams were merged or points are equal."""
-        return None if self._mesh is None or not self._mesh.has_copies else self._mesh.originals
-
-    def _with_copies(self, values: AnyArray) -> AnyArray:
-        """Values (..., n) in which copies have those of their originals."""
-        return values if self._originals is None else values[..., self._originals]
-
     def _checked(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck:
         """Check one answer (n,), and move it inside the bounds that it violates.
 
         A field of length 1 is the paper's method, and a time step or a boundary that was asked for has a purpose: their
         answers are left as they are.
         """
-        checker = self._parts.checker
-        check = checker.check(distance, sources)
-        return checker.hold_to_bounds(distance, sources, check) if self._parts.is_default else check
+        return self._parts.checker.check(distance, sources, holds=self._parts.is_default)
 
     def _compared(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck) -> AnswerCheck:
         """The check of an answer (n,), which is compared with another engine where it may be wrong."""
@@ -349,8 +337,10 @@ class HeatMethodSolver(BatchedSolver):
         if u.min() < LOWEST_HEAT:
             for term, of_term in zip(terms, u.T, strict=True):
                 _warn_if_cold(parts, term, of_term)
-        rows = zip(terms, np.ascontiguousarray(phi.T), u.T, strict=True)
-        return np.stack([_pin_level(parts, *row) for row in rows])[:, : self.n_vertices]
+        distances = np.ascontiguousarray(phi.T)
+        for term, distance, of_term in zip(terms, distances, u.T, strict=True):
+            _pin_level(parts, term, distance, of_term)
+        return distances[:, : self.n_vertices]
 
     @names_guessed
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
@@ -434,8 +424,8 @@ def _impose_near_field(domain: Operators, term: SourceTerm, X: FloatArray, magni
     magnitude[faces] = length
 
 
-def _pin_level(parts: SolverParts, term: SourceTerm, phi: FloatArray, u: FloatArray) -> FloatArray:
-    """Distance (n,) from phi (n,) and heat (n,): at the right level, and equal to known distances.
+def _pin_level(parts: SolverParts, term: SourceTerm, phi: FloatArray, u: FloatArray) -> None:
+    """Make distance of phi (n,) in place, from heat (n,): at the right level, and equal to known distances.
 
     The level of a component is the mean by which phi exceeds the known distances there. A component without a
     source gets ``inf``.
@@ -443,28 +433,29 @@ def _pin_level(parts: SolverParts, term: SourceTerm, phi: FloatArray, u: FloatAr
     domain, components, anchors, far = parts.operators, parts.operators.components, term.anchors, term.far
     excess = phi[anchors.vertex] - anchors.value
     n_anchors = np.bincount(components[anchors.vertex], minlength=domain.n_components)
-    if (n_anchors > 1).any():
+    if n_anchors.max() > 1:
         of_source = _level_of_source(parts, term, excess, u)
-        phi = phi - of_source
-        excess = excess - of_source[anchors.vertex]
+        phi -= of_source
+        excess -= of_source[anchors.vertex] if isinstance(of_source, np.ndarray) else of_source
     total = np.bincount(components[anchors.vertex], weights=excess, minlength=len(n_anchors))
     level = np.where(n_anchors > 0, total / np.maximum(n_anchors, 1), -np.inf)
     lowest = np.full(len(n_anchors), np.inf)
     np.minimum.at(lowest, components[term.near.vertex], term.near.value)
-    start = domain.expand_to_vertices(lowest)
-    distance = phi - domain.expand_to_vertices(level)
-    np.maximum(distance, start, out=distance)
-    begin = start[far.vertex]
-    taken = far.value - begin < (distance[far.vertex] - begin) * (1 + _HEAT_ERROR)
-    distance[far.vertex[taken]] = far.value[taken]
+    distance, is_one = phi, domain.n_components == 1
+    distance -= level if is_one else level[components]
+    np.maximum(distance, lowest if is_one else lowest[components], out=distance)
+    if len(far.vertex):
+        begin = lowest[components[far.vertex]]
+        taken = far.value - begin < (distance[far.vertex] - begin) * (1 + _HEAT_ERROR)
+        distance[far.vertex[taken]] = far.value[taken]
     if parts.t_damping is not None or not term.sources.on_vertices_alone:
         _bound_by_edges(parts, term.near, distance)
     distance[term.near.vertex] = term.near.value
-    return np.asarray(distance)
 
 
-def _level_of_source(parts: SolverParts, term: SourceTerm, excess: FloatArray, u: FloatArray) -> FloatArray:
-    """The value (n,) that phi has at the source from which a vertex got heat, less that source's offset.
+def _level_of_source(parts: SolverParts, term: SourceTerm, excess: FloatArray, u: FloatArray) -> FloatArray | float:
+    """The value (n,) that phi has at the source from which a vertex got heat, less that source's offset; one for all
+    if it is the same.
 
     It is a little different at each source: the error of a path between them. Shifting by the mean would move
     the whole cell of each source by the difference. Here every vertex is shifted by the values of the sources
@@ -476,7 +467,7 @@ def _level_of_source(parts: SolverParts, term: SourceTerm, excess: FloatArray, u
     level = np.bincount(term.anchors.label, excess, minlength=n_labels) / np.maximum(count, 1)
     low, high = float(level[count > 0].min()), float(level[count > 0].max())
     if low == high:
-        return np.full_like(u, low)
+        return low
     relative = np.where(count > 0, (level - low) / (high - low), 0.0)
     weighted = right_hand_side(parts.operators.n, [term], [term.share * relative[term.label]])
     part = parts.heat_flow.solve(weighted)[:, 0]
@@ -488,7 +479,7 @@ def _bound_by_edges(parts: SolverParts, near: Seeds, distance: FloatArray) -> No
     """Across an edge from a known value, distance changes by no more than the length of the edge."""
     if parts.operators.surface is None:
         return
-    which, ends, lengths = parts.operators.surface.triangulation.spokes(near.vertex)
+    which, ends, lengths = parts.assembler.edges.around(near.vertex)
     value = near.value[which]
     np.maximum.at(distance, ends, value - lengths)
     np.minimum.at(distance, ends, value + lengths)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from heat_igl.runtime import SOURCE_HEAT
 from heat_igl.sources import SourceSegments, SourceSet, nearest_first, samples
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows import ExactSurface
+from heat_igl.windows.guards import edge_paths
 
 # So many mean edge lengths of a curve give as much heat as a point, so that both are equally warm some edges away. What
 # matters is the order of magnitude: from 1 to 16, errors from a point and a curve change by less than 0.06 points.
@@ -139,9 +140,12 @@ class SourceAssembler:
         self._radius = NEAR_RADIUS
         if surface is not None and surface.faces is not None and surface.faces.n < domain.n:
             self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
-        # Triangulations on which the edges are straight lines: one, if none was flipped; on polygons, their triangles.
-        straight = [self._faces, *(() if surface is None else (surface.triangulation, surface.uncovered))]
-        self._straight = list({id(each): each for each in straight if each is not None}.values())
+
+    @cached_property
+    def edges(self) -> Any:
+        """The edges that are straight lines: of all triangulations, and on polygons of their triangles."""
+        surface = self._domain.surface
+        return edge_paths(self._faces, *(() if surface is None else (surface.triangulation, surface.uncovered)))
 
     @cached_property
     def windows(self) -> ExactSurface:
@@ -171,7 +175,7 @@ class SourceAssembler:
             # Heat is measured in units of h, so that the gradient has none.
             largest_heat=SOURCE_HEAT * min(self._h_at(vertex).min(initial=1e10), 1e10),
             # Inside a region of sources there is no heat flow, and phi says nothing.
-            anchors=near.at(~np.isin(near.vertex, sources.vertices[~rim])),
+            anchors=near if rim.all() else near.at(~np.isin(near.vertex, sources.vertices[~rim])),
             near=near,
             seen=seen,
             far=far,
@@ -216,14 +220,11 @@ class SourceAssembler:
     def _ring(self, sources: SourceSet, rim: BoolArray) -> Seeds:
         """Source vertices, and around those at the rim their neighbours at the lengths of edges."""
         itself = Seeds(sources.vertices, sources.vertex_offset, sources.vertex_label)
-        if self._plain:
+        if self._plain or self.edges is None:
             return itself
         vertices, offset, label = sources.vertices[rim], sources.vertex_offset[rim], sources.vertex_label[rim]
-        found = [itself]
-        for triangulation in self._straight:
-            which, ends, lengths = triangulation.spokes(vertices)
-            found.append(Seeds(ends, offset[which] + lengths, label[which]))
-        return Seeds.joined(*found)
+        which, ends, lengths = self.edges.around(vertices)
+        return Seeds.joined(itself, Seeds(ends, offset[which] + lengths, label[which]))
 
     def _known_by_windows(self, sources: SourceSet, rim: BoolArray) -> tuple[Seeds, Seeds]:
         """Exact distance of the vertices within the radius, and of the corners of the sources' own faces beyond.
@@ -236,7 +237,7 @@ class SourceAssembler:
             return _NONE, _NONE
         if sources.on_vertices_alone:
             is_covered = surface.uncovered is not None and not self._plain
-            if not (is_covered and self._straight[0].meets_shared_edge(sources.vertices[rim])):
+            if not (is_covered and self._faces.meets_shared_edge(sources.vertices[rim])):
                 return _NONE, _NONE
         begin = sources.offsets.min()
         radius = self._radius * self._h_at(np.arange(self._faces.n))

@@ -259,7 +259,7 @@ class IntrinsicTriangulation:
         """One half-edge (k,) of each edge; one per face at edges of more than two."""
         return np.flatnonzero((self.twin < 0) | (self.twin > np.arange(len(self.twin))))
 
-    @property
+    @cached_property
     def mean_edge_length(self) -> float:
         """Mean length of `edges`."""
         return float(self.l.ravel()[self.edges].mean())
@@ -289,17 +289,6 @@ class IntrinsicTriangulation:
     def corners_at(self, vertices: IntArray) -> tuple[IntArray, IntArray]:
         """The corners (k,) of faces at the given vertices, and for each the position of the vertex in `vertices`."""
         return self._corners.of(vertices)
-
-    def spokes(self, vertices: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
-        """Edges from the given vertices: position of the vertex in `vertices`, the other end, and the length.
-
-        An edge comes once for each face at it.
-        """
-        corner, which = self.corners_at(vertices)
-        following, preceding = next_half_edge(corner), previous_half_edge(corner)
-        ends = self.F.ravel()[np.concatenate([following, preceding])]
-        lengths = self.l.ravel()[np.concatenate([preceding, following])]
-        return np.concatenate([which, which]), ends, lengths
 
     def meets_shared_edge(self, vertices: IntArray) -> bool:
         """Whether a face at one of the vertices has an edge of more than two faces."""

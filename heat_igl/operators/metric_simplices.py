@@ -141,6 +141,11 @@ class MetricSimplices:
         W = _symmetric(self.velocity[chosen, corner])
         return np.asarray(np.linalg.inv(W @ W))
 
+    @cached_property
+    def spread(self) -> FloatArray | None:
+        """Positions (n, 3) so far apart that no path is shorter than the line; None if none are known."""
+        return None if self.place is None else np.ascontiguousarray(self.least * self.place, np.float64)
+
     @property
     def edges(self) -> tuple[IntArray, FloatArray]:
         """Edges (e, 2) of each simplex one after the other, and their lengths (e,) there."""

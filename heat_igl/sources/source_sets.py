@@ -172,9 +172,13 @@ def source_set(
     closest points of `mesh`, which has these triangles; without it they are an error. Of a `part` of a mesh, F are all
     triangles; the result has the faces of the part. A vertex stands for the one of which it is a copy in `originals`.
     """
-    builder = _Builder(n, F, mesh)
-    builder.add(sources)
-    chosen = builder.finish()
+    if isinstance(sources, (int, np.integer)) and not isinstance(sources, bool) and 0 <= sources < n:
+        # Most queries, at a tenth of the cost.
+        chosen = SourceSet(np.array([int(sources)]), np.zeros(1, np.int64), np.zeros(1), NO_POINTS, NO_SEGMENTS, 1)
+    else:
+        builder = _Builder(n, F, mesh)
+        builder.add(sources)
+        chosen = builder.finish()
     if originals is not None:
         vertices, label = originals[chosen.vertices], chosen.vertex_label
         kept = nearest_first(vertices, chosen.vertex_offset, label)
@@ -193,6 +197,8 @@ def source_set(
 def require_resolved(sources: SourceSet, mean_edge_length: float) -> SourceSet:
     """The same sources, if distances can be told from their offsets in double precision; else a `SourceError`."""
     offsets = sources.offsets
+    if not offsets.any():
+        return sources
     wrong = np.spacing(offsets) > _COARSEST * mean_edge_length
     if wrong.any():
         offset = float(offsets[np.argmax(wrong)])

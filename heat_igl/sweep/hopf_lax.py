@@ -97,5 +97,5 @@ class HopfLaxEngine(SimplexEngine):
         distance, label = self._begun(sources)
         found = self._found(sources.vertex_offset, distance, label)
         answer = distance.copy()
-        self._keep_bounds(sources.vertices.astype(np.int32), sources.vertex_offset, answer, label.copy())
+        self._keep_bounds(sources, answer, label.copy())
         return FixedPointDerivative(self._simplices, sources, answer, distance, label, *found)

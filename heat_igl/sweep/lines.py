@@ -17,7 +17,7 @@ from heat_igl.operators import MetricSimplices
 from heat_igl.plan import SMALL_BODY
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import SimplexDerivative
-from heat_igl.sweep.simplex_engine import ROUNDING, SimplexEngine
+from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
@@ -85,7 +85,7 @@ class LineEngine(SimplexEngine):
         if self._finer is not None:
             found, other = (values[: len(distance)] for values in self._finer.labelled(sources))
             # Longer by rounding alone, a distance stays as it is.
-            shorter = found < distance * (1 - ROUNDING)
+            shorter = found < distance * (1 - _SAME)
             distance[shorter] = found[shorter]
             labels[shorter] = other[shorter]
         return distance, labels
@@ -100,7 +100,7 @@ class LineEngine(SimplexEngine):
         distance, label = self._begun(sources)
         vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
         edges, way = self._ways(vertices, offset, distance, label)
-        self._keep_bounds(vertices, offset, distance, label)
+        self._keep_bounds(sources, distance, label)
         ends = np.where(label >= 0, vertices[label], np.arange(len(label)))
         length, slopes = line_slopes(self._V, ends, edges, way, distance)
         length += np.append(offset, 0)[label]
@@ -108,7 +108,7 @@ class LineEngine(SimplexEngine):
             n = len(distance)
             found, other, finer_length, finer_slopes = self._finer._differentiated(sources)
             finer_slopes = finer_slopes[:n] @ sp.kron(self._simplices.halfway(), sp.eye_array(3), format="csr")
-            is_shorter = found[:n] < distance * (1 - ROUNDING)
+            is_shorter = found[:n] < distance * (1 - _SAME)
             distance, label, length = (
                 np.where(is_shorter, x[:n], y) for x, y in ((found, distance), (other, label), (finer_length, length))
             )

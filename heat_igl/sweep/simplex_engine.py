@@ -13,15 +13,11 @@ from heat_igl.mesh.connectivity import group_by_label
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine
+from heat_igl.windows.guards import raise_to_lines
 
 if TYPE_CHECKING:
     from heat_igl.operators import MetricSimplices
     from heat_igl.sweep.simplex_derivative import SimplexDerivative
-
-#: Share of a distance that is rounding.
-ROUNDING = 1e-9
-# With more sources, lines are bounded by the nearest one and the first value.
-_MANY = 100
 
 
 class SimplexEngine(Engine):
@@ -52,7 +48,7 @@ class SimplexEngine(Engine):
         distance, label = self._begun(sources)
         vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
         self._lower(vertices, offset, distance, label)
-        self._keep_bounds(vertices, offset, distance, label)
+        self._keep_bounds(sources, distance, label)
         return distance, np.concatenate([sources.vertex_label, [-1]])[label]
 
     def _begun(self, sources: SourceSet) -> tuple[FloatArray, AnyArray]:
@@ -70,22 +66,11 @@ class SimplexEngine(Engine):
     def _paths(self) -> checking.EdgePaths:
         return checking.EdgePaths(*self._edges, self._simplices.n)
 
-    def _keep_bounds(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
+    def _keep_bounds(self, sources: SourceSet, distance: FloatArray, label: AnyArray) -> None:
         """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""
-        place, least = self._simplices.place, self._simplices.least
-        if place is not None:
-            if len(offset) > _MANY:
-                from scipy.spatial import cKDTree
-
-                line = least * cKDTree(place[vertices]).query(place)[0] + offset.min()
-            else:
-                line = np.full(len(place), np.inf)
-                for vertex, start in zip(vertices, offset, strict=True):
-                    np.minimum(line, start + least * np.linalg.norm(place - place[vertex], axis=1), out=line)
-            line[vertices] = offset.min()
-            # In place of a value that is no number, a path along edges is found.
-            distance[np.isnan(distance)] = np.inf
-            np.maximum(distance, line * (1 - ROUNDING), out=distance)
+        # In place of a value that is no number, a path along edges is found.
+        distance[np.isnan(distance)] = np.inf
+        raise_to_lines(distance, self._simplices.spread, None, sources)
         self._along_edges(distance, label)
 
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from heat_igl.sources import SourcePoints, SourceSet, samples
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.windows.engine import Query, TriangleEngine, Triangles
 from heat_igl.windows.exact import ExactSolution
-from heat_igl.windows.guards import Bounds
+from heat_igl.windows.guards import edge_paths, raise_to_lines
 
 _SPOKE = np.dtype(
     [(name, "f8") for name in ("length", "along", "height", "base", "beyond_along", "beyond_depth")]
@@ -134,8 +134,8 @@ class SweepEngine(TriangleEngine):
         return bool(((vertices - (3 * faces - shared / 2) + faces)[faces > 0] < 1).any())
 
     @cached_property
-    def _bounds(self) -> Bounds:
-        return Bounds(self._triangles.surface)
+    def _edges(self) -> Any:
+        return edge_paths(self._triangles.surface.unfolding, self._triangles.surface.faces)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from."""
@@ -158,8 +158,8 @@ class SweepEngine(TriangleEngine):
         swept = distance.copy()
         distance[np.isnan(distance)] = np.inf
         distance[sources.vertices] = np.minimum(distance[sources.vertices], sources.vertex_offset)
-        self._bounds.shorten(distance, labels)
-        self._bounds.lengthen(distance, sources)
+        self._edges.shorten(distance, labels)
+        raise_to_lines(distance, self._triangles.surface.V, self._triangles.surface.given_faces, sources)
         _warn_if_moved(swept, distance, self._triangles.mean_edge_length)
         return distance, labels
 
@@ -195,7 +195,8 @@ class SweepEngine(TriangleEngine):
             distance[at], label[at] = value[order], source[order]
             return at
 
-        begin(*self._corners_of(points, k))
+        if len(points.faces):
+            begin(*self._corners_of(points, k))
         if near is not None and not len(query.sources.segments.faces):  # which point of a curve is nearest is not known
             known = np.flatnonzero(np.isfinite(near.distance))
             known = known[~np.isin(known, sources.vertices)]

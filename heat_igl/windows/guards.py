@@ -16,10 +16,9 @@ from heat_igl.errors import AccuracyWarning
 from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels.mesh import checking
 from heat_igl.mesh import Mesh, SurfacePoints
-from heat_igl.operators import Surface
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet, source_set
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
+from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine, MeshTriangles, Triangles, WindowEngine
 
 if TYPE_CHECKING:
@@ -32,10 +31,10 @@ ROUNDING = 1e-7
 _SOURCES_AT_ALL = 8
 _NO_LENGTHS = np.empty((0, 3))
 _REPORT = "please report this as a bug, with the mesh and the sources"
-# Less than this fraction is rounding.
+# Less than this fraction of a line is rounding.
 _ROUNDING = 1e-12
-# With more sources, a tree finds the nearest sooner than a loop over all.
-_FEW = 32
+# With more sources, a tree finds the nearest sooner than a loop over all, but for the offsets.
+_MANY = 100
 
 
 class Invariants:
@@ -160,8 +159,9 @@ class Invariants:
         if places is None:
             return None
         step = -(-len(places[1]) // _SOURCES_AT_ALL)
-        found = checking.below_line(distance, self._V if at is None else at, step, *places, slack)
-        if found < 0:
+        at_all = np.arange(len(distance))
+        _, most, found, _ = checking.shortfall(distance, at_all, step, self._V if at is None else at, *places)
+        if most <= slack:
             return None
         what = "vertex" if at is None else "target"
         return f"{distance[found]:.6g} at {what} {found}, which is farther from every source along a straight line"
@@ -267,37 +267,6 @@ def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:
     return np.stack([engine.distance(source_set(int(vertex), mesh.n_vertices, None)) for vertex in vertices])
 
 
-class Bounds:
-    """The two bounds on a surface that take no search: along the edges of all of its triangles there are paths."""
-
-    def __init__(self, surface: Surface) -> None:
-        self._surface = surface
-
-    @cached_property
-    def _edges(self) -> Any:
-        """Paths along the edges unfolded in, and along the given ones if some were flipped."""
-        unfolding, given = self._surface.unfolding, self._surface.faces
-        ends, length = _sides(unfolding)
-        if given is not None and unfolding.n_flips:
-            # Most edges are there twice then, which costs less than to find out which.
-            more_ends, more_length = _sides(given)
-            ends, length = np.concatenate([ends, more_ends]), np.concatenate([length, more_length])
-        return checking.EdgePaths(ends, length, unfolding.n)
-
-    def shorten(self, distance: FloatArray, labels: IntArray | None = None, share: float = 0.0) -> None:
-        """Lower distances (n,) to the paths along edges, in place; labels (n,) are handed on with them.
-
-        With a `share`, only from edges on which they are too long by more than that share of the length.
-        """
-        self._edges.shorten(distance, labels, share)
-
-    def lengthen(self, distance: FloatArray, sources: SourceSet) -> None:
-        """Raise distances (n,) to the straight lines from the nearest source, in place, where positions are known."""
-        places = source_places(self._surface.V, self._surface.given_faces, sources)
-        if places is not None and self._surface.V is not None:
-            raise_to_lines(distance, self._surface.V, *places)
-
-
 def source_places(
     V: FloatArray | None, F: IntArray | None, sources: SourceSet, *, of_curves: bool = False
 ) -> tuple[FloatArray, FloatArray] | None:
@@ -321,26 +290,31 @@ def source_places(
     return np.concatenate([V[sources.vertices], inside]), np.concatenate([sources.vertex_offset, offset])
 
 
-def raise_to_lines(distance: FloatArray, V: FloatArray, places: FloatArray, offsets: FloatArray) -> bool:
-    """Raise distances (n,) to the straight lines from the nearest place, in place; returns whether that was done.
+def raise_to_lines(distance: FloatArray, V: FloatArray | None, F: IntArray | None, sources: SourceSet) -> bool:
+    """Raise distances (n,) to the straight lines from the nearest source, in place, if its place is known.
 
-    Nothing is done for many places with different offsets.
+    Of many sources with different offsets, they are raised to the line to the nearest with the least offset alone.
+    Returns whether no distance is below a line then.
     """
-    if len(places) <= _FEW:
-        line = checking.straight_lines(V, places, offsets)
-    elif np.ptp(offsets) == 0:
-        from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
-
-        line = cKDTree(places).query(V)[0] + offsets[0]
-    else:
+    places = source_places(V, F, sources)
+    if V is None or places is None:
         return False
-    # Less rounding, which is a share of the lines without the offsets.
-    np.maximum(distance, line - _ROUNDING * (line - offsets.min()), out=distance)
-    return True
+    if len(places[0]) <= _MANY:
+        checking.raise_to_lines(distance, V, *places, _ROUNDING)
+        return True
+    from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
+
+    start = places[1].min()
+    line = cKDTree(places[0]).query(V)[0] + start
+    np.maximum(distance, line - _ROUNDING * (line - start), out=distance)
+    return bool(np.ptp(places[1]) == 0)
 
 
-def _sides(triangulation: IntrinsicTriangulation) -> tuple[AnyArray, FloatArray]:
-    """Ends (e, 2) and lengths (e,) of edges, each once."""
-    F, lengths = np.ascontiguousarray(triangulation.F), np.ascontiguousarray(triangulation.l)
-    ends, length = checking.glued_edges(F, lengths.ravel(), triangulation.twin)
-    return ends, length
+def edge_paths(*triangulations: IntrinsicTriangulation | None) -> Any:
+    """Paths along the edges of triangulations that have vertices in common, each edge once; None without any."""
+    known = [each for each in triangulations if each is not None]
+    kernel: Any = checking.EdgePaths
+    paths = kernel(np.empty((0, 2), np.int32), np.empty(0), max((each.n for each in known), default=0))
+    for each in known:
+        paths = paths.joined(np.ascontiguousarray(each.F), np.ascontiguousarray(each.l).ravel(), each.twin)
+    return paths if known else None

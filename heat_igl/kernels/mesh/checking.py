@@ -10,7 +10,7 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 class EdgePaths:
     """Paths along edges, whose ends (e, 2) int32 are among n vertices, and lengths (e,) float64.
 
-    Once they are asked for, the edges of vertex v are ``incident[first[v] : first[v + 1]]``.
+    The edges of vertex v are ``incident[first[v] : first[v + 1]]``.
     """
 
     ends: cython.const[cython.int][:, ::1]
@@ -20,74 +20,12 @@ class EdgePaths:
 
     def __init__(self, ends, length, n: cython.Py_ssize_t):
         self.ends, self.length = ends, length
-        self.first, self.incident = np.zeros(n + 1, np.int64), np.empty(0, np.int32)
-
-    def __reduce__(self):
-        """What it was made of."""
-        return EdgePaths, (np.asarray(self.ends), np.asarray(self.length), self.first.shape[0] - 1)
-
-    def shorten(self, d: cython.double[::1], labels=None, share: cython.double = 0.0) -> None:
-        """Lower `d` (n,) to the paths along edges, in place; `labels` (n,) are handed on with it.
-
-        One pass over all edges, and then only over those of vertices that were lowered. With a `share`, the pass leaves
-        edges alone on which the given distances are too long by less than that share of the length; whatever the order
-        of the edges, the result is the same.
-        """
-        if not self.is_longer(d, share):
-            return
-        self.list_incident()
-        n: cython.Py_ssize_t = d.shape[0]
-        label: cython.longlong[::1] = np.empty(0, np.int64) if labels is None else labels
-        # A circular buffer: no vertex waits twice, so n places suffice.
-        waiting: cython.int[::1] = np.empty(n, np.int32)
-        given: cython.const[cython.double][::1] = np.array(d) if share > 0 else d
-        is_waiting: cython.uchar[::1] = np.zeros(n, np.uint8)
-        begin: cython.Py_ssize_t = 0
-        count: cython.Py_ssize_t = 0
+        self.first, self.incident = np.zeros(n + 1, np.int64), np.empty(2 * len(ends), np.int32)
         with cython.nogil:
-            for e in range(self.length.shape[0]):
-                # Nearly always false, and so cheaper than to ask which end is nearer.
-                if fabs(given[self.ends[e, 0]] - given[self.ends[e, 1]]) > self.length[e] * (1 + share):
-                    lowered = self.lower(d, label, e)
-                    if lowered >= 0 and not is_waiting[lowered]:
-                        is_waiting[lowered] = True
-                        waiting[count] = lowered
-                        count += 1
-            while count > 0:
-                v: cython.int = waiting[begin]
-                is_waiting[v] = False
-                begin = begin + 1 if begin + 1 < n else 0
-                count -= 1
-                for k in range(self.first[v], self.first[v + 1]):
-                    lowered = self.lower(d, label, self.incident[k])
-                    if lowered >= 0 and not is_waiting[lowered]:
-                        is_waiting[lowered] = True
-                        end: cython.Py_ssize_t = begin + count
-                        waiting[end if end < n else end - n] = lowered
-                        count += 1
-
-    @cython.cfunc
-    @cython.nogil
-    def is_longer(self, d: cython.const[cython.double][::1], share: cython.double) -> cython.bint:
-        """Whether a distance is longer than along an edge, by more than that share of it: mostly it is not."""
-        for e in range(self.length.shape[0]):
-            # Infinite at both ends gives nan, and false.
-            is_steep: cython.bint = fabs(d[self.ends[e, 0]] - d[self.ends[e, 1]]) > self.length[e] * (1 + share)
-            if is_steep and self.far_end(d, e, share) >= 0:
-                return True
-        return False
-
-    @cython.cfunc
-    def list_incident(self) -> cython.void:
-        """List the edges by vertex, unless that is done."""
-        with cython.critical_section(self):
-            if self.incident.shape[0] > 0:
-                return
-            self.incident = np.empty(2 * self.ends.shape[0], np.int32)
             for e in range(self.ends.shape[0]):
                 for c in range(2):
                     self.first[self.ends[e, c]] += 1
-            for v in range(self.first.shape[0] - 1):
+            for v in range(n):
                 self.first[v + 1] += self.first[v]
             # Now first[v] is where the edges of v end; filled from there back to where they begin.
             for e in range(self.ends.shape[0] - 1, -1, -1):
@@ -95,57 +33,160 @@ class EdgePaths:
                     self.first[self.ends[e, c]] -= 1
                     self.incident[self.first[self.ends[e, c]]] = e
 
+    def __reduce__(self):
+        """What it was made of."""
+        return EdgePaths, (np.asarray(self.ends), np.asarray(self.length), self.first.shape[0] - 1)
+
+    def joined(
+        self,
+        F: cython.const[cython.longlong][:, ::1],
+        length: cython.const[cython.double][::1],
+        twin: cython.const[cython.longlong][::1],
+    ) -> EdgePaths:
+        """These, and the edges of a triangulation that are not among them: that have other ends, or another length.
+
+        As an `IntrinsicTriangulation` has them, with the lengths (3 m,) in one row.
+        """
+        pairs, lengths = np.empty((twin.shape[0], 2), np.int32), np.empty(twin.shape[0])
+        ends: cython.int[:, ::1] = pairs
+        length_of: cython.double[::1] = lengths
+        n_new: cython.Py_ssize_t = 0
+        with cython.nogil:
+            for h in range(twin.shape[0]):
+                if 0 <= twin[h] < h:
+                    continue
+                tail: cython.int = F[h // 3, (h + 1) % 3]
+                head: cython.int = F[h // 3, (h + 2) % 3]
+                for k in range(self.first[tail], self.first[tail + 1]):
+                    e: cython.int = self.incident[k]
+                    if self.ends[e, 0] + self.ends[e, 1] - tail == head and self.length[e] == length[h]:
+                        break
+                else:
+                    ends[n_new, 0], ends[n_new, 1], length_of[n_new] = tail, head, length[h]
+                    n_new += 1
+        ends_of_both = np.concatenate([self.ends, pairs[:n_new]])
+        return EdgePaths(ends_of_both, np.concatenate([self.length, lengths[:n_new]]), self.first.shape[0] - 1)
+
+    def around(self, vertices: cython.const[cython.longlong][::1]):
+        """Edges from some vertices: which of these (s,), the other end (s,), and the length (s,)."""
+        k: cython.Py_ssize_t = 0
+        for i in range(vertices.shape[0]):
+            k += self.first[vertices[i] + 1] - self.first[vertices[i]]
+        position, end, long = np.empty(k, np.int64), np.empty(k, np.int64), np.empty(k)
+        which: cython.longlong[::1] = position
+        other: cython.longlong[::1] = end
+        length: cython.double[::1] = long
+        k = 0
+        for i in range(vertices.shape[0]):
+            for j in range(self.first[vertices[i]], self.first[vertices[i] + 1]):
+                e: cython.Py_ssize_t = self.incident[j]
+                which[k], length[k] = i, self.length[e]
+                other[k] = self.ends[e, 0] + self.ends[e, 1] - vertices[i]
+                k += 1
+        return position, end, long
+
+    def steepness(self, d: cython.const[cython.double][::1]) -> tuple[float, int]:
+        """By how much distances `d` (n,) change along edges beyond their lengths, as a share of the sum of lengths.
+
+        Then an end of the edge with the largest excess, -1 if there is none. Edges with an infinite end are left out.
+        """
+        total: cython.double = 0.0
+        excess: cython.double = 0.0
+        largest: cython.double = 0.0
+        steepest: cython.int = -1
+        for e in range(self.length.shape[0]):
+            difference: cython.double = fabs(d[self.ends[e, 0]] - d[self.ends[e, 1]])
+            if difference < INFINITY:
+                total += self.length[e]
+                excess += max(difference - self.length[e], 0.0)
+                if difference - self.length[e] > largest:
+                    largest, steepest = difference - self.length[e], self.ends[e, 0]
+        return excess / total if total > 0 else 0.0, steepest
+
+    def shorten(self, d: cython.double[::1], labels=None, share: cython.double = 0.0) -> None:
+        """Lower `d` (n,) to the paths along edges, in place; `labels` (n,) are handed on with it.
+
+        One pass over all edges, and then over those of vertices that were lowered. With a `share`, the pass leaves
+        edges alone on which the given distances are too long by less than that share of the length; whatever the order
+        of the edges, the result is the same.
+        """
+        n: cython.Py_ssize_t = d.shape[0]
+        found, reach = np.empty(self.length.shape[0], np.int32), np.empty(self.length.shape[0])
+        steep: cython.int[::1] = found
+        nearest: cython.double[::1] = reach
+        n_steep: cython.Py_ssize_t = 0
+        with cython.nogil:
+            for e in range(self.length.shape[0]):
+                near: cython.double = min(d[self.ends[e, 0]], d[self.ends[e, 1]])
+                far: cython.double = max(d[self.ends[e, 0]], d[self.ends[e, 1]])
+                if is_longer(near, far, self.length[e] * (1 + share)):
+                    steep[n_steep], nearest[n_steep] = e, near
+                    n_steep += 1
+        if n_steep == 0:
+            return
+        # From near to far, vertices are lowered half as often.
+        steep = found[reach[:n_steep].argsort(kind="stable")]
+        label: cython.pointer[cython.longlong] = cython.NULL
+        if labels is not None:
+            label_of: cython.longlong[::1] = labels
+            label = cython.address(label_of[0])
+        # A circular buffer: no vertex waits twice, so n places suffice.
+        waiting: cython.int[::1] = np.empty(n, np.int32)
+        is_waiting: cython.uchar[::1] = np.zeros(n, np.uint8)
+        begin: cython.Py_ssize_t = 0
+        count: cython.Py_ssize_t = 0
+        with cython.nogil:
+            for e in range(n_steep):
+                lowered = self.lower(cython.address(d[0]), label, steep[e])
+                if lowered >= 0 and not is_waiting[lowered]:
+                    is_waiting[lowered] = True
+                    waiting[count] = lowered
+                    count += 1
+            while count > 0:
+                v: cython.int = waiting[begin]
+                is_waiting[v] = False
+                begin = begin + 1 if begin + 1 < n else 0
+                count -= 1
+                for k in range(self.first[v], self.first[v + 1]):
+                    e = self.incident[k]
+                    # Mostly not, and no processor foresees which end is nearer; infinite at both ends gives nan.
+                    if not fabs(d[self.ends[e, 0]] - d[self.ends[e, 1]]) > self.length[e]:
+                        continue
+                    lowered = self.lower(cython.address(d[0]), label, e)
+                    if lowered >= 0 and not is_waiting[lowered]:
+                        is_waiting[lowered] = True
+                        end: cython.Py_ssize_t = begin + count
+                        waiting[end if end < n else end - n] = lowered
+                        count += 1
+
     @cython.cfunc
     @cython.inline
     @cython.nogil
-    def lower(self, d: cython.double[::1], label: cython.longlong[::1], e: cython.Py_ssize_t) -> cython.int:
+    def lower(
+        self, d: cython.pointer[cython.double], label: cython.pointer[cython.longlong], e: cython.Py_ssize_t
+    ) -> cython.int:
         """The end of edge e whose distance was lowered to the path along it; -1 if that is not shorter."""
-        far: cython.int = self.far_end(d, e, 0.0)
-        if far >= 0:
-            near: cython.int = self.ends[e, 0] if self.ends[e, 1] == far else self.ends[e, 1]
-            d[far] = d[near] + self.length[e]
-            if label.shape[0] > 0:
-                label[far] = label[near]
+        one: cython.double = d[self.ends[e, 0]]
+        other: cython.double = d[self.ends[e, 1]]
+        near: cython.int = self.ends[e, 0] if one < other else self.ends[e, 1]
+        far: cython.int = self.ends[e, 1] if one < other else self.ends[e, 0]
+        if not is_longer(d[near], d[far], self.length[e]):
+            return -1
+        d[far] = d[near] + self.length[e]
+        if label:
+            label[far] = label[near]
         return far
 
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def far_end(self, d: cython.const[cython.double][::1], e: cython.Py_ssize_t, share: cython.double) -> cython.int:
-        """The end of edge e to which the path along it is shorter, by more than that share; -1 if there is none."""
-        near: cython.int = self.ends[e, 0]
-        far: cython.int = self.ends[e, 1]
-        if d[far] < d[near]:
-            near, far = far, near
-        # Not by rounding, which would pass along many edges.
-        return far if d[near] + self.length[e] * (1 + share) < d[far] * (1 - 1e-12) else -1
 
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def is_longer(near: cython.double, far: cython.double, length: cython.double) -> cython.bint:
+    """Whether the farther of two distances is longer than the way over the nearer one, not by rounding.
 
-def glued_edges(
-    F: cython.const[cython.longlong][:, ::1],
-    length: cython.const[cython.double][::1],
-    twin: cython.const[cython.longlong][::1],
-):
-    """Ends (e, 2) int32 and lengths (e,) of the edges of a triangulation, each once; of more than two faces, for each.
-
-    As an `IntrinsicTriangulation` has them, with the lengths (3 m,) in one row.
+    Rounding would pass along many edges.
     """
-    e: cython.Py_ssize_t = 0
-    with cython.nogil:
-        for f in range(twin.shape[0]):
-            e += twin[f] < 0 or f < twin[f]
-    pairs, lengths = np.empty((e, 2), np.int32), np.empty(e)
-    ends: cython.int[:, ::1] = pairs
-    length_of: cython.double[::1] = lengths
-    e = 0
-    with cython.nogil:
-        for f in range(F.shape[0]):
-            for c in range(3):
-                if twin[3 * f + c] < 0 or 3 * f + c < twin[3 * f + c]:
-                    ends[e, 0], ends[e, 1] = F[f, (c + 1) % 3], F[f, (c + 2) % 3]
-                    length_of[e] = length[3 * f + c]
-                    e += 1
-    return pairs, lengths
+    return near + length < far * (1 - 1e-12)
 
 
 def largest_finite(distance: cython.const[cython.double][::1]) -> float:
@@ -156,35 +197,6 @@ def largest_finite(distance: cython.const[cython.double][::1]) -> float:
             if largest < distance[i] < INFINITY:
                 largest = distance[i]
     return largest
-
-
-def below_line(
-    distance: cython.const[cython.double][::1],
-    V: cython.const[cython.double][:, ::1],
-    step: cython.Py_ssize_t,
-    places: cython.const[cython.double][:, ::1],
-    offsets: cython.const[cython.double][::1],
-    slack: cython.double,
-) -> int:
-    """The first of every `step`-th vertices that is below the straight lines from all places; -1 if there is none.
-
-    Lines begin at `offsets` (k,) in the `places` (k, 3); distances below them by `slack` count as rounding.
-    """
-    found: cython.Py_ssize_t = -1
-    with cython.nogil:
-        for k in range((distance.shape[0] + step - 1) // step):
-            i: cython.Py_ssize_t = k * step
-            for s in range(places.shape[0]):
-                x: cython.double = V[i, 0] - places[s, 0]
-                y: cython.double = V[i, 1] - places[s, 1]
-                z: cython.double = V[i, 2] - places[s, 2]
-                reach: cython.double = distance[i] + slack - offsets[s]
-                if reach >= 0 and x * x + y * y + z * z <= reach * reach:
-                    break
-            else:
-                found = i
-                break
-    return found
 
 
 def steepest_edge(
@@ -237,26 +249,72 @@ def steepest_edge(
     return far, near
 
 
-def straight_lines(
-    positions: cython.const[cython.double][:, ::1],
-    sources: cython.const[cython.double][:, ::1],
+def shortfall(
+    distance: cython.const[cython.double][::1],
+    vertices: cython.const[cython.longlong][::1],
+    step: cython.Py_ssize_t,
+    V: cython.const[cython.double][:, ::1],
+    places: cython.const[cython.double][:, ::1],
     offsets: cython.const[cython.double][::1],
-):
-    """Length (p,) of the shortest straight line from each position to a source, the source's offset added."""
-    found = np.empty(positions.shape[0])
-    shortest: cython.double[::1] = found
+) -> tuple[float, float, int, float]:
+    """How far distances are below the straight lines from the nearest place, at every `step`-th of some vertices.
+
+    In the mean, as shares of the lines; at most; where that is, -1 for nowhere; and the largest distance that was met.
+    Lines begin at `offsets` (k,) in the `places` (k, 3), and distances count from the least offset.
+    """
+    start: cython.double = np.min(offsets)
+    total: cython.double = 0.0
+    most: cython.double = 0.0
+    farthest: cython.double = 0.0
+    count: cython.Py_ssize_t = 0
+    shortest: cython.longlong = -1
     with cython.nogil:
-        for k in range(positions.shape[0]):
-            least: cython.double = 1e308
-            for s in range(sources.shape[0]):
-                x: cython.double = positions[k, 0] - sources[s, 0]
-                y: cython.double = positions[k, 1] - sources[s, 1]
-                z: cython.double = positions[k, 2] - sources[s, 2]
-                line: cython.double = sqrt(x * x + y * y + z * z) + offsets[s]
-                if line < least:
-                    least = line
-            shortest[k] = least
-    return found
+        for k in range((vertices.shape[0] + step - 1) // step):
+            v: cython.longlong = vertices[k * step]
+            line: cython.double = INFINITY
+            for s in range(places.shape[0]):
+                x: cython.double = V[v, 0] - places[s, 0]
+                y: cython.double = V[v, 1] - places[s, 1]
+                z: cython.double = V[v, 2] - places[s, 2]
+                line = min(line, sqrt(x * x + y * y + z * z) + offsets[s])
+            if distance[v] < INFINITY and line > start:
+                count += 1
+                farthest = max(farthest, distance[v] - start)
+                missing: cython.double = max(line - distance[v], 0.0)
+                total += missing / (line - start)
+                if missing > most:
+                    most, shortest = missing, v
+    return total / max(count, 1), most, shortest, farthest
+
+
+def raise_to_lines(
+    distance: cython.double[::1],
+    V: cython.const[cython.double][:, ::1],
+    places: cython.const[cython.double][:, ::1],
+    offsets: cython.const[cython.double][::1],
+    share: cython.double,
+) -> None:
+    """Raise distances (n,) to those lines of `shortfall`, less a `share` of them that is rounding, in place."""
+    start: cython.double = np.min(offsets)
+    s: cython.Py_ssize_t = 0
+    with cython.nogil:
+        for v in range(distance.shape[0]):
+            line: cython.double = INFINITY
+            # Mostly above the line from the place that the vertex before is above of, without a square root.
+            for _ in range(places.shape[0]):
+                x: cython.double = V[v, 0] - places[s, 0]
+                y: cython.double = V[v, 1] - places[s, 1]
+                z: cython.double = V[v, 2] - places[s, 2]
+                squared: cython.double = x * x + y * y + z * z
+                reach: cython.double = distance[v] - offsets[s]
+                if reach >= 0 and squared <= reach * reach:
+                    break
+                line = min(line, sqrt(squared) + offsets[s])
+                s = s + 1 if s + 1 < places.shape[0] else 0
+            else:
+                line -= share * (line - start)
+                if line > distance[v]:
+                    distance[v] = line
 
 
 def wrong_rows(
