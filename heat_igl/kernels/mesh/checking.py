@@ -182,10 +182,8 @@ class EdgePaths:
 @cython.inline
 @cython.nogil
 def is_longer(near: cython.double, far: cython.double, length: cython.double) -> cython.bint:
-    """Whether the farther of two distances is longer than the way over the nearer one, not by rounding.
-
-    Rounding would pass along many edges.
-    """
+    """Whether the farther of two distances is longer than the way over the nearer one."""
+    # Not by rounding, which would pass along many edges.
     return near + length < far * (1 - 1e-12)
 
 
