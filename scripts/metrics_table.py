@@ -17,7 +17,8 @@ walls: bodies cut out of even or random tetrahedra, against the same solver on t
 than 3000 vertices: "finer" is an upper bound. Edges around which paths bend; the mean of |d - finer| / finer, the
 largest differences, and how much the worst is below the straight line; milliseconds for a query, and those of heat.
 layers and faces: Delaunay triangles of random points, rotated, against shortest ways through ``--border`` points on
-each edge of a border, or on all edges; mean and largest error, also of the reference with half as many points.
+each edge of a border, or on all edges; mean and largest error, also of the reference with half as many points, and of
+fim-python with a metric per face, if it is installed.
 grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels as rows, at their centres, from one of
 them, beside scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and
 largest error in percent, and seconds of one query with its preparation.
@@ -415,7 +416,8 @@ def on_faces(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     for c in (3.0, 100.0):
         name = f"checkerboard, three cells to a field, 1 beside {c:g}"
         cases[name] = lambda mesh, c=c: speeds(c ** (np.floor(centres(mesh) * FINE / 3).sum(axis=1) % 2))
-    cases["random fibres, 1 : 2"] = lambda mesh: fibres(rng.uniform(0, np.pi, mesh.n_faces), 2.0)
+    for r in (2.0, 10.0, 30.0):
+        cases[f"random fibres, 1 : {r:g}"] = lambda mesh, r=r: fibres(rng.uniform(0, np.pi, mesh.n_faces), r)
     for r in (5.0, 20.0):
         cases[f"smooth fibres, 1 : {r:g}"] = lambda mesh, r=r: fibres(np.sin(3 * centres(mesh)).sum(axis=1), r)
 
@@ -425,6 +427,7 @@ def on_faces(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
             g, source = make(mesh), int(rng.integers(mesh.n_vertices))
             half, whole = (through_edges(mesh, source, g, n) for n in (options.edge // 2, options.edge))
             yield "default", off(mesh, source, g, whole, rng.uniform(0, np.pi))
+            yield "fim", fim_off(mesh, source, g, whole)
             yield "half", np.abs(excess(half, whole))
 
     for name, make in cases.items():
@@ -567,6 +570,15 @@ def by_fim(mesh: Mesh, g: FloatArray, source: int) -> FloatArray:
 
     solver = create_fim_solver(mesh.V, mesh.F, np.linalg.inv(g), device="cpu", precision=np.float64)
     return np.asarray(solver.comp_fim(np.array([source]), np.zeros(1)))
+
+
+def fim_off(mesh: Mesh, source: int, g: FloatArray, truth: FloatArray) -> FloatArray:
+    """Errors of fim-python in the plane, in percent; nan if it is not installed."""
+    try:
+        found = by_fim(mesh, np.pad(g, ((0, 0), (0, 1), (0, 1))) + np.diag([0, 0, 1]), source)
+    except ImportError:
+        return np.array([np.nan])
+    return np.abs(excess(found, truth))
 
 
 def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
@@ -712,7 +724,9 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
     "layers": (on_layers, {"layers": "{case}"} | mean_and_largest(
         border="source on the border", beside="1.5 edges away", middle="in the middle", **HALF
     )),
-    "faces": (on_faces, {"metric per face": "{case}"} | mean_and_largest(default="default", **HALF)),
+    "faces": (on_faces, {"metric per face": "{case}"} | mean_and_largest(
+        default="default", fim="fim-python", **HALF
+    )),
     "grids": (on_grids, {"grid": "{grid}"} | errors_and_seconds(default="default", fmm="scikit-fmm", konal="pykonal")),
     "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}"} | errors_and_seconds(
         fim="fim-python", face="per simplex", vertex="at the vertices"

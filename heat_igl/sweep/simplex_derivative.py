@@ -64,7 +64,7 @@ class _FacetUpdate:
     is_sloped : (k, p) bool
         Whether the slope at a corner is known.
     same : (k, p, p) bool
-        Whether two corners have their distance from one source.
+        Whether two corners have their distance from one source, and the second order counts between them.
     share : (k, p) float64
         The place on the facet; corners of share 0 keep it.
     """
@@ -198,6 +198,7 @@ class _FacetUpdate:
                 # Where fronts are those of one point, there is no doubt, and none arises when vertices move.
                 size = np.where(np.abs(np.real(ratio)) < _ROUNDING, 0, _size(doubt))
                 sag = sag - size * share * np.sign(np.real(sag))
+                sag = np.where(np.real(sag) < 0, sag * _smaller(trust[:, i], trust[:, j]), sag)
                 edge = [metric[:, m % metric.shape[1]] for m in (i, j)]
                 from_i, from_j = (
                     2 * d * np.sqrt(g[:, i, i] + g[:, j, j] - 2 * g[:, i, j])
@@ -323,7 +324,7 @@ class FixedPointDerivative(SimplexDerivative):
         Vertices.
     answer : (n,) float64
         The distance that the engine gives.
-    distance, label, facet, place, slope, is_sloped
+    distance, label, facet, place, slope, is_sloped, is_linear
         What `HopfLax` found before bounds were kept.
     """
 
@@ -338,6 +339,7 @@ class FixedPointDerivative(SimplexDerivative):
         place: FloatArray,
         slope: FloatArray,
         is_sloped: AnyArray,
+        is_linear: AnyArray,
     ) -> None:
         super().__init__(simplices, sources)
         n = simplices.n
@@ -350,7 +352,7 @@ class FixedPointDerivative(SimplexDerivative):
         self._vertices = simplices.corners[self._simplex[:, None], self._corner]
         labels = label[self._vertices[:, 1:]]
         self._first = np.take_along_axis(labels, sources.vertex_offset[labels].argmin(axis=1)[:, None], axis=1)[:, 0]
-        same = labels[:, :, None] == labels[:, None]
+        same = (labels[:, :, None] == labels[:, None]) & ~is_linear[v, None, None]
         is_known = is_sloped[self._vertices[:, 1:]].astype(bool)
         self._update = _FacetUpdate(is_known, same, place[v])
         self._rank = np.empty(n, np.int64)

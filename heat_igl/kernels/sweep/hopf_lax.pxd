@@ -10,8 +10,6 @@ cdef extern from *:
     double SETTLED, EQUAL
 
 cdef enum:
-    # Where the mesh resolves the metric, vertices settle in 2 to 11 visits.
-    MOST_VISITS = 40
     MOST_ROUNDS = 100
 
 
@@ -39,8 +37,11 @@ cdef class HopfLax(Facet):
     # The derivative of distance by the position of each vertex, where it is known.
     cdef double[:, ::1] slope
     cdef unsigned char[::1] is_sloped
-    # Whether a vertex was in a circle that did not settle: its slope is not asked for.
-    cdef unsigned char[::1] is_linear
+    # What each vertex adds to T linear at its place, the sum of this over the open vertices up to each, and how often a
+    # vertex was in a circle around which it is negative.
+    cdef double[::1] step
+    cdef double[::1] sum
+    cdef unsigned char[::1] n_circles
     # The corner whose facet gave each vertex its distance, the place there, and what bounds the values through each
     # simplex.
     cdef int[::1] facet
@@ -52,7 +53,6 @@ cdef class HopfLax(Facet):
     cdef int side[3]
     cdef double level[3]
 
-    cdef int nearest_corner(self) noexcept nogil
     cdef double face(self, int s, int c) noexcept nogil
     cdef double linear(self, int s, int c, double room) noexcept nogil
     cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
@@ -62,7 +62,6 @@ cdef class HopfLax(Facet):
     cdef void open_circle(self, int u, int n_open) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
-    cdef bint rests_on(self, int v, int u) noexcept nogil
     cdef double through(self, int s, int c, double best) noexcept nogil
     cdef double curved(self, int s, int c, double best, double limit) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil

@@ -17,7 +17,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.signals import is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, invert, mean_velocity, multiply
-from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, MOST_ROUNDS, MOST_VISITS, SETTLED
+from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, MOST_ROUNDS, SETTLED
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 from heat_igl.kernels.signals import raise_caught
@@ -235,31 +235,23 @@ class HopfLax(Facet):
             The shares of the other corners, in their order, at the best place on that facet.
         slope, is_sloped : (n, 3) float64, (n,) uint8
             The derivative of distance by the position of each vertex, and whether it is known.
+        is_linear : (n,) bool
+            Whether T linear is taken for a vertex, as in circles.
         """
         n = len(d)
         self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
         # Nearer than a source to itself is another one.
         self.fixed = (d == np.append(offset, np.inf)[label]).view(np.uint8)
-        self.slope, self.is_sloped, self.is_linear = np.zeros((n, 3)), np.zeros(n, np.uint8), np.zeros(n, np.uint8)
+        self.slope, self.is_sloped, self.n_circles = np.zeros((n, 3)), np.zeros(n, np.uint8), np.zeros(n, np.uint8)
         self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
         self.order = np.argsort(d, kind="stable").astype(np.int32)
         self.roots, self.state, self.stack = np.zeros(n, np.int32), np.zeros(n, np.uint8), np.zeros(4 * n, np.int32)
+        self.step, self.sum = np.zeros(n), np.zeros(n)
         self.pending, self.n_visits = np.where(np.isfinite(d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen()
         raise_caught()
-        return tuple(map(np.asarray, (self.facet, self.place, self.slope, self.is_sloped)))
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def nearest_corner(self) -> cython.int:
-        """The corner of the simplex that has the largest share of the best place."""
-        most: cython.int = 0
-        for k in range(1, self.p):
-            if self.share[k] > self.share[most]:
-                most = k
-        return self.side[most]
+        return *map(np.asarray, (self.facet, self.place, self.slope, self.is_sloped)), np.asarray(self.n_circles) > 1
 
     @cython.cfunc
     @cython.inline
@@ -417,7 +409,7 @@ class HopfLax(Facet):
                         # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
                         if (
                             self.d[v] < self.d[u]
-                            or self.rests_on(u, v)
+                            or self.facet[u] // size == s
                             or ((change == INFINITY or self.d[v] < old) and self.through(s, c, self.d[u]) < self.d[u])
                         ):
                             self.pending[u] = most
@@ -427,12 +419,14 @@ class HopfLax(Facet):
     def arrange(self) -> cython.void:
         """Order vertices topologically: each behind the corners that it has its distance from, but for circles.
 
-        By the second order, vertices of a circle may lower each other for ever. After many visits they lose it.
+        Vertices of a circle have their distances from each other. What each adds to T linear, the step, may be less
+        than 0 by the second order. If it sums to less than 0 around a circle, its vertices lower each other for ever.
         """
         v: cython.int
         size: cython.int = self.p + 1
         n_done: cython.int = 0
         n: cython.int = self.order.shape[0]
+        so_far: cython.double = 0.0
         for at in range(n):
             self.roots[at] = self.order[at]
             self.state[at] = 0
@@ -443,6 +437,8 @@ class HopfLax(Facet):
                 v = self.stack[n_open - 1]
                 if self.state[v] == 0 and self.facet[v] >= 0:
                     self.state[v] = 1
+                    so_far += self.step[v]
+                    self.sum[v] = so_far
                     k: cython.int = 0
                     for c in range(size):
                         if c == self.facet[v] % size:
@@ -452,26 +448,31 @@ class HopfLax(Facet):
                             if self.state[u] == 0:
                                 self.stack[n_open] = u
                                 n_open += 1
-                            elif self.state[u] == 1 and self.n_visits[u] > MOST_VISITS:
+                            elif self.state[u] == 1 and self.sum[v] - self.sum[u] + self.step[u] < 0.0:
                                 self.open_circle(u, n_open)
                         k += 1
                     continue
                 n_open -= 1
+                if self.state[v] == 1:
+                    so_far = self.sum[v] - self.step[v]
                 if self.state[v] < 2:
                     self.state[v] = 2
                     self.order[n_done] = v
                     n_done += 1
 
     def open_circle(self, u: cython.int, n_open: cython.int) -> cython.void:
-        """Take the second order from vertices that depend on u and on which u depends: those open above it."""
+        """Take the second order from vertices that depend on u and on which u depends: those open above it.
+
+        At the second time: the first may be on the way from distances along edges.
+        """
         w: cython.int = -1
         while w != u:
             n_open -= 1
             w = self.stack[n_open]
-            if self.state[w] == 1 and self.n_visits[w] > MOST_VISITS:
-                self.is_linear[w] = True
-                self.is_sloped[w] = False
-                self.pending[w], self.n_visits[w] = INFINITY, 0
+            if self.state[w] == 1 and self.n_circles[w] < 2:
+                self.n_circles[w] += 1
+                if self.n_circles[w] == 2:
+                    self.pending[w] = INFINITY
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it."""
@@ -496,25 +497,16 @@ class HopfLax(Facet):
             return
         s, c = best_at // size, best_at % size
         self.face(s, c)
+        self.d[v], self.facet[v], self.step[v] = best, best_at, best
+        most: cython.int = 0
         for i in range(self.p):
-            self.share[i] = kept[i]
-            self.place[v, i] = kept[i]
-        self.d[v], self.facet[v] = best, best_at
-        self.label[v] = self.label[self.corners[s, self.nearest_corner()]]
+            self.share[i] = self.place[v, i] = kept[i]
+            self.step[v] -= kept[i] * self.level[i]
+            if kept[i] > kept[most]:
+                most = i
+        self.label[v] = self.label[self.corners[s, self.side[most]]]
         self.lay(s, c)
         self.find_slope(s, c)
-
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def rests_on(self, v: cython.int, u: cython.int) -> cython.bint:
-        """Whether u is in the simplex through which v got its distance."""
-        c: cython.int
-        if self.facet[v] >= 0:
-            for c in range(self.p + 1):
-                if self.corners[self.facet[v] // (self.p + 1), c] == u:
-                    return True
-        return False
 
     def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
         """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
@@ -566,6 +558,7 @@ class HopfLax(Facet):
         self.start = start
         self.lay(s, c)
         is_source: cython.bint = False
+        is_linear: cython.bint = self.n_circles[self.corners[s, c]] > 1
         x: cython.double[3]
         for i in range(self.p):
             self.D[i] = self.d[self.corners[s, self.side[i]]] - start
@@ -576,7 +569,10 @@ class HopfLax(Facet):
         for i in range(self.p):
             x[i] = self.trust(s, c, i)
             for j in range(i):
-                self.sag[i][j] = self.sag[j][i] = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
+                sag: cython.double = 0.0
+                if not is_linear:
+                    sag = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
+                self.sag[i][j] = self.sag[j][i] = sag
         best = self.newton(limit)
         if is_source:
             # Straight from the source, where the square of T may have no derivatives.
@@ -630,6 +626,9 @@ class HopfLax(Facet):
         if fabs(doubt) >= fabs(sag):
             return 0.0
         sag -= fabs(doubt) * max(doubt / sag, -doubt / sag, 1.0 - trusted) * (1.0 if sag > 0.0 else -1.0)
+        # T above that of first order makes distances longer: if both slopes say so.
+        if sag < 0.0:
+            sag *= trusted
         edge: cython.int = _pair(self.side[i], self.side[j])
         from_i: cython.double = 2.0 * Di * sqrt(self.squares[s, self.side[i] if self.q > 1 else 0, edge])
         from_j: cython.double = 2.0 * Dj * sqrt(self.squares[s, self.side[j] if self.q > 1 else 0, edge])
@@ -660,7 +659,7 @@ class HopfLax(Facet):
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
         """The derivative of the length of v - x by the position of v, at the best place x."""
         v: cython.int = self.corners[s, c]
-        self.is_sloped[v] = self.length(self.share) > 0.0 and not self.is_linear[v]
+        self.is_sloped[v] = self.length(self.share) > 0.0
         for k in range(3):
             self.slope[v, k] = 0.0
             for i in range(self.p):
