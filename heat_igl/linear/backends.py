@@ -54,23 +54,12 @@ def is_of_volume(n: int, n_entries: int) -> bool:
 
 
 def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
-    """Order and analyse symmetric matrices of a pattern.
+    """Order and analyse symmetric matrices of a pattern (n, n) with both triangles stored; the values do not matter.
 
-    Parameters
-    ----------
-    pattern : (n, n) csc_matrix
-        Both triangles stored, indices sorted or not; the values do not matter.
-    backend : {"auto", "scipy", "multifrontal"}
-        SuperLU, or the package's own factorization, which "auto" takes if the matrix is not small and the order of
-        elimination good.
-
-    Raises
-    ------
-    MemoryError
-        If two factors, of heat and of Poisson's problem, would not fit into the memory available now; not if a backend
-        is named. Their entries are counted, not estimated.
-    ValueError
-        If there is no such backend.
+    The backend is SuperLU ("scipy"), or the package's own factorization ("multifrontal"), which "auto" takes if the
+    matrix is not small and the order of elimination good. A MemoryError if two factors, of heat and of Poisson's
+    problem, would not fit into the memory available now, by counts of their entries; not if a backend is named. A
+    ValueError if there is no such backend.
     """
     require_choice("backend", backend, get_args(Backend))
     n = pattern.shape[0]

@@ -42,18 +42,8 @@ def cotan_operators(mesh: Mesh, on_laplacian: OnLaplacian | None = None) -> Oper
     """The operators on the mesh's own triangles or tetrahedra, gradients in space (d = 3).
 
     Triangles come without `Operators.surface` and `Operators.lengths`; ``operators(mesh, "cotan")`` has both.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Triangles or tetrahedra.
-    on_laplacian : callable, optional
-        Called with L as soon as it is known.
-
-    Raises
-    ------
-    MeshError
-        If a triangle has no area, or a tetrahedron no volume.
+    `on_laplacian` is called with L as soon as it is known. A MeshError if a triangle has no area, or a tetrahedron no
+    volume.
     """
     check_measures(mesh)
     G = _gradient(mesh.V, mesh.F, _unit(mesh))

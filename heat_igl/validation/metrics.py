@@ -73,22 +73,9 @@ class ErrorSummary:
 
 
 def relative_error(distance: ArrayLike, truth: ArrayLike) -> FloatArray:
-    """Relative error |d - truth| / truth, entry by entry.
+    """Relative error |d - truth| / truth of distances (n,) or (k, n), entry by entry; a ValueError for other shapes.
 
-    Parameters
-    ----------
-    distance, truth : (n,) or (k, n) array_like
-        In the same unit.
-
-    Returns
-    -------
-    (n,) or (k, n) float64
-        NaN if the truth is 0 or infinite; ``inf`` if only the distance is not finite.
-
-    Raises
-    ------
-    ValueError
-        If the shapes differ.
+    NaN if the truth is 0 or infinite; ``inf`` if only the distance is not finite.
     """
     d, x = _same_shape(distance, truth)
     error = np.full(x.shape, np.nan)
@@ -100,27 +87,9 @@ def relative_error(distance: ArrayLike, truth: ArrayLike) -> FloatArray:
 def error_summary(
     mesh: MeshLike, distances: ArrayLike, truths: ArrayLike, source_sets: Sequence[Sources]
 ) -> ErrorSummary:
-    """All error norms of some distances.
+    """All error norms of distances (k, n), a row for each set of sources, on a mesh that gives areas and neighbours.
 
-    Parameters
-    ----------
-    mesh : mesh
-        Gives the areas and neighbours of vertices.
-    distances, truths : (k, n) array_like
-        One row per set of sources.
-    source_sets : sequence of sources
-        k entries.
-
-    Returns
-    -------
-    ErrorSummary
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not fit each other.
-    SourceError
-        If an entry does not name vertices of the mesh.
+    A ValueError if the shapes do not fit each other, and a SourceError if an entry does not name vertices of the mesh.
     """
     mesh = as_simplices(mesh)
     d, x = _same_shape(distances, truths)
@@ -230,20 +199,10 @@ class BoundViolations:
 
 
 def eikonal_residual(mesh: MeshLike, distance: ArrayLike) -> FloatArray:
-    """Residual of the eikonal equation |grad d| = 1 on each face: | |grad d| - 1 |.
+    """Residual (m,) of the eikonal equation |grad d| = 1 on each triangle or tetrahedron: | |grad d| - 1 |.
 
-    Parameters
-    ----------
-    mesh : mesh
-        Triangles or tetrahedra.
-    distance : (n,) array_like
-        In the mesh's unit.
-
-    Returns
-    -------
-    (m,) float64
-        NaN on faces that are degenerate or not reached. It does not vanish at the sources and across the cut locus for
-        any discrete distance, so its mean tends to 0 with the edge length, and its maximum does not.
+    NaN on faces that are degenerate or not reached. It does not vanish at the sources and across the cut locus for any
+    discrete distance (n,), so its mean tends to 0 with the edge length, and its maximum does not.
     """
     mesh = as_simplices(mesh)
     d = np.asarray(distance, dtype=np.float64)
@@ -255,19 +214,9 @@ def eikonal_residual(mesh: MeshLike, distance: ArrayLike) -> FloatArray:
 
 
 def asymmetry(distances: ArrayLike, sources: ArrayLike) -> FloatArray:
-    """The matrix d(a, b) - d(b, a) over pairs of sources; 0 for an exact distance.
+    """The matrix (k, k) of d(a, b) - d(b, a) over pairs of sources; 0 for an exact distance, and between components.
 
-    Parameters
-    ----------
-    distances : (k, n) array_like
-        Row i is the distance from the one vertex ``sources[i]``.
-    sources : (k,) array_like of int
-        Single vertices.
-
-    Returns
-    -------
-    (k, k) float64
-        Antisymmetric, in the mesh's unit; 0 between components.
+    Row i of the distances (k, n) is that from the one vertex ``sources[i]``.
     """
     between = np.asarray(distances, dtype=np.float64)[:, np.asarray(sources)]
     difference: FloatArray = np.where(np.isfinite(between) & np.isfinite(between.T), _finite_or_zero(between), 0.0)
@@ -293,22 +242,10 @@ def triangle_violations(distances: ArrayLike, sources: ArrayLike) -> TriangleVio
 def bound_violations(
     mesh: MeshLike, distance: ArrayLike, sources: Sources, limits: tuple[FloatArray, FloatArray] | None = None
 ) -> BoundViolations:
-    """Check a distance against the straight line from below and paths along edges from above.
+    """Check a distance (n,) against the straight line from below and paths along edges from above.
 
-    Parameters
-    ----------
-    mesh : mesh
-        Triangles or tetrahedra.
-    distance : (n,) array_like
-        In the mesh's unit; vertices at which it is not finite are left out.
-    sources : int, sequence of int, or (n,) mask of bool
-        The sources of the distance.
-    limits : pair of (n,) float64, optional
-        `straight_lines` and `edge_paths` from these sources, if they are known already.
-
-    Returns
-    -------
-    BoundViolations
+    Vertices at which it is not finite are left out. The `limits` are `straight_lines` and `edge_paths` from these
+    sources, if they are known already.
     """
     mesh = as_simplices(mesh)
     d = np.asarray(distance, dtype=np.float64)
