@@ -673,11 +673,11 @@ def test_points_of_a_regular_torus_make_a_closed_surface(around_tube, around_hol
     np.testing.assert_allclose(np.linalg.norm(found.gradient[1:], axis=1), 1, atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(8))
 def test_fans_that_meet_in_a_point_are_joined(seed):
     """Some triangles of two closed surfaces with vertices in common, no neighbours, all of which run alike.
 
-    The joined ones run against their neighbours; no edge gets a third, and no vertex a closed fan beside another.
+    Joined ones run against their neighbours; no edge gets a third, no vertex several fans, and none goes that fits.
     """
     torus, rng = shapes.torus(12, 16), np.random.default_rng(seed)
     N = torus.n_vertices
@@ -695,14 +695,14 @@ def test_fans_that_meet_in_a_point_are_joined(seed):
     # Nothing else is near enough to be filled.
     joined = with_gaps_filled(V, F, np.zeros(n))[0]
     found = heat_igl.Mesh(V, joined).report()
-    assert len(found.nonmanifold_vertices) < 0.1 * len(pinched)
-    assert len(found.nonmanifold_edges) == 0
+    assert len(found.nonmanifold_vertices) + len(found.nonmanifold_edges) == 0
     sides = np.concatenate([joined[:, [0, 1]], joined[:, [1, 2]], joined[:, [2, 0]]])
     assert len(np.unique(sides, axis=0)) == len(sides)
-    given = {tuple(row) for row in np.sort(F, axis=1).tolist()}
-    kept = {tuple(row) for row in np.sort(joined, axis=1).tolist()} & given
-    assert len(kept) > 0.95 * len(given)
-    assert len(joined) > len(kept)
+    given, kept = ({tuple(row) for row in np.sort(rows, axis=1).tolist()} for rows in (F, joined))
+    assert kept - given
+    for row in given - kept:
+        again = heat_igl.Mesh(V, np.append(joined, [row], axis=0)).report()
+        assert len(again.nonmanifold_vertices) + len(again.nonmanifold_edges) > 0
     assert np.unique(joined).size == np.unique(F).size
 
 
