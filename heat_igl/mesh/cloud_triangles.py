@@ -22,10 +22,11 @@ from heat_igl.mesh.neighbourhoods import K, Neighbourhoods, PointTree, by_rows
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 # Largest radius of a circumscribed circle, in shares of the radius of the neighbourhood. Below one half, all points
-# inside the circle are known; a little more bridges the gaps of random points.
+# inside the circle are known; a little more bridges the gaps of random points. With 0.5 and 0.9 errors on 25 surfaces
+# are 1 % larger in the mean, with 0.4 a sixth.
 _LARGEST_RADIUS = 0.6
 # The same for gaps, in shares of the distance of the farthest neighbour: larger, since the sides of a gap are known to
-# belong to the surface.
+# belong to the surface. With 0.7 and 1.2 errors are 1 % larger in the mean, with 2 they are 4 %.
 _LARGEST_GAP = 0.9
 # Sides, those of neighbours on them, and whether both run alike.
 GluedSides = tuple[IntArray, IntArray, BoolArray]
@@ -33,15 +34,17 @@ GluedSides = tuple[IntArray, IntArray, BoolArray]
 _OTHER_SHEET = -0.25
 # Cosine of the angle to the next triangle above which the two fold back and may join sheets wrongly: 60 degrees.
 FOLDED_BACK = 0.5
-# The same above which a triangle is put into a gap only if it closes it, a right angle, as of a notch that belongs to
-# stairs; and above which it never is, since both lie on each other.
+# The same above which a triangle is put into a gap only if it closes it, a right angle whatever the rounding, as of a
+# notch that belongs to stairs; and above which it never is, since both lie on each other, as within a flat border.
 _RIGHT_ANGLE, _MOST_FOLDED = -0.1, 0.99
-# Triangles of a part for each one that fills its gaps: with fewer, it is the border of the part that was filled.
+# Triangles of a part for each one that fills its gaps: with fewer, it is the border of the part that was filled, as
+# of a cap of 70, which 18 fill. With 4 errors are the same, and with 30 gaps of small parts stay.
 _PER_FILLED = 10
 # Sum of the angles around a point: the two sheets of a fold that is joined have 2 pi each, and vertices of scans and
 # of models, 2.6 pi at most but for one in a thousand.
 _CROWDED = 3 * np.pi
-# A gap is torn where one of so many nearest points is more than so many edges away.
+# A gap is torn where one of so many nearest points is more than so many edges away. With 24 points or 3 edges one more
+# of 25 surfaces warns, with 6 edges two fewer, of which one is nearly as wrong as by potpourri3d.
 _NEAREST, _EDGES_AWAY = 12, 4
 
 

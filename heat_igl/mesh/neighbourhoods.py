@@ -15,13 +15,14 @@ from heat_igl.kernels.cloud.nearest_points import nearest_points, tree_of_boxes
 from heat_igl.runtime import over_rows, warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-# Nearest points from which the plane of a point and its triangles are found.
+# Nearest points, for planes and triangles: errors on scans are a sixth larger with 24, and a tenth smaller with 40.
 K = 30
 # Points at a time: bounds the memory for their neighbours.
 _BLOCK = 1 << 12
 # Points in a leaf of the tree that sorts them: as many as in the smallest boxes.
 _LEAF = 8
-# Ratio of the two smaller variances above which neighbours may be on several sheets.
+# Ratio of the two smaller variances above which neighbours may be on several sheets: errors on 25 surfaces are the same
+# with 0.05, and a tenth larger without.
 _SEVERAL_SHEETS = 0.1
 # Directions in which balls are tried, half and their opposites: every 22 degrees. With 60 a tenth of a neighbour
 # stays on the other of two sheets 1.5 spacings apart; with 120 and 160 errors at thin parts are no smaller.
@@ -31,18 +32,19 @@ _DIRECTIONS = 100
 # below this one noise costs less than the heat method.
 _NOISE = 0.05
 # Above this ratio of the two smaller variances, a neighbourhood is no disc: more points are needed to see the surface.
+# With 0.15, three meshes with noise of 1 % are a tenth nearer, and a sphere of 20 000 points is 6 % less so.
 _THICKNESS = 0.05
+# With 60 and noise of 3 %, errors on five meshes are 14 to 27 % larger, on four 4 to 34 % smaller.
 _LARGEST_K = 120
-# Above this ratio in all neighbourhoods, the flattest of which is not the largest, nothing tells noise from detail:
-# on tori of 500 and 1000 points with noise and on a head of 507, distance is 4 to 9 % wrong above it, 2 %
-# below.
+# Above this ratio in all neighbourhoods, the flattest of which is not the largest, nothing tells noise from detail: on
+# tori of 500 and 1000 points with noise and on a head of 507, distance is 4 to 9 % wrong above it, 2 % below.
 _NO_DISC = 0.15
-# Above this one the neighbourhood is a ball within the noise.
+# Above this one the neighbourhood is a ball within the noise. With 0.6, errors on 30 000 points of a square with noise
+# of 3 and 6 % are 1.2 and 2.5 times as large; with 0.3, those on six meshes with noise of 3 % are 1.3 to 2.2 times.
 _NO_SURFACE = 0.5
-# Noise in the neighbours moves quadrics, too: one pass leaves errors on scans 2 % larger, and eight make them no
-# smaller.
+# Noise in the neighbours moves quadrics, too: with one pass errors on scans are 2 % larger, with eight no smaller.
 _PASSES = 2
-# Noise is looked for at this many points.
+# Noise is looked for at this many points: deviations differ by a third from point to point, their median by 2 %.
 _SAMPLE = 500
 # Deviations from a quadric of half as many neighbours, in shares of those from the quadric of all: noise deviates from
 # both alike, by 0.85 to 1 in measurements, detail from the smaller one by less, 0.14 to 0.74. Noise of about a spacing
