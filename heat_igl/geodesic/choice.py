@@ -14,7 +14,6 @@ from heat_igl.plan import DistanceMethod
 from heat_igl.typing import ArrayLike
 
 Solver = GeodesicSolver | HeatMethodSolver
-_OPTIONS_OF_HEAT = tuple(option.name for option in fields(SolverOptions))
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class SolverChoice:
             If there is no such option.
         """
         heat = SolverOptions(**options)
-        given = [name for name in _OPTIONS_OF_HEAT if getattr(heat, name) != getattr(SolverOptions(), name)]
+        given = [option.name for option in fields(heat) if getattr(heat, option.name) != option.default]
         if given and method not in (None, "heat"):
             raise ValueError(f"{given[0]} is an option of the heat method, but the method is {method}: leave one away")
         return cls(method or ("heat" if given else "auto"), tolerance, heat)  # type: ignore[arg-type]

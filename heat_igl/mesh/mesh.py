@@ -324,7 +324,7 @@ class Mesh:
         mask[self.facets.vertices[self.facets.n_faces == 1]] = True
         return _frozen(mask)
 
-    @cached_property
+    @property
     def measures(self) -> FloatArray:
         """The area of each triangle or volume of each tetrahedron (m,), never negative."""
         if self.is_tetrahedral:

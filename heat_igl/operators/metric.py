@@ -21,8 +21,7 @@ from heat_igl.operators.triangles import check_measures, edge_length_operators, 
 from heat_igl.plan import hopf_lax_is_nearer
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 
-# Two faces may see the edge between them at lengths that differ by this share of the longer: the mean of both is taken
-# for its length.
+# Share of the longer by which two faces may see the length of an edge differ, for which the mean is taken then.
 _ONE_LENGTH = 0.1
 # Share that has to remain of the length by which two sides of a triangle are longer than the third, with the mean of
 # two lengths for each side, or with lengths integrated in a smooth metric.
@@ -364,16 +363,14 @@ class _TetrahedronOperators(Operators):
     """The operators of tetrahedra with a metric g (m, 3, 3) on each, made on first use: `simplices` need none."""
 
     def __init__(self, mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> None:
-        vars(self).update(_mesh=mesh, simplices=simplices, _g=g, is_surface=False)
+        vars(self).update(_of=(mesh, simplices, g), simplices=simplices, is_surface=False)
 
-    _mesh: Mesh
-    _g: FloatArray
-    simplices: MetricSimplices
+    _of: tuple[Mesh, MetricSimplices, FloatArray]
 
     @property
     def n(self) -> int:
         """Number of vertices."""
-        return self._mesh.n_vertices
+        return self._of[0].n_vertices
 
     @property
     def longest_distances(self) -> FloatArray | None:
@@ -382,7 +379,7 @@ class _TetrahedronOperators(Operators):
 
     @cached_property
     def _made(self) -> Operators:
-        return _of_tetrahedra(self._mesh, self.simplices, self._g)
+        return _of_tetrahedra(*self._of)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # an instance that is not filled yet, as in `pickle`

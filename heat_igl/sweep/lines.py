@@ -11,7 +11,6 @@ import scipy.sparse as sp
 from heat_igl.kernels.bodies.bends import bend_around
 from heat_igl.kernels.bodies.rays import Body
 from heat_igl.kernels.bodies.sight import look_around
-from heat_igl.mesh import connectivity
 from heat_igl.mesh.connectivity import unique_rows
 from heat_igl.operators import MetricSimplices
 from heat_igl.plan import SMALL_BODY
@@ -59,24 +58,13 @@ class LineEngine(SimplexEngine):
         body: Any = Body
         return body(self._corners, self._first, self._incident, self._V)
 
-    @cached_property
-    def _edges(self) -> tuple[AnyArray, FloatArray]:
-        """Each edge once."""
-        ends = self._body.edges()
-        # By coordinate: voxels have seven times as many edges as vertices.
-        return ends, np.sqrt(sum((x[ends[:, 0]] - x[ends[:, 1]]) ** 2 for x in self._V.T))
-
-    @cached_property
-    def _edge_graph(self) -> sp.csr_array:
-        ends, lengths = self._edges
-        return sp.csr_array((lengths, tuple(ends.T)), shape=(self._simplices.n, self._simplices.n))
-
     def _order(self, vertices: AnyArray, straight: bool = False) -> AnyArray:
         """All vertices, from near to far: by the straight line from the only source, or by edges."""
         if straight:
-            far = np.linalg.norm(self._V - self._V[vertices[0]], axis=1)
+            far = np.sqrt(sum((x - x[vertices[0]]) ** 2 for x in self._V.T))
         else:
-            far = connectivity.edge_distance(self._edge_graph, vertices)
+            far = np.where(np.isin(np.arange(len(self._V)), vertices), 0.0, np.inf)
+            self._along_edges(far, np.zeros(len(far), np.int32))
         return np.argsort(far, kind="stable").astype(np.int32)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
@@ -163,18 +151,15 @@ class LineEngine(SimplexEngine):
 
     def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
         """Give vertices that nothing has reached a distance along edges; returns whether there were any."""
-        if np.isfinite(distance).all():
+        unreached = np.isinf(distance)
+        if not unreached.any():
             return False
-        pairs, lengths = self._edges
-        start, end = np.concatenate([pairs, pairs[:, ::-1]]).T
-        lengths = np.concatenate([lengths, lengths])
-        reached = len(distance) - np.count_nonzero(np.isinf(distance))
-        while len(rows := np.flatnonzero(np.isinf(distance[end]) & np.isfinite(distance[start]))):
-            # The smallest value of each vertex is written last.
-            rows = rows[np.argsort(-(distance[start[rows]] + lengths[rows]), kind="stable")]
-            distance[end[rows]] = distance[start[rows]] + lengths[rows]
-            begin[end[rows]], label[end[rows]] = distance[start[rows]], label[start[rows]]
-        return bool(len(distance) - np.count_nonzero(np.isinf(distance)) > reached)
+        self._body.along_edges(distance, label, begin)
+        return bool(np.isfinite(distance[unreached]).any())
+
+    def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
+        """As of all engines, without a list of edges: voxels have seven times as many as vertices."""
+        self._body.along_edges(distance, label, np.empty_like(distance))
 
 
 def reflex_edges(corners: AnyArray, behind: AnyArray, V: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:

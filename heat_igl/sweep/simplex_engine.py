@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.kernels.mesh import checking
-from heat_igl.mesh.connectivity import group_by_label
+from heat_igl.kernels.mesh import checking, incidence
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine
@@ -32,8 +31,7 @@ class SimplexEngine(Engine):
     def __init__(self, simplices: MetricSimplices) -> None:
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
-        by_vertex = group_by_label(simplices.corners.ravel(), simplices.n)
-        self._first, self._incident = (np.asarray(part, np.int32) for part in by_vertex)
+        self._first, self._incident = incidence.corners_by_vertex(self._corners, simplices.n)
 
     @abstractmethod
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:

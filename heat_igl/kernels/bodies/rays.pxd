@@ -22,6 +22,7 @@ cdef class Body:
     cdef int across(self, int t, int o) noexcept nogil
     cdef int list_around(self, int v, int[::1] mark, int[::1] into, int at) noexcept nogil
     cdef double longest_edge(self, int v) noexcept nogil
+    cdef double apart(self, int v, int u) noexcept nogil
 
 
 cdef class Ray:

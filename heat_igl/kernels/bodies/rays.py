@@ -64,12 +64,6 @@ class Body:
         """`behind`, as an array."""
         return np.asarray(self.behind)
 
-    def edges(self):
-        """The ends (e, 2) int32 of each edge, the smaller one first."""
-        first, head = np.asarray(self.first_neighbour), np.asarray(self.neighbours)
-        tail = np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first))
-        return np.stack([tail, head], axis=1)[tail < head]
-
     def across(self, t: cython.int, o: cython.int) -> cython.int:
         """The first other tetrahedron at the side of t opposite corner o, or -1; that one is told as well."""
         a: cython.int = self.corners[t, (o + 1) % 4]
@@ -109,12 +103,40 @@ class Body:
         """The distance of v from its farthest neighbour."""
         longest: cython.double = 0.0
         for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
-            squared: cython.double = 0.0
-            for i in range(3):
-                off: cython.double = self.positions[self.neighbours[k], i] - self.positions[v, i]
-                squared += off * off
-            longest = max(longest, squared)
-        return sqrt(longest)
+            longest = max(longest, self.apart(v, self.neighbours[k]))
+        return longest
+
+    def apart(self, v: cython.int, u: cython.int) -> cython.double:
+        """The distance of two vertices in space."""
+        squared: cython.double = 0.0
+        for i in range(3):
+            off: cython.double = self.positions[u, i] - self.positions[v, i]
+            squared += off * off
+        return sqrt(squared)
+
+    def along_edges(self, d: cython.double[::1], label: cython.int[::1], begin: cython.double[::1]) -> None:
+        """Lower distances `d` (n,) to paths along edges, in place; `begin` is where their last edge begins."""
+        n: cython.int = d.shape[0]
+        # A circular buffer: no vertex waits twice, so n places suffice.
+        waiting: cython.int[::1] = np.arange(n, dtype=np.int32)
+        is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
+        at: cython.int = 0
+        count: cython.int = n
+        with cython.nogil:
+            while count > 0:
+                v: cython.int = waiting[at]
+                is_waiting[v] = False
+                at = at + 1 if at + 1 < n else 0
+                count -= 1
+                for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
+                    u: cython.int = self.neighbours[k]
+                    # Not by rounding, which would pass along many edges.
+                    if d[v] < d[u] and d[v] + self.apart(v, u) < d[u] * (1 - 1e-12):
+                        d[u], begin[u], label[u] = d[v] + self.apart(v, u), d[v], label[v]
+                        if not is_waiting[u]:
+                            is_waiting[u] = True
+                            waiting[at + count if at + count < n else at + count - n] = u
+                            count += 1
 
 
 @cython.cclass

@@ -40,6 +40,24 @@ def edges_of_triangles(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ss
     return ends, number.reshape(-1, 3), counts
 
 
+def corners_by_vertex(corners: cython.const[cython.int][:, ::1], n: cython.Py_ssize_t):
+    """The corners ``size * simplex + corner`` at vertex v: places ``first[v]`` to ``first[v + 1]`` of `incident`."""
+    size: cython.Py_ssize_t = corners.shape[1]
+    begins, found = np.zeros(n + 2, np.int32), np.empty(corners.shape[0] * size, np.int32)
+    # One place ahead, until each corner has moved the begin of its vertex to the end.
+    place: cython.int[::1] = begins
+    incident: cython.int[::1] = found
+    with cython.nogil:
+        for i in range(incident.shape[0]):
+            place[corners[i // size, i % size] + 2] += 1
+        for i in range(n):
+            place[i + 2] += place[i + 1]
+        for i in range(incident.shape[0]):
+            incident[place[corners[i // size, i % size] + 1]] = i
+            place[corners[i // size, i % size] + 1] += 1
+    return begins[:-1], found
+
+
 @cython.cfunc
 @cython.inline
 @cython.nogil
