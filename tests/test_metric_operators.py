@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import igl
 import numpy as np
 import pytest
 from conftest import flat_perturbed, mean_error, perturbed, two_halves
@@ -72,6 +73,17 @@ def test_points_are_sources_in_a_metric():
     np.testing.assert_allclose(heat_igl.GeodesicSolver(domain).distance(inside), exact, rtol=1e-9)
     domain = metric_operators(mesh, np.eye(3) / (1 + mesh.V[:, 1])[:, None, None] ** 2)
     np.testing.assert_array_equal(distance(domain, inside, "auto"), distance(domain, inside, "exact"))
+
+
+def test_around_a_corner_a_metric_that_varies_by_rounding_is_constant():
+    square, rng = shapes.grid(16), np.random.default_rng(0)
+    kept = square.F[(square.V[square.F].mean(axis=1)[:, :2] < 0.5).any(axis=1)]
+    mesh = Mesh(*igl.remove_unreferenced(square.V, kept)[:2])
+    g = np.diag([1.0, 4.0, 1.0]) * (1 + 1e-7 * rng.random(mesh.n_vertices))[:, None, None]
+    exact = Mesh(mesh.V @ np.diag([1.0, 2.0, 1.0]), mesh.F)
+    source = int(np.argmax(mesh.V[:, 0]))
+    found, expected = distance(metric_operators(mesh, g), source, "auto"), distance(exact, source, "exact")
+    assert found == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.filterwarnings("ignore:the metric turns farther", "ignore:heat is off")

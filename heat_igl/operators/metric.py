@@ -281,7 +281,7 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Lapl
 def _unfolded(mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian) -> Operators:
     """The operators of triangles with the lengths `sides` (m, 3), and with `simplices` where these are nearer."""
     domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
-    if simplices is not None and not hopf_lax_is_nearer(simplices.variation, mean_angle_defect(in_space(mesh))):
+    if simplices is not None and not hopf_lax_is_nearer(simplices.variation, mean_angle_defect(in_space(mesh), True)):
         simplices = None
     return replace(domain, simplices=simplices)
 

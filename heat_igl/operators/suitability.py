@@ -144,19 +144,24 @@ def is_rough_or_narrow(domain: Operators) -> bool:
     return mean_angle_defect(triangulation) * triangulation.n_used > ROUGH_FOR_HEAT * n
 
 
-def mean_angle_defect(triangulation: IntrinsicTriangulation) -> float:
-    """Mean of |2 pi - sum of angles| over inner vertices, or over a thousand of them."""
+def mean_angle_defect(triangulation: IntrinsicTriangulation, at_boundary: bool = False) -> float:
+    """Mean of |2 pi - sum of angles| over inner vertices, or over a thousand of them.
+
+    `at_boundary`: over all vertices; on the boundary, that by which the sum exceeds pi, since ways bend there.
+    """
     F, n = triangulation.F, triangulation.n
-    chosen = np.zeros(n, bool)
+    chosen, is_outer = np.zeros(n, bool), np.zeros(n, bool)
     chosen[F] = True
     outer = np.flatnonzero(triangulation.twin < 0)
-    chosen[triangulation.tail(outer)] = chosen[triangulation.head(outer)] = False
-    vertices = np.flatnonzero(chosen)
-    vertices = vertices[:: len(vertices) // _MOST_SAMPLES + 1]
+    is_outer[triangulation.tail(outer)] = is_outer[triangulation.head(outer)] = True
+    vertices = np.flatnonzero(chosen if at_boundary else chosen & ~is_outer)
+    if not at_boundary:
+        vertices = vertices[:: len(vertices) // _MOST_SAMPLES + 1]
     if not len(vertices):
         return 0.0
     chosen[:] = False
     chosen[vertices] = True
     faces = np.flatnonzero(chosen[F[:, 0]] | chosen[F[:, 1]] | chosen[F[:, 2]])
-    total = np.bincount(F[faces].ravel(), corner_angles(triangulation.l[faces]).ravel(), n)
-    return float(np.abs(2 * np.pi - total[vertices]).mean())
+    total = np.bincount(F[faces].ravel(), corner_angles(triangulation.l[faces]).ravel(), n)[vertices]
+    defect = np.where(is_outer[vertices], np.maximum(total - np.pi, 0.0), np.abs(2 * np.pi - total))
+    return float(defect.mean())
