@@ -27,7 +27,7 @@ _ERROR_OF_NOISE = 4.0
 # Clouds with a larger one warn.
 _LARGE_ERROR = 0.05
 # Share of doubtful points, without those at folds, above which clouds warn: single points with noise fold back, too. On
-# the vertices of 16 meshes of which distance is nearer than by potpourri3d it is at most 0.0013, on random points with
+# the vertices of 17 meshes of which distance is nearer than by potpourri3d it is at most 0.0040, on random points with
 # outliers 0.0035, and from 0.0052 on where parts are joined or torn.
 _MOST_DOUBTFUL = 0.005
 # Share of the points outside of the largest part above which clouds warn: scans have up to as many outliers.
