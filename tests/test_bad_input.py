@@ -532,7 +532,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
 )
 ACCEPTED: dict[str, Callable[[heat_igl.Mesh], Any]] = {
     "far positions": lambda m: heat_igl.closest_points(m, [[0, 1e149, 0]]),
-    "long line": lambda m: heat_igl.exp_map(m, 0, [[1e4, 0]]),
+    "long lines": lambda _: heat_igl.exp_map(heat_igl.shapes.cylinder(3, 1, 1e6), 0, [[9, 4e5], [4e5, 9]]),
     "polygons": lambda _: PolygonMesh(SQUARE, [[0, 1, 2, 3]]),
     "last face": lambda m: SurfacePoints([0, 79], CENTRE * 2).positions(m),
     "edge lengths": lambda _: HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]]),

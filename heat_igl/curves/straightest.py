@@ -88,11 +88,11 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     if not is_number(length) or not 0 <= length < np.inf:
         raise ValueError(f"length must be a finite number of at least 0, not {shown(length)}")
     distance = np.array([float(length)])
-    mean_edge = tracer.mean_edges("length", begin.faces, distance)
+    tracer.refuse_endless("length", begin.faces, distance)
     turn, size = tracer.directions("direction", begin, vector)
     if not size[0] > 0:
         raise ValueError(f"direction = {np.asarray(direction).tolist()} is 0 in the tangent plane: it needs a length")
-    return tracer.curve(begin, turn, distance, mean_edge)
+    return tracer.curve(begin, turn, distance)
 
 
 def exp_map(mesh: MeshLike, source: Sources, vectors: ArrayLike) -> SurfacePoints:
@@ -176,11 +176,11 @@ class Tracer:
         elif len(begin.faces) != k:
             raise SourceError(f"source must be one point, or one for each of the {k} vectors, not {len(begin.faces)}")
         turn, size = self.directions("vectors", begin, array)
-        mean_edge = self.mean_edges("vectors", begin.faces, size)
+        self.refuse_endless("vectors", begin.faces, size)
         faces, barycentric, lengths = self._room(k)
 
         def work(part: slice) -> None:
-            given = (begin.faces[part], begin.barycentric[part], turn[part], size[part], mean_edge[part])
+            given = (begin.faces[part], begin.barycentric[part], turn[part], size[part])
             kernel.trace(self._triangles, *given, faces[part], barycentric[part], lengths[part])
 
         over_rows(work, k, k) if k >= _FEW else work(slice(k))
@@ -193,16 +193,12 @@ class Tracer:
         """Room for the ends of k geodesics, faces and barycentric coordinates, and for their lengths."""
         return np.empty(k, np.int64), np.empty((k, 3)), np.empty(k)
 
-    def mean_edges(self, name: str, faces: IntArray, lengths: FloatArray) -> FloatArray:
-        """Mean length (k,) of the edges of the component of each face.
-
-        A ValueError for lengths (k,) that would take minutes to trace, which another unit is the reason of.
-        """
+    def refuse_endless(self, name: str, faces: IntArray, lengths: FloatArray) -> None:
+        """Raise ValueError for lengths (k,) that would take minutes to trace, which another unit is the reason of."""
         F, l = self._surface.F, self._triangles[0]
         component = self._surface.components[F[:, 0]]
         mean = np.bincount(component, l.mean(axis=1)) / np.maximum(np.bincount(component), 1)
-        mean = mean[component[faces]]
-        edges = lengths / mean
+        edges = lengths / mean[component[faces]]
         if (edges > _MOST_EDGES).any():
             first = int(np.argmax(edges > _MOST_EDGES))
             raise ValueError(
@@ -210,7 +206,6 @@ class Tracer:
                 f"{edges[first]:.2g} mean edge lengths, and a line may have {_MOST_EDGES:.0e}: give it in the unit of "
                 "the mesh"
             )
-        return mean
 
     def starts(self, name: str, points: Sources, in_frame: bool = True) -> _Starts:
         """Starts of geodesics: vertices in the order given, or points in faces.
@@ -254,9 +249,9 @@ class Tracer:
             turn[at_vertex] = inside + np.choose(c, [np.zeros(len(c)), np.pi - angles[:, 1], angles[:, 0] - np.pi])
         return turn, size
 
-    def curve(self, start: _Starts, turn: FloatArray, length: FloatArray, mean_edge: FloatArray) -> SurfaceCurve:
+    def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:
         """Trace one geodesic."""
-        given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length, mean_edge)
+        given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
         ends = self._room(1)
         faces, points = kernel.trace(self._triangles, *given, *ends, True)
         if ends[2][0] < 0:

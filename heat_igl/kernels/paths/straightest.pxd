@@ -16,7 +16,7 @@ cdef class _Tracer:
     cdef double share, entry[3], leave[3], travelled
     cdef long long end_face
 
-    cdef int trace_one(self, long long face, const double* at, double turn, double length, double mean_edge) except -1 nogil
+    cdef int trace_one(self, long long face, const double* at, double turn, double length) except -1 nogil
     cdef bint start(self, long long f, double turn) noexcept nogil
     cdef bint leave_corner(self, long long corner, double turn) noexcept nogil
     cdef double find_exit(self) noexcept nogil

@@ -11,8 +11,9 @@ from cython.cimports.libc.math import M_PI, atan2, cos, fabs, hypot, sin
 _ON_RAY = cython.declare(cython.double, 1e-10)
 # Angles that differ by less are equal: those of the faces around a vertex are rounded, and the direction is.
 _LEAST_ANGLE = cython.declare(cython.double, 1e-10)
-# A geodesic across more faces for each mean edge of its length is lost among faces without area.
-_MOST_FACES = cython.declare(cython.int, 100000)
+# A geodesic that crosses so many faces in a row on less than this share of their sides is lost: they have no area.
+_MOST_IDLE = cython.declare(cython.int, 1000000)
+_IDLE = cython.declare(cython.double, 1e-6)
 
 
 @cython.final
@@ -26,7 +27,6 @@ class _Tracer:
         at: cython.pointer[cython.const[cython.double]],
         turn: cython.double,
         length: cython.double,
-        mean_edge: cython.double,
     ) -> cython.int:
         """One geodesic, to ``leave`` in ``end_face``; `travelled` is -1 if it is lost among faces without area.
 
@@ -34,17 +34,13 @@ class _Tracer:
         corner 1.
         """
         has_segments: cython.bint = False
-        n_faces: cython.longlong = 0
+        idle: cython.longlong = 0
         left: cython.double = length
         for c in range(3):
             self.entry[c] = self.leave[c] = at[c]
         self.end_face, self.travelled = face, 0.0
         goes_on: cython.bint = length > 0.0 and self.start(face, turn)
         while goes_on:
-            n_faces += 1
-            if n_faces * mean_edge > _MOST_FACES * (mean_edge + self.travelled):
-                self.travelled = -1.0
-                break
             f: cython.longlong = self.ray.h // 3
             self.exit = cross(cython.address(self.l[0, 0]), 2.0 * self.area[f], cython.address(self.ray))
             step: cython.double = self.find_exit()
@@ -58,6 +54,10 @@ class _Tracer:
                 left -= step
                 self.travelled = length - left
             self.end_face = f
+            idle = idle + 1 if step < _IDLE * max(self.l[f, 0], self.l[f, 1], self.l[f, 2]) else 0
+            if idle > _MOST_IDLE:
+                self.travelled = -1.0
+                break
             if step > 0.0 or ends:
                 self.store(f)
                 has_segments = True
@@ -124,7 +124,7 @@ class _Tracer:
         while turn > self.angle[f, k]:
             t = self.twin[3 * f + (k + 1) % 3]
             steps += 1
-            if t < 0 or steps > _MOST_FACES:
+            if t < 0 or steps > _MOST_IDLE:
                 if turn - self.angle[f, k] > _LEAST_ANGLE:
                     return False
                 turn = self.angle[f, k]
@@ -209,7 +209,6 @@ def trace(
     at: cython.double[:, ::1],
     turn: cython.double[::1],
     length: cython.double[::1],
-    mean_edge: cython.double[::1],
     end_face: cython.longlong[::1],
     end: cython.double[:, ::1],
     travelled: cython.double[::1],
@@ -218,7 +217,7 @@ def trace(
     """Trace k geodesics over triangles: fill their ends and the lengths travelled (k,), -1 for those that are lost.
 
     `triangles` are edge lengths (m, 3) > 0, areas (m,), angles (m, 3), twins (3 m,), and at each corner (m, 3) half the
-    sum of the angles around the vertex, negative on the boundary. `mean_edge` (k,) is the mean length of edges there.
+    sum of the angles around the vertex, negative on the boundary.
     Returns what they cross, geodesic after geodesic, if it `stores` that: faces (s,), and barycentric coordinates
     (s, 2, 3) of both ends of each segment.
     """
@@ -227,7 +226,7 @@ def trace(
     tracer.segments = SegmentList() if stores else None
     with cython.nogil:
         for i in range(face.shape[0]):
-            tracer.trace_one(face[i], cython.address(at[i, 0]), turn[i], length[i], mean_edge[i])
+            tracer.trace_one(face[i], cython.address(at[i, 0]), turn[i], length[i])
             end_face[i], travelled[i] = tracer.end_face, tracer.travelled
             for c in range(3):
                 end[i, c] = tracer.leave[c]
