@@ -1,7 +1,7 @@
 cdef extern from *:
     """
-    // Share of a facet by which the place moves in the last step of Newton's method; the error is of second order in it.
-    #define PLACED 1e-8
+    // Share of a facet by which the place moves in the last step of Newton's method, which leaves about its square.
+    #define PLACED 1e-4
     """
     double PLACED
 
@@ -48,7 +48,7 @@ cdef class Facet:
     cdef double H[3][3]
     # Vectors to the corners, and velocity at v and at the corners: the inverse root of the metric, and its mean.
     cdef double E[3][3]
-    cdef double W[4][6]
+    cdef const double* W[4]
     cdef double s[4]
     # The length of the gradient of the mean velocity, in the metric of the centre.
     cdef double growth

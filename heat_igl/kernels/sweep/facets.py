@@ -199,8 +199,9 @@ class Facet:
             at += self.g[i] * x[i]
         if best + low - at >= limit:
             return INFINITY
+        is_last: cython.bint = False
         for _step in range(MOST_STEPS):
-            if best == INFINITY:
+            if best == INFINITY or is_last:
                 return best
             self.curve()
             db: cython.double = 0.0
@@ -210,9 +211,8 @@ class Facet:
                 db = _on_interval(self.g[1] - self.g[0], bend, -x[1], x[0])
             else:
                 db, de = self.on_triangle(x)
-            if fabs(db) + fabs(de) <= PLACED:
-                break
-            for _half in range(MOST_HALVINGS):
+            is_last = fabs(db) + fabs(de) <= PLACED
+            for _half in range(1 if is_last else MOST_HALVINGS):
                 y[0], y[1], y[2] = max(x[0] - db - de, 0.0), max(x[1] + db, 0.0), max(x[2] + de, 0.0)
                 value: cython.double = self.value(y)
                 if value < best:

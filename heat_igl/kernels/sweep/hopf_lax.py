@@ -404,7 +404,7 @@ class HopfLax(Facet):
                         most = max(most, fabs(by))
                     for c in range(size):
                         u = self.corners[s, c]
-                        if u == v or not most > self.pending[u]:
+                        if u == v or not most > settled or not most > self.pending[u]:
                             continue
                         # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
                         if (
@@ -536,10 +536,9 @@ class HopfLax(Facet):
                     m[3 * i + j] = m[3 * j + i] = 0.5 * between
             return
         self.growth = self.growths[s]
-        for i in range(self.p + 1):
-            at: cython.int = c if i == 0 else self.side[i - 1]
-            for k in range(6):
-                self.W[i][k] = self.velocity[s, at, k]
+        for i in range(4):  # the fourth of a triangle has the share 0
+            at: cython.int = c if i == 0 or i > self.p else self.side[i - 1]
+            self.W[i] = cython.address(self.velocity[s, at, 0])
             self.s[i] = mean_velocity(self.W[i])
         for i in range(self.p):
             for k in range(3):
