@@ -20,7 +20,7 @@ from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray
 
 # Simplices of which it is asked how far the metric turns.
-_SAMPLE = 1000
+_SAMPLE = 250
 _ROUNDING = 1e-12
 # Determinants of singular tensors over their squared traces are rounding.
 _FLAT = 1e-15
@@ -65,13 +65,13 @@ class HopfLaxEngine(SimplexEngine):
         other, corner = np.divmod(self._incident[self._first[corners[chosen]]].ravel(), size)
         first, two = simplices.metric(one, 0), simplices.metric(other, corner)
         if size == 3:
-            x = plane_axes(Mesh(place, corners))
-            normal = np.cross(x[:, 0], x[:, 1])
-            w, cosine = np.cross(normal[one], normal[other]), (normal[one] * normal[other]).sum(axis=1)
+            x, y = (plane_axes(Mesh(place, corners[k])) for k in (one, other))
+            normals = [np.cross(axes[:, 0], axes[:, 1]) for axes in (x, y)]
+            w, cosine = np.cross(*normals), (normals[0] * normals[1]).sum(axis=1)
             # Rodrigues' formula for the rotation that takes one normal to the other.
-            once = np.cross(w[:, None], x[one])
-            turned = x[one] + once + np.cross(w[:, None], once) / np.maximum(1 + cosine, _ROUNDING)[:, None, None]
-            first, two = (axes @ g @ np.swapaxes(axes, 1, 2) for axes, g in ((x[one], first), (turned, two)))
+            once = np.cross(w[:, None], x)
+            turned = x + once + np.cross(w[:, None], once) / np.maximum(1 + cosine, _ROUNDING)[:, None, None]
+            first, two = (axes @ g @ np.swapaxes(axes, 1, 2) for axes, g in ((x, first), (turned, two)))
             # Triangles without area know no metric in their plane.
             flat = ~np.all(
                 [np.linalg.det(g) > _FLAT * np.trace(g, axis1=1, axis2=2) ** 2 for g in (first, two)], axis=0
