@@ -66,8 +66,8 @@ class HopfLaxEngine(SimplexEngine):
         first, two = simplices.metric(one, 0), simplices.metric(other, corner)
         if size == 3:
             x, y = (plane_axes(Mesh(place, corners[k])) for k in (one, other))
-            normals = [np.cross(axes[:, 0], axes[:, 1]) for axes in (x, y)]
-            w, cosine = np.cross(*normals), (normals[0] * normals[1]).sum(axis=1)
+            here, there = (np.cross(axes[:, 0], axes[:, 1]) for axes in (x, y))
+            w, cosine = np.cross(here, there), (here * there).sum(axis=1)
             # Rodrigues' formula for the rotation that takes one normal to the other.
             once = np.cross(w[:, None], x)
             turned = x + once + np.cross(w[:, None], once) / np.maximum(1 + cosine, _ROUNDING)[:, None, None]
