@@ -17,16 +17,14 @@ walls: bodies cut out of even or random tetrahedra, against the same solver on t
 than 3000 vertices: "finer" is an upper bound. Edges around which paths bend; the mean of |d - finer| / finer, the
 largest differences, and how much the worst is below the straight line; milliseconds for a query, and those of heat.
 layers and faces: Delaunay triangles of random points, rotated, against shortest ways through ``--border`` points on
-each edge of a border, or on all edges; mean and largest error, also of the reference with half as many points, and of
-fim-python with a metric per face, if it is installed.
+each edge of a border, or on all; mean and largest error, also with half as many points, and per face of fim-python.
 grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels as rows, at their centres, from one of
 them, beside scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and
 largest error in percent, and seconds of one query with its preparation.
 smooth: a twisted cylinder and discs, and a cube with a speed that grows linearly, with tensors per simplex and at the
-vertices; the same of fim-python, if it is installed, which takes those per simplex.
+vertices, times over those of fim-python, which takes those per simplex; "turning" is what `MOST_TURNING` is asked of.
 choice: what `hopf_lax_is_nearer` compares, and mean errors in closed form or against triangles cut into 4 or 16.
-polygons: the mean error of heat on triangles of the polygons, and on those around virtual vertices, each from exact
-distance on the same surface. docs/metrics_theory.md has the tables.
+polygons: mean errors of heat on triangles of the polygons and around virtual vertices, from exact distance there.
 """
 
 from __future__ import annotations
@@ -36,10 +34,10 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 from itertools import pairwise, product
 from typing import Any
 
-import igl
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -68,17 +66,13 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.closed_forms import around_the_edge, by_fermat, straight
 from heat_igl.validation.zoo import carved, compact, tetrahedra
 
-from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds
+from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds, subdivided
 
 Random = np.random.Generator
 Cut = Callable[[FloatArray], BoolArray]
 Samples = Iterator[tuple[str, FloatArray]]
-METHODS = {
-    "default": ours(),
-    "heat": ours("heat", magnitude="unit"),
-    "sweep": ours("sweep"),
-    "windows": ours("windows"),
-}
+METHODS = {"default": ours(), "heat": ours("heat", magnitude="unit")} | {m: ours(m) for m in ("sweep", "windows")}
+HAS_FIM = find_spec("fimpy") is not None
 Field = tuple[str, Mesh, Callable[[FloatArray], FloatArray], int, FloatArray]
 # Cells across layers, and across a mesh with a metric per face.
 ACROSS, FINE = 30, 18
@@ -427,7 +421,8 @@ def on_faces(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
             g, source = make(mesh), int(rng.integers(mesh.n_vertices))
             half, whole = (through_edges(mesh, source, g, n) for n in (options.edge // 2, options.edge))
             yield "default", off(mesh, source, g, whole, rng.uniform(0, np.pi))
-            yield "fim", fim_off(mesh, source, g, whole)
+            g_3 = np.pad(g, ((0, 0), (0, 1), (0, 1))) + np.diag([0, 0, 1])
+            yield "fim", np.abs(excess(by_fim(mesh, g_3, source), whole)) if HAS_FIM else np.array([np.nan])
             yield "half", np.abs(excess(half, whole))
 
     for name, make in cases.items():
@@ -544,12 +539,11 @@ def cylinder(rings: int, rng: Random) -> Mesh:
 
 def smooth(rows: int, rng: Random) -> Iterator[Field]:
     """Names, meshes, metrics (k, 3, 3) at places (k, 3), a source, and exact distances."""
-    for k in (2.0, 4.0):
-        for rings in (rows // 12, rows // 6, rows // 4):
-            mesh = cylinder(rings, rng)
-            source = int(np.linalg.norm(mesh.V - [0.4, 0.3, 0.5], axis=1).argmin())
-            name = f"twisted, 1 : {((k + np.hypot(k, 2)) / 2) ** 2:.2g}"
-            yield name, mesh, lambda x, k=k: twisted_body(x, k)[1], source, straight(twisted_body(mesh.V, k)[0], source)
+    for k, rings in product((2.0, 4.0), (rows // 12, rows // 6, rows // 4)):
+        mesh = cylinder(rings, rng)
+        source = int(np.linalg.norm(mesh.V - [0.4, 0.3, 0.5], axis=1).argmin())
+        name = f"twisted, 1 : {((k + np.hypot(k, 2)) / 2) ** 2:.2g}"
+        yield name, mesh, lambda x, k=k: twisted_body(x, k)[1], source, straight(twisted_body(mesh.V, k)[0], source)
     for k, (where, place) in product((3.0, 5.0), (("the centre", 0.0), ("beside", 0.4))):
         for rings in (rows // 6, rows // 3, 2 * rows // 3, 4 * rows // 3):
             mesh = shapes.disk(rings)
@@ -572,27 +566,19 @@ def by_fim(mesh: Mesh, g: FloatArray, source: int) -> FloatArray:
     return np.asarray(solver.comp_fim(np.array([source]), np.zeros(1)))
 
 
-def fim_off(mesh: Mesh, source: int, g: FloatArray, truth: FloatArray) -> FloatArray:
-    """Errors of fim-python in the plane, in percent; nan if it is not installed."""
-    try:
-        found = by_fim(mesh, np.pad(g, ((0, 0), (0, 1), (0, 1))) + np.diag([0, 0, 1]), source)
-    except ImportError:
-        return np.array([np.nan])
-    return np.abs(excess(found, truth))
-
-
 def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     default = lambda mesh, g, source: GeodesicSolver(metric_operators(mesh, g)).distance(source)  # noqa: E731
     for name, mesh, metric, source, exact in smooth(options.rows, rng):
         centres = metric(mesh.V[mesh.F].mean(axis=1))
-        row: Row = {"body": name, "n": mesh.n_vertices, "m": mesh.n_faces}
+        turning = HopfLaxEngine(MetricSimplices.in_metric(mesh, centres, 0.0)).turning
+        row: Row = {"body": name, "n": mesh.n_vertices, "m": mesh.n_faces, "turning": turning}
         for method, query, g in (
             ("fim", by_fim, centres),
             ("face", default, centres),
             ("vertex", default, metric(mesh.V)),
         ):
             row[method] = timed(exact, query, mesh, g, source)
-        yield row
+        yield row | {m: row[m] | {"s": row[m]["s"] / row["fim"]["s"]} for m in ("fim", "face", "vertex")}
 
 
 def choices(options: argparse.Namespace, rng: Random) -> Iterator[Field]:
@@ -613,7 +599,7 @@ def choices(options: argparse.Namespace, rng: Random) -> Iterator[Field]:
     surfaces = {"square": plane(24, rng), "sphere": shapes.icosphere(4), "torus": shapes.torus(24, 60, 0.4)}
     for (name, mesh), c in product((surfaces | named(options.meshes)).items(), (0.01, 0.1, 0.5)):
         mesh = Mesh(mesh.V / np.ptp(mesh.V, axis=0).max(), mesh.F)
-        finer = Mesh(*igl.upsample(mesh.V, mesh.F, 1 if len(mesh.F) > MANY else 2))
+        finer = subdivided(mesh if len(mesh.F) > MANY else subdivided(mesh))
         metric = isotropic(lambda x, c=c: 1 + c * np.sin(9 * x[:, 0] + 2) * np.cos(8 * x[:, 1]))
         exact = GeodesicSolver(metric_operators(finer, metric(finer.V))).distance(7)[: mesh.n_vertices]
         yield f"{name}, speeds in waves, 1 : {(1 + c) / (1 - c):.3g}", mesh, metric, 7, exact
@@ -700,9 +686,9 @@ def mean_and_largest(**heads: str) -> dict[str, str]:
     return {f"{head}, %": f"{{{key}[0]:.2g}} and {{{key}[1]:.2g}}" for key, head in heads.items()}
 
 
-def errors_and_seconds(**heads: str) -> dict[str, str]:
+def errors_and(unit: str, **heads: str) -> dict[str, str]:
     return {
-        f"{head}, % and s": f"{{{key}[mean]:.2g}} and {{{key}[largest]:.2g}}, {{{key}[s]:.2g}}"
+        f"{head}, % and {unit}": f"{{{key}[mean]:.2g}} and {{{key}[largest]:.2g}}, {{{key}[s]:.2g}}"
         for key, head in heads.items()
     }
 
@@ -727,10 +713,11 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
     "faces": (on_faces, {"metric per face": "{case}"} | mean_and_largest(
         default="default", fim="fim-python", **HALF
     )),
-    "grids": (on_grids, {"grid": "{grid}"} | errors_and_seconds(default="default", fmm="scikit-fmm", konal="pykonal")),
-    "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}"} | errors_and_seconds(
-        fim="fim-python", face="per simplex", vertex="at the vertices"
-    )),
+    "grids": (on_grids, {"grid": "{grid}"} | errors_and("s", default="default", fmm="scikit-fmm", konal="pykonal")),
+    "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}", "turning": "{turning:.2g}",
+        "fim-python, %": "{fim[mean]:.2g} and {fim[largest]:.2g}",
+        **errors_and("time", face="per simplex", vertex="at the vertices"),
+    }),
     "choice": (on_choice, {
         "metric": "{field}", "vertices": "{n}", "variation": "{variation:.2g}", "curvature": "{curvature:.2g}",
         "windows, %": "{windows:.2g}", "Hopf-Lax, %": "{hopf:.2g}", "chosen": "{chosen}",
