@@ -40,6 +40,8 @@ _DIFFERENT_AT_WORST = 0.125
 # random members of the kinds of the zoo, six answers each in eight orders, answers wrong by more than 5 % came after
 # three near ones never, after two in 6 of 100 000, and after one in 40.
 _ENOUGH, _NEAR_IN_MEAN, _NEAR_AT_WORST = 3, 0.02, 0.06
+# Distances are kept from so many vertices: three on each of three components.
+_MOST_KNOWN = 9
 # A comparison of vertices with known distances alone says nothing of others.
 _ROUNDING = 1e-9
 _BY_SWEEP = Plan("sweep", None, "heat is compared with a sweep")
@@ -162,7 +164,8 @@ class Comparisons:
     """Compares answers with those of an engine that shares nothing with heat, where heat may be wrong.
 
     These are the first three answers from every kind of sources in each component. If all are near, later ones are
-    trusted; if one is not, each later one is compared. The domain has triangles, or simplices.
+    trusted; if one is not, each later one is compared. So is one from a vertex that gives other distances of vertices
+    that were compared than these gave of it. The domain has triangles, or simplices.
     """
 
     def __init__(self, domain: Operators) -> None:
@@ -170,6 +173,8 @@ class Comparisons:
         # By kind and component: how many answers were near; -1 after one that was not.
         self._near: dict[Kind, IntArray] = {}
         self._engine: Engine | None = None
+        # Vertices that gave near answers, and the distances (n,) from them by the other engine.
+        self._known: list[tuple[int, FloatArray]] = []
         #: Of all comparisons, the one that is farthest off on average; None before the first.
         self.worst: Comparison | None = None
 
@@ -182,7 +187,9 @@ class Comparisons:
             return None  # the other engine's triangles are those of the fans
         near = self._near.setdefault(_kind(sources), np.zeros(self._domain.n_components, np.int64))
         components = self._components(sources)
-        if not is_doubtful and near[components].min() >= _ENOUGH:
+        is_vertex = len(sources.vertices) == 1 and sources.on_vertices_alone and sources.vertex_offset[0] == 0
+        is_trusted = not is_doubtful and near[components].min() >= _ENOUGH
+        if is_trusted and not (is_vertex and self._is_asymmetric(distance, int(sources.vertices[0]))):
             return None
         engine = self._engine or self._made()
         other = engine.distance(sources)[: len(distance)]
@@ -192,9 +199,16 @@ class Comparisons:
             near[components] = -1
         elif found.largest > _ROUNDING:
             near[components] += near[components] >= 0
+            if is_vertex and len(self._known) < _MOST_KNOWN:
+                self._known.append((int(sources.vertices[0]), other))
         # Tables that no later answer needs are not kept.
         self._engine = engine if (near < _ENOUGH).any() else None
         return found
+
+    def _is_asymmetric(self, distance: FloatArray, vertex: int) -> bool:
+        """Whether distances (n,) from a vertex differ in the median from those known in the other direction."""
+        off = sorted(abs(distance[v] / other[vertex] - 1) for v, other in self._known if 0 < other[vertex] < np.inf)
+        return len(off) > 0 and bool(off[len(off) // 2] > _DIFFERENT)
 
     def _made(self) -> Engine:
         domain, surface = self._domain, self._domain.surface
