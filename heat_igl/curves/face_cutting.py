@@ -1,9 +1,9 @@
 """One triangle cut along straight segments, in integers, so that no rounding decides which segments cross.
 
-A point is a triple of integers, its barycentric coordinates times any positive number. The sign of the determinant of
-three points is the orientation of their triangle, and the line through two points is their cross product: nothing is
-divided. The triangulation starts with the triangle and takes in one point after another; segments are enforced by flips
-(Sloan 1993), and further flips make the other edges Delaunay. Only these look at lengths.
+A point is a triple of integers: its barycentric coordinates times a positive number. The sign of the determinant of
+three points is the orientation of their triangle, and the cross product of two points is the line through them, so that
+no division is needed. Points are inserted into the triangle one by one, segments are enforced by flips of edges (Sloan
+1993), and further flips make the other edges Delaunay. Only these last flips compare lengths.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def cut_triangle(
 ) -> tuple[list[Point], list[tuple[int, int, int]], list[list[int]]]:
     """Triangulate a triangle, its corners at (3, 2) in the plane, with points in it and segments between pairs of them.
 
-    The corners come first in `points`, which are distinct. Segments may cross, overlap and run along sides. Returns the
-    points with the crossings, the triangles, oriented like the corners, and the points along each segment.
+    The `points` are distinct, and the corners come first. Segments may cross, overlap and run along sides. Returns the
+    points and the crossings, the triangles, oriented as the corners are, and the points on each segment in order.
     """
     points = [_reduced(point) for point in points]
     number = {point: i for i, point in enumerate(points)}
@@ -60,7 +60,7 @@ def _side(line: Point, p: Point) -> int:
 
 
 def _reduced(p: Point) -> Point:
-    """The triple of the same point with no common divisor, not negative."""
+    """The same point as a triple that is not negative and has no common divisor."""
     divisor = gcd(*p)
     if sum(p) < 0:
         divisor = -divisor
@@ -98,7 +98,7 @@ def _along(points: list[Point], a: int, b: int) -> list[int]:
 
 
 class _Triangulation:
-    """Triangles, as the third point of each directed edge on its left."""
+    """Triangles, stored as the third point of the triangle on the left of each directed edge."""
 
     def __init__(self, points: list[Point]) -> None:
         self._points = points
@@ -110,7 +110,7 @@ class _Triangulation:
         return sorted((a, b, c) for (a, b), c in self._apex.items() if a < b and a < c)
 
     def insert(self, i: int) -> None:
-        """Split the triangle that holds point i, or the two at the edge that holds it."""
+        """Split the triangle that contains point i, or the two triangles at the edge that contains it."""
         for a, b, c in self.triangles():
             edges = ((a, b), (b, c), (c, a))
             sides = [self._left(*edge, i) for edge in edges]
@@ -131,7 +131,7 @@ class _Triangulation:
             return
 
     def enforce(self, a: int, b: int) -> None:
-        """Flip edges until one joins a and b; no point lies between them."""
+        """Flip edges until one of them joins a and b, between which no point lies."""
         if (a, b) in self._apex or (b, a) in self._apex:
             return
         crossed = deque(self._crossed(a, b))
@@ -146,7 +146,7 @@ class _Triangulation:
     def make_delaunay(self, fixed: set[tuple[int, int]], corners: FloatArray) -> None:
         """Flip edges that are not `fixed` while the two angles opposite them sum to more than pi.
 
-        Thin triangles along straight rows of points go; the flips end since each raises the smallest angles.
+        This removes thin triangles along collinear points. It ends, as every flip increases the smallest angles.
         """
         weights = np.array([[weight / sum(point) for weight in point] for point in self._points])
         at = (weights @ corners @ [1, 1j]).tolist()

@@ -229,37 +229,19 @@ class ExactSurface:
         directed: bool = False,
         threads: int = 1,
     ) -> ExactSolution:
-        """Distances from vertices, points and curves.
+        """Distances from vertices, points and curves, exact on the polyhedral surface to rounding.
 
-        Parameters
-        ----------
-        sources : SourceSet
-            What distance starts from, with points in the faces that the triangulation was made from. Segments need a
-            triangulation that was not flipped. Labels are not read.
-        cutoff : float
-            What is farther is ``inf``, and the search ends there.
-        targets : SurfacePoints, optional
-            t points in the faces that the triangulation was made from, whose distance is asked for.
-        goals : (g,) int64, optional
-            If given, the search ends once the distances of these vertices and of the targets are known; those of other
-            vertices may then be too large or ``inf``.
-        directed : bool
-            Whether it is asked for how paths to the vertices leave, see `Origin`, on faces that are oriented alike.
-        threads : int
-            With more than one, two threads share the search for distances of all vertices, on large surfaces. The
-            distances are the same; of paths that are equally long, another may be found.
+        Points of the sources, and the t `targets` whose distance is asked for, lie in the faces that the triangulation
+        was made from; segments need a triangulation that was not flipped. Labels are not read. What is farther than the
+        `cutoff` is ``inf``, and the search ends there. It also ends once the distances of the vertices `goals` (g,), if
+        given, and of the targets are known; those of other vertices may then be too large or ``inf``. If it is
+        `directed`, it is asked for how paths to the vertices leave, see `Origin`, on faces that are oriented alike.
 
-        Returns
-        -------
-        ExactSolution
-            Distances are exact on the polyhedral surface, to rounding.
+        With more than one of the `threads`, two share the search for distances of all vertices, on large surfaces. The
+        distances are the same; of paths that are equally long, another may be found.
 
-        Raises
-        ------
-        MemoryError
-            If the windows do not fit into memory.
-        ValueError
-            If there are segments or points, and the surface does not know the faces that they refer to.
+        A MemoryError if the windows do not fit into memory, and a ValueError if there are segments or points, and the
+        surface does not know the faces that they refer to.
         """
         done = search(
             self.tables,
