@@ -228,26 +228,14 @@ def corner(sides: IntArray, turn: int | IntArray) -> IntArray:
 
 
 def with_gaps_filled(P: FloatArray, F: IntArray, reach: FloatArray) -> tuple[IntArray, BoolArray]:
-    """The triangles F (m, 3) int32, and others between fans of a point and in the loops of outer edges.
+    """The triangles F (m, 3) int32 on points P (n, 3), and others between fans of a point and in loops of outer edges.
+
+    Triangles are a surface, oriented alike if it has two sides; `reach` (n,) is that of `Neighbourhoods`. Also returns
+    the points (n,) on outer edges of the given triangles.
 
     Two parts of a surface that meet in one vertex alone are connected for distance, but not for vectors, which need a
     tangent plane along the way. Loops of outer edges go from fan to fan there, to the nearest end of another one. Where
     no triangle fits between two fans, the largest stays, unless parts or points would be cut off.
-
-    Parameters
-    ----------
-    P : (n, 3) float64
-        The points.
-    F : (m, 3) int32
-        Triangles that are a surface, oriented alike if it has two sides.
-    reach : (n,) float64
-        See `Neighbourhoods`.
-
-    Returns
-    -------
-    F : (k, 3) int32
-    is_gap : (n,) bool
-        The points on outer edges of the given triangles.
     """
     n = len(P)
     vertex, twin, *_ = glue(F.astype(np.int64), np.zeros((n, 3)), 1.0)
