@@ -404,6 +404,10 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: GeodesicSolver(SPHERE, method="sweep").distance_vjp(0), "derivatives are those of paths"),
     (lambda _: GeodesicSolver(CLOUD).distance_vjp(0), "derivatives need a surface of triangles"),
     # Fibres and sheets.
+    (lambda _: heat_igl.fibre_metric([[1, 0, 0], [0, 0, 0]], 1, 2), r"directions\[1\] = \[0.0, 0.0, 0.0\] is no dir"),
+    (lambda _: heat_igl.fibre_metric([1, 0, 0], 1, 2), r"directions must have shape \(k, 3\)"),
+    (lambda _: heat_igl.fibre_metric(X, 0, 2), r"along\[0\] = 0.0 must be positive and finite"),
+    (lambda _: heat_igl.metric_operators(LINE, np.tile(np.eye(3), (len(LINE.F), 1, 1))), r"F\[0\] .* has no area"),
     (lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=X[:, ::-1]), "sheets and normal go together"),
     (
         lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=2 * X, normal=1),
