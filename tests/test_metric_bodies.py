@@ -208,6 +208,18 @@ def test_vertices_do_not_lower_each_other_for_ever(seed):
     assert 0.8 < np.median(solver(mesh, g).distance(0)[1:] / finer[1:]) < 1.4
 
 
+@pytest.mark.filterwarnings("ignore:the metric turns farther")
+def test_places_without_a_newton_step_are_inexact():
+    """Tensors 1:30 turned at random: the matrix of a Newton step was singular, which numpy's error said."""
+    rng = np.random.default_rng(12)
+    P = rng.random((60, 3))
+    T = Delaunay(P).simplices
+    turned = np.linalg.qr(rng.standard_normal((len(T), 3, 3)))[0]
+    phi, pull_back = solver(Mesh(P, T), turned @ np.diag([1.0, 1, 900]) @ np.swapaxes(turned, 1, 2)).distance_vjp(1)
+    assert len(pull_back.inexact) > 0
+    assert np.isfinite(pull_back.by_metric(np.where(np.isfinite(phi), 1.0, 0.0))).all()
+
+
 def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
     """Neither speeds that jump do, nor fibres that a finer mesh resolves."""
     mesh, _, g = twisted_disk(24, 6.0)
@@ -398,6 +410,6 @@ def test_heat_says_that_it_is_wrong_where_the_speed_varies_much(mesh, ratio):
     with pytest.warns(AccuracyWarning, match="heat is off by"):
         found = heat.distance(source)
     truth = GeodesicSolver(domain).distance(source)
-    off = np.abs(found - truth)[truth > 0] / truth[truth > 0]
-    assert heat.diagnostics.compared.mean == pytest.approx(off.mean(), rel=0.01)
-    assert off.mean() > 0.05
+    off = np.abs(found - truth).sum() / truth.sum()
+    assert heat.diagnostics.compared.mean == pytest.approx(off, rel=0.01)
+    assert off > 0.05

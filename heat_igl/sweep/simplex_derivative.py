@@ -88,12 +88,12 @@ class _FacetUpdate:
             # The shares sum to 1.
             M[:, p, :p] = M[:, :p, p] = 1
             M[:, :p] = np.where(stays[:, :, None], np.eye(p, p + 1), M[:, :p])
-            self.moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -np.linalg.inv(M)[:, :p, :p])
+            self.moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -_inverse(M)[:, :p, :p])
             step = np.einsum("kij,kj->ki", self.moves, self._gradient(at, self.share))
             # Not beyond an edge of the facet.
             room = np.min(np.where(step < 0, -self.share / np.minimum(step, -1e-300), 1.0), axis=1)
             self.share += np.where(np.isfinite(step), np.minimum(room, 1.0)[:, None] * step, 0.0)
-            if np.nanmax(np.abs(step)) < _SETTLED:
+            if not (np.abs(step) >= _SETTLED).any():
                 break
 
     def values(self, at: _Inputs) -> AnyArray:
@@ -104,7 +104,7 @@ class _FacetUpdate:
             share = share + 1j * np.einsum("kij,kj->ki", self.moves, change)
         T, length, _, lean = self._value(at, share)
         e = at.X[:, 1:] - at.X[:, :1]
-        slope = np.einsum("kpx,kpq,kq->kx", e, np.linalg.inv(e @ np.swapaxes(e, 1, 2)), lean)
+        slope = np.einsum("kpx,kpq,kq->kx", e, _inverse(e @ np.swapaxes(e, 1, 2)), lean)
         return np.concatenate([(at.start + T + length)[:, None], slope], axis=1)
 
     def _gradient(self, at: _Inputs, x: AnyArray) -> AnyArray:
@@ -131,13 +131,13 @@ class _FacetUpdate:
         W, e = self._velocity(at, e)
         mean = np.trace(W, axis1=2, axis2=3) / e.shape[2]
         one, two = mean[:, 0], (x * mean[:, 1:]).sum(axis=1)
-        middle = np.linalg.inv((W[:, 0] + np.einsum("kj,kjab->kab", x, W[:, 1:])) / 2)
+        middle = _inverse((W[:, 0] + np.einsum("kj,kjab->kab", x, W[:, 1:])) / 2)
         w = np.einsum("kab,kjb,kj->ka", middle, e, x)
         near = np.sqrt((w**2).sum(axis=1))
         u = np.einsum("kab,kb->ka", middle, w) / near[:, None]
         # The gradient of the mean velocity, in the metric of the centre.
         centre = W.mean(axis=1)
-        steep = np.einsum("kab,kbc,kc->ka", centre, np.linalg.inv(e), mean[:, 1:] - mean[:, :1])
+        steep = np.einsum("kab,kbc,kc->ka", centre, _inverse(e), mean[:, 1:] - mean[:, :1])
         root, growth = np.sqrt(one * two), np.sqrt((steep**2).sum(axis=1)) / mean.mean(axis=1)
         even = near * (one + two) / (2 * root)
         half = growth * even / 2
@@ -171,7 +171,7 @@ class _FacetUpdate:
         k, p = D.shape
         metric = product if product.shape[1] == 1 else product[:, 1:]
         w = np.einsum("kix,kjx->kij", at.slope, e)
-        square = np.einsum("kij,kijl,kil->ki", w, np.linalg.inv(np.broadcast_to(metric, (k, p, p, p))), w)
+        square = np.einsum("kij,kijl,kil->ki", w, _inverse(np.broadcast_to(metric, (k, p, p, p))), w)
         is_known = self._is_sloped & (np.real(square) > 0)
         trust = _larger(1 - np.log(np.where(is_known, square, 1.0)) ** 2, 0.0) * is_known
         result = np.zeros((k, p, p), D.dtype if np.iscomplexobj(D) else np.result_type(D, w, product))
@@ -235,6 +235,12 @@ def _larger(x: AnyArray, y: Any) -> AnyArray:
 
 def _smaller(x: AnyArray, y: AnyArray) -> AnyArray:
     return -_larger(-x, -y)
+
+
+def _inverse(A: AnyArray) -> AnyArray:
+    """The inverses of matrices (..., n, n); NaN where one is singular, as at places that no Newton step leads from."""
+    is_regular = (np.abs(np.linalg.slogdet(A)[0]) > 0)[..., None, None]
+    return np.where(is_regular, np.linalg.inv(np.where(is_regular, A, np.eye(A.shape[-1]))), np.nan)
 
 
 class SimplexDerivative(ABC):
@@ -451,7 +457,8 @@ class FixedPointDerivative(SimplexDerivative):
         for entry in np.ndindex(given.shape[1:]):
             moved = given.astype(complex)
             moved[(slice(None), *entry)] += 1j * _STEP
-            by = np.imag(self._update.values(self._at._replace(**{name: moved}))) / _STEP
+            with np.errstate(invalid="ignore", divide="ignore"):
+                by = np.imag(self._update.values(self._at._replace(**{name: moved}))) / _STEP
             yield entry, np.where(self._is_known[:, None], by, 0.0)
 
     def _factored(self) -> Any:
