@@ -362,6 +362,15 @@ def test_heat_says_when_it_is_wrong(kind):
         assert solver.diagnostics.compared.mean == pytest.approx(off, abs=0.015)
 
 
+def test_vertices_beside_the_source_do_not_count_more_than_others():
+    mesh = shapes.icosphere(2)
+    (a, b, c), new = mesh.F[0], mesh.n_vertices
+    beside = mesh.V[a] + 1e-12 * (mesh.V[b] + mesh.V[c] - 2 * mesh.V[a])
+    solver = HeatMethodSolver(Mesh([*mesh.V, beside], [*mesh.F[1:], (a, b, new), (b, c, new), (c, a, new)]))
+    solver.distance(a)
+    assert 0.001 < solver.diagnostics.compared.mean < 0.035
+
+
 @pytest.fixture
 def counted(monkeypatch):
     """The vertices whose answers were compared."""

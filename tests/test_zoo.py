@@ -125,9 +125,8 @@ def test_a_wrong_answer_is_raised_to_straight_lines_or_warns():
     with pytest.warns(AccuracyWarning, match=r"off by \d+\.\d % on average") as caught:
         unchecked = HeatMethodSolver(solver.operators).solve(210)
     told = float(re.search(r"off by (\S+) %", str(caught[0].message))[1]) / 100
-    assert told == pytest.approx(mean_error(unchecked.distance, lines), rel=0.1)
+    assert told == pytest.approx(np.abs(unchecked.distance - lines).mean() / lines.mean(), rel=0.1)
     assert np.isnan(unchecked.diagnostics.check.shortfall)
-    assert np.mean(unchecked.distance < 0.9 * lines) > 0.2
 
 
 def test_a_good_answer_is_left_alone():

@@ -56,7 +56,7 @@ class Comparison(NamedTuple):
     Attributes
     ----------
     mean : float
-        Mean over the vertices of ``|distance - other| / other``.
+        Mean of ``|distance - other|`` over the vertices, as a share of the mean distance.
     largest : float
         Largest ``|distance - other|``, as a share of the largest distance.
     vertex : int
@@ -76,7 +76,7 @@ class Comparison(NamedTuple):
         length = other[reached] - start
         off = np.abs(distance[reached] - other[reached])
         worst = int(np.argmax(off))
-        return cls(float(np.mean(off / length)), float(off[worst] / length.max()), int(reached[worst]))
+        return cls(float(off.mean() / length.mean()), float(off[worst] / length.max()), int(reached[worst]))
 
     @property
     def is_near(self) -> bool:
