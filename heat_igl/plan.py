@@ -152,9 +152,6 @@ def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:
     return plan if reason is None else replace(plan, engine="windows", tolerance=0.0, reason=reason)
 
 
-# With more radians of curvature at a vertex in the mean, log maps for means of points are those of exact paths, not of
-# straightened ones: locally shortest paths often pass a hill on the longer side.
-ROUGH_FOR_MEANS = 0.1
 # With more of the faces within a cutoff, leaving out the others saves nothing.
 MOST_WITHIN_REACH = 0.5
 

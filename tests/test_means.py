@@ -16,6 +16,7 @@ from heat_igl import (
     voronoi_cells,
 )
 from heat_igl.curves import geodesic_bezier
+from heat_igl.validation.zoo import FAMILIES
 
 CELLS = 12
 
@@ -32,8 +33,7 @@ def torus_coordinates(mesh: Mesh, points: SurfacePoints) -> np.ndarray:
 
 def sphere_mean(P: np.ndarray, weights: np.ndarray, p: float) -> np.ndarray:
     """The mean on the unit sphere, by the Karcher iteration with the log map of the sphere."""
-    z = weights @ P
-    z /= np.linalg.norm(z)
+    z = weights @ P / np.linalg.norm(weights @ P)
     for _ in range(2000):
         angle = np.arccos(np.clip(P @ z, -1, 1))
         log = (P - np.cos(angle)[:, None] * z) * (angle / np.sin(angle))[:, None]
@@ -83,14 +83,17 @@ def test_means_on_spheres_approach_those_of_the_sphere(p):
     assert errors[1] < errors[0] / 3
 
 
-def test_means_of_two_points_on_rough_ground_are_in_the_middle():
-    flat = shapes.grid(14)
-    for seed in (0, 33):
-        rng = np.random.default_rng(seed)
-        mesh = Mesh(flat.V + 0.3 * flat.edge_lengths.mean() * rng.standard_normal(flat.V.shape), flat.F)
-        ends = rng.choice(mesh.n_vertices, 2, replace=False)
-        halves = geodesic_distance(mesh, karcher_mean(mesh, ends), method="exact")[ends]
-        np.testing.assert_allclose(halves, pair_distances(mesh, [ends])[0] / 2, rtol=1e-5)
+@pytest.mark.parametrize(
+    ("kind", "seed", "ends"), [("tube of few sides", 700335, [33, 471]), ("helix", 700417, [0, 99])]
+)
+def test_means_divide_a_shortest_path_and_are_no_worse_than_a_vertex(kind, seed, ends):
+    mesh = FAMILIES[kind](seed)
+    parts = geodesic_distance(mesh, karcher_mean(mesh, ends, [1, 9], p=3), method="exact")[ends]
+    np.testing.assert_allclose(parts, pair_distances(mesh, [ends]) * np.array([0.75, 0.25]), rtol=1e-9)
+    points = [*ends, *np.random.default_rng(3).choice(mesh.n_vertices, 3)]
+    rows = np.stack([geodesic_distance(mesh, int(v), method="exact") for v in points])
+    found = geodesic_distance(mesh, karcher_mean(mesh, points), method="exact")[points]
+    assert (found**2).sum() <= (1 + 1e-9) * (rows**2).sum(axis=0).min()
 
 
 def test_single_points_are_their_means(sphere):
@@ -98,8 +101,7 @@ def test_single_points_are_their_means(sphere):
     found = karcher_mean(sphere, point)
     np.testing.assert_array_equal(found.faces, [7])
     np.testing.assert_allclose(found.barycentric, [[0.2, 0.3, 0.5]])
-    same = karcher_mean(sphere, [5, 9, 30], [0, 1, 0])
-    np.testing.assert_array_equal(same.positions(sphere)[0], sphere.V[9])
+    np.testing.assert_array_equal(karcher_mean(sphere, [5, 9, 30], [0, 1, 0]).positions(sphere)[0], sphere.V[9])
     mixed = karcher_mean(sphere, [point, 40])
     assert geodesic_distance(sphere, mixed)[40] == pytest.approx(geodesic_distance(sphere, point)[40] / 2, rel=1e-6)
 
@@ -108,12 +110,10 @@ def test_bezier_curves_in_the_plane_are_polynomials():
     mesh = flat_perturbed(shapes.grid(8))
     control = SurfacePoints([3, 60, 100, 30], np.random.default_rng(0).dirichlet([1, 1, 1], 4))
     P = control.positions(mesh)
-    pieces = 8
-    curve = geodesic_bezier(mesh, control, pieces)
-    t = np.arange(pieces + 1)[:, None] / pieces
+    curve = geodesic_bezier(mesh, control, 8)
+    t = np.arange(9)[:, None] / 8
     expected = (1 - t) ** 3 * P[0] + 3 * t * (1 - t) ** 2 * P[1] + 3 * t**2 * (1 - t) * P[2] + t**3 * P[3]
-    corners = curve.positions(mesh)
-    gap = np.linalg.norm(corners[:, None] - expected, axis=2).min(axis=0)
+    gap = np.linalg.norm(curve.positions(mesh)[:, None] - expected, axis=2).min(axis=0)
     np.testing.assert_allclose(gap, 0, atol=1e-9)
     np.testing.assert_allclose(curve.lengths(mesh).sum(), np.linalg.norm(np.diff(expected, axis=0), axis=1).sum())
 

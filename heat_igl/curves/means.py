@@ -5,25 +5,29 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from heat_igl.curves.geodesics import GeodesicPathSolver
-from heat_igl.curves.paths import shortest_paths
+from heat_igl.curves.paths import shortest_path, shortest_paths
 from heat_igl.curves.places import Waypoints, checked_places
 from heat_igl.curves.straightest import Tracer
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, is_number, names_guessed, real_numbers, shown
 from heat_igl.geodesic import GeodesicSolver
-from heat_igl.mesh import Mesh, MeshLike, SurfacePoints, as_mesh, as_simplices
-from heat_igl.plan import ROUGH_FOR_MEANS
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices
+from heat_igl.mesh.surface_points import unchecked_curve
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 # A mean inside a face keeps this barycentric distance from its sides, so that all paths leave through this face.
 _INSIDE = 1e-7
-# The search ends with a step below this share of the largest distance from the mean.
-_CONVERGED = 1e-9
+# The search ends with a step below this share of the largest distance from the mean: the sum changes by the square of
+# it, which is below rounding.
+_CONVERGED = 1e-8
 _MOST_STEPS = 500
-# On rough surfaces, the sum has local minima within an edge or two of each other, so there are three starts: of 60
-# means of two points on rough squares one was not in the middle from one vertex, and none from three.
+# Paths of one length differ by this share of it at most.
+_ROUNDING = 1e-12
+# The sum has local minima, on rough surfaces within an edge or two of each other, so there are three starts: means of
+# five points on two of six rough squares had sums larger by 0.2 and 0.6 % from one vertex than from three.
 _STARTS = 3
 # Distances in a weight d^(p - 2) are at least this share of the largest one.
 _NEAREST = 1e-12
@@ -63,17 +67,17 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     Warns
     -----
     AccuracyWarning
-        If the steps are still longer than 1e-9 of the largest distance after 500 of them.
+        If the steps are still longer than 1e-8 of the largest distance after 500 of them.
 
     Notes
     -----
-    The search starts at the best vertex, by a distance query for each point, and on rough surfaces at the
-    three best. There, the place that is found may still be only locally best. Each step goes along the mean of the log
-    maps v_i of the points, weighted by w_i d_i^(p - 2): the Karcher iteration for p = 2 (Karcher 1977) and Weiszfeld's
-    for p = 1. The step is halved until the sum falls, so the sum falls in every step. A median can be one of the
-    points: it is if the unit vectors to the others, weighted, sum to no more than the weight of this point (Vardi and
-    Zhang 2000). Log maps are the first directions and the lengths of straightened paths, on rough surfaces of exact
-    ones.
+    Two points have their mean on a shortest path between them. For more, the search starts at the three best vertices,
+    by a distance query for each point, and may end at a place that is only locally best. Each step goes along the mean
+    of the log maps v_i of the points, weighted by w_i d_i^(p - 2): the Karcher iteration for p = 2 (Karcher 1977) and
+    Weiszfeld's for p = 1. The step is halved until the sum falls, so the sum falls in every step. A median can be one
+    of the points: it is if the unit vectors to the others, weighted, sum to no more than the weight of this point
+    (Vardi and Zhang 2000). Log maps are the first directions and the lengths of exact shortest paths, which are
+    straightened from step to step; where others are shorter at the end, the search goes on with these.
 
     Examples
     --------
@@ -94,10 +98,11 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
 
 
 class _State(NamedTuple):
-    """A place, the log maps (k, 2) of all points there, their distances (k,), and the sum of the powers."""
+    """A place, the paths from there, the log maps (k, 2) of all points, their distances (k,), the sum of the powers."""
 
     face: int
     barycentric: FloatArray
+    paths: list[SurfaceCurve]
     vectors: FloatArray
     distances: FloatArray
     energy: float
@@ -128,7 +133,6 @@ class _Mean:
         self._weight, self._power = weight / weight.sum(), power
         self._solver = GeodesicPathSolver(mesh)
         self._tracer = tracer
-        self._is_rough = tracer.curvature > ROUGH_FOR_MEANS
 
     def found(self) -> SurfacePoints:
         """The point with the least sum."""
@@ -142,30 +146,43 @@ class _Mean:
             at_point = self._median_at_a_point(fields)
             if at_point is not None:
                 return at_point
-        best = np.argsort(energy)[: _STARTS if self._is_rough else 1]
-        starts = [int(self._corner[vertex]) for vertex in best if energy[vertex] < np.inf]
-        ends = [self._descend(self._state(corner // 3, np.eye(3)[corner % 3])) for corner in starts]
+        if len(self._faces) == 2:
+            return self._between()
+        starts = [int(self._corner[vertex]) for vertex in np.argsort(energy)[:_STARTS] if energy[vertex] < np.inf]
+        ends = [self._lowest(self._state(corner // 3, np.eye(3)[corner % 3])) for corner in starts]
         return min(ends, key=lambda end: end.energy).points
 
-    def _state(self, face: int, barycentric: FloatArray) -> _State:
+    def _between(self) -> SurfacePoints:
+        """Of two points and p > 1: the point of a shortest path that divides it in the ratio of the least sum."""
+        path = shortest_path(self._mesh, *self._places)
+        length = path.lengths(self._mesh)
+        share = expit(np.subtract(*np.log(self._weight[::-1])) / (self._power - 1))
+        along = share * length.sum() - (np.cumsum(length) - length)
+        at = int(np.flatnonzero(along >= 0)[-1])
+        part = along[at] / length[at] if length[at] > 0 else 0.0
+        return SurfacePoints(path.faces[[at]], (path.start + part * (path.end - path.start))[[at]])
+
+    def _state(self, face: int, barycentric: FloatArray, near: _State | None = None) -> _State:
+        """The state at a place, with shortest paths, or those in the classes of the paths from a place nearby."""
         inside = np.maximum(barycentric, _INSIDE)
         inside /= inside.sum()
-        vectors = self._log_maps(face, inside)
+        here = SurfacePoints(np.array([face]), inside[None])
+        if near is None:
+            points = SurfacePoints(self._faces, self._barycentric)
+            paths = [path.reversed() for path in shortest_paths(self._mesh, points, here)]
+        else:
+            step = self._solver.path([here, near.points])
+            paths = [self._solver.straighten(_joined(step, path)) for path in near.paths]
+        vectors = self._log_maps(face, paths)
         distances = np.hypot(*vectors.T)
-        return _State(face, inside, vectors, distances, float(self._weight @ distances**self._power))
+        return _State(face, inside, paths, vectors, distances, float(self._weight @ distances**self._power))
 
-    def _log_maps(self, face: int, barycentric: FloatArray) -> FloatArray:
-        """The log maps (k, 2) of all points at a place inside a face.
+    def _log_maps(self, face: int, paths: list[SurfaceCurve]) -> FloatArray:
+        """The log maps (k, 2) of all points at the place inside a face from which paths lead there.
 
         The first axis runs from corner 0 to corner 1 of the face, the second to the side of corner 2.
         """
         V, F = self._mesh.V, self._mesh.F
-        here = SurfacePoints(np.array([face]), barycentric[None])
-        if self._is_rough:
-            points = SurfacePoints(self._faces, self._barycentric)
-            paths = [path.reversed() for path in shortest_paths(self._mesh, points, here)]
-        else:
-            paths = [self._solver.path([here, place]) for place in self._places]
         if not self._mesh.measures[face] > 0:
             raise MeshError(f"the mean lies at F[{face}] = {F[face].tolist()}, which has no area: repair this face")
         along, side = V[F[face, 1:]] - V[F[face, 0]]
@@ -187,24 +204,35 @@ class _Mean:
         # The second derivative of d^p along the path is p - 1 times that across it.
         return np.asarray(share @ at.vectors / (share.sum() * max(self._power - 1, 1)))
 
+    def _lowest(self, at: _State) -> _State:
+        """Descend in the classes of the shortest paths at a place, until these are the shortest at the end too."""
+        while True:
+            end = self._descend(at)
+            at = self._state(end.face, end.barycentric)
+            if not at.energy < end.energy * (1 - _ROUNDING):
+                return at
+
     def _descend(self, at: _State) -> _State:
         """Steps along the mean of the log maps until they are short."""
+        part = 1.0
         for _ in range(_MOST_STEPS):
             step = self._direction(at)
-            shortest = _CONVERGED * float(at.distances.max())
-            while np.hypot(*step) > shortest:
-                end = self._tracer.exp(at.points, step[None])
+            size, shortest = float(np.hypot(*step)), _CONVERGED * float(at.distances.max())
+            # As many halvings as the last step, or one less.
+            part = min(1.0, 2 * part)
+            while part * size > shortest:
+                end = self._tracer.exp(at.points, part * step[None])
                 face = int(end.faces[0])
                 if self._mesh.measures[face] > 0:
-                    trial = self._state(face, end.barycentric[0])
+                    trial = self._state(face, end.barycentric[0], at)
                     if trial.energy < at.energy:
                         break
-                step = step / 2
+                part /= 2
             else:
                 return at
             at = trial
         warn_caller(
-            f"the mean of {len(self._faces)} points moves by {np.hypot(*step):.3g} still, after {_MOST_STEPS} steps",
+            f"the mean of {len(self._faces)} points moves by {part * size:.3g} still, after {_MOST_STEPS} steps",
             AccuracyWarning,
         )
         return at
@@ -223,6 +251,12 @@ class _Mean:
         if np.hypot(*pull) <= self._weight[here].sum():
             return SurfacePoints(self._faces[[best]], self._barycentric[[best]])
         return None
+
+
+def _joined(first: SurfaceCurve, second: SurfaceCurve) -> SurfaceCurve:
+    """The curve along one and then along another, which starts where the first ends."""
+    start, end = np.concatenate([first.start, second.start]), np.concatenate([first.end, second.end])
+    return unchecked_curve(np.concatenate([first.faces, second.faces]), start, end, is_closed=False)
 
 
 def _checked_weights(weights: ArrayLike | None, k: int) -> FloatArray:

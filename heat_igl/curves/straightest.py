@@ -156,13 +156,6 @@ class Tracer:
         half = np.ascontiguousarray(np.where(polar.on_boundary, -1.0, polar.sums / 2)[self._surface.F])
         self._triangles = triangulation.l, triangulation.areas, polar.corners, triangulation.twin, half
 
-    @property
-    def curvature(self) -> float:
-        """Mean over the vertices inside of how far the angles around them are from 2 pi, in radians."""
-        polar = self._frames.angles
-        inside = self._surface.referenced & ~polar.on_boundary
-        return float(np.abs(2 * np.pi - polar.sums[inside]).mean()) if inside.any() else 0.0
-
     def exp(self, source: Sources, vectors: ArrayLike) -> SurfacePoints:
         """The exponential map; see `exp_map`."""
         array = real_numbers("vectors", vectors)
