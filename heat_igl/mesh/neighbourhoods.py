@@ -225,7 +225,7 @@ def without_noise(tree: PointTree) -> PointTree:
 def _is_noisy(tree: PointTree, sample: IntArray) -> bool:
     """Whether points deviate from quadrics at those of `sample` as noise does: independently, and everywhere alike."""
     way, share, size = _deviations(tree, sample)
-    if np.median(share) < _NOISE or np.median(share) < _NOT_DETAIL * np.median(_deviations(tree, sample, K)[1]):
+    if np.median(share) < _NOISE or np.median(share) < _NOT_DETAIL * np.median(_deviations(tree, sample[::2], K)[1]):
         return False
     nearest, middle = tree.neighbours[0][sample][:, [1, K // 4 + 1]].T
     other, other_size = _deviations(tree, nearest)[0], _deviations(tree, middle)[2]
