@@ -12,8 +12,8 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning, positive, require_choice
-from heat_igl.heat.checking import AnswerCheck, Checker, Comparison, Comparisons
+from heat_igl.errors import AccuracyWarning, FactorizationError, positive, require_choice
+from heat_igl.heat.checking import AnswerCheck, Checker, Comparison, Comparisons, thinnest
 from heat_igl.heat.source_terms import SourceAssembler
 from heat_igl.heat.steps import (
     Boundary,
@@ -334,7 +334,10 @@ def prepare(
     begun = time.perf_counter()
     found = analysis(domain.L, options.backend, known())
     analysed = time.perf_counter()
-    heat_flow, poisson, divergence = _factored(domain, options, step, found, t_damping, fitted)
+    try:
+        heat_flow, poisson, divergence = _factored(domain, options, step, found, t_damping, fitted)
+    except FactorizationError as error:
+        raise FactorizationError(f"{error}{thinnest(domain.source_surface)}") from None
     factored = time.perf_counter()
     assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped)
     triangulation = None if domain.surface is None else domain.surface.triangulation

@@ -67,7 +67,7 @@ class HeatMethodSolver(BatchedSolver):
     MeshError
         If the mesh cannot be used; the message names the first offender.
     FactorizationError
-        If a matrix is not positive definite.
+        If a matrix is not positive definite, or an answer is no number; it names the thinnest face.
     ValueError
         If an option has no meaning.
 
