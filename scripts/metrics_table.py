@@ -249,16 +249,16 @@ WALLS: dict[str, Callable[[Random], Mesh]] = {
     "U, random": lambda rng: cut_out(9, lambda P: in_box(P, [1 / 3, 1 / 3, -1], [2 / 3, 2, 2]), rng),
     "block with a cavity, even": lambda _: carved(8, lambda P: in_box(P, 0.25, 0.75)),
     "block with a cavity, random": lambda rng: cut_out(10, lambda P: in_box(P, 0.25, 0.75), rng),
-    "block with four holes, even": lambda _: carved(10, holes),
+    "block with four holes, even": lambda _: carved(25, holes),
     "block with four holes, random": lambda rng: cut_out(15, holes, rng),
     "frame of rods, even": lambda _: carved(10, lambda P: (np.abs(P - 0.5) < 0.3).sum(axis=1) > 1),
-    "shell": lambda rng: shell(0.5, 2000, rng),
+    "shell": lambda rng: shell(0.5, 9000, rng),
     "thin shell without a vertex inside": lambda rng: shell(0.8, 0, rng),
     "torus": lambda rng: ring(16, 40, 400, rng),
     "torus without a vertex inside": lambda rng: ring(10, 25, 0, rng),
     "union of balls and a box, random": lambda rng: cut_out(14, beyond_union, rng),
     "cube without two balls, random": lambda rng: cut_out(10, two_balls, rng),
-    "cube without two balls, fine": lambda rng: cut_out(20, two_balls, rng),
+    "cube without two balls, fine": lambda rng: cut_out(24, two_balls, rng),
 }
 
 
@@ -285,7 +285,7 @@ def in_walls(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
             query = METHODS[method](mesh)
             query(sources[0])  # prepares
             found[method] = [query(i) for i in sources]
-            took[method] = 1e3 * np.median([seconds(lambda i=i, q=query: q(i), time.perf_counter) for i in sources])
+            took[method] = 1e3 * np.median([seconds(lambda i=i, q=query: q(i), time.process_time) for i in sources])
         truth = finer(mesh)
         error = np.concatenate([excess(d, truth(i)) for i, d in zip(sources, found["default"], strict=True)])
         row |= {"mean": np.abs(error).mean(), "longer": max(error.max(), 0), "shorter": max(-error.min(), 0)}

@@ -22,7 +22,7 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 # Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
 _MOST_ROUNDS = 5
 # How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
-_BESIDE, _BESIDE_OF_FEW = 0.5, 2.0
+_BESIDE, _BESIDE_OF_FEW = 1.0, 2.0
 # What the kernel of bends knows of the way to a vertex.
 _STRAIGHT, _UNKNOWN = -1, -2
 # Sine of the angle by which a body must exceed half a turn at an edge.

@@ -81,8 +81,7 @@ class _Bends(Ray):
     along the edge, and `beyond` by how much the way would miss the edge on a line through it.
 
     Of the search around the edge `sought`, `stamp` is the number; `seen` (n,) has the last search that came to each
-    vertex, and `lit` (n,) the last in which it saw the edge. `is_below` tells whether the vertex that was last looked
-    at is hidden by the wall behind the edge.
+    vertex, and `lit` (n,) the last in which it saw the edge.
     """
 
     edges: cython.const[cython.int][:, ::1]
@@ -107,7 +106,6 @@ class _Bends(Ray):
     lit: cython.int[::1]
     queue: cython.int[::1]
     beside: cython.double
-    is_below: cython.bint
 
     @cython.cfunc
     @cython.nogil
@@ -242,15 +240,6 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def away(self, v: cython.int) -> cython.double:
-        """Distance of v from `x`."""
-        squared: cython.double = 0.0
-        for k in range(3):
-            squared += (self.body.positions[v, k] - self.x[k]) * (self.body.positions[v, k] - self.x[k])
-        return sqrt(squared)
-
-    @cython.cfunc
-    @cython.nogil
     def is_lit_from(
         self, v: cython.int, x: cython.pointer[cython.const[cython.double]], share: cython.double
     ) -> cython.bint:
@@ -299,13 +288,13 @@ class _Bends(Ray):
                 continue
             if not self.is_hidden_from_before(i, u):
                 continue
-            # A vertex that gains nothing, or sees nothing of the edge, may lie between those that do.
-            if is_better and not self.is_below:
+            # A vertex that gains nothing may lie between those that do.
+            if is_better:
                 if not self.sees(u, self.x):
                     continue
                 self.lit[u] = stamp
                 self.d[u], self.way[u] = value, i
-                self.begin[u] = value - self.away(u)
+                self.begin[u] = value - self.away(u, self.x)
                 self.label[u] = self.label[a if self.share < 0.5 else b]
             size = self.push_around(u, size, stamp)
 
@@ -324,12 +313,12 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def is_hidden_from_before(self, i: cython.int, v: cython.int) -> cython.bint:
-        """Whether v lies behind the edge, or beside that at most so far as was allowed; sets `is_below`.
+        """Whether v lies behind the edge, or beside that at most so far as was allowed.
 
         Seen along the edge, the line from v to the point from which the way comes passes outside, and v is not below
-        the plane of the wall behind the edge.
+        the plane of the wall behind the edge. No line to the edge needs those below: each triangle that it passes
+        through has a corner on the other side of the plane, and such corners are neighbours from one to the next.
         """
-        self.is_below = False
         if self.outward[i, 0] == 0 and self.outward[i, 1] == 0 and self.outward[i, 2] == 0:
             return True
         before_out: cython.double = 0.0
@@ -348,8 +337,7 @@ class _Bends(Ray):
             side += off * across
         near: cython.double = self.beside * self.body.reach[v]
         below: cython.double = out - self.wall[i] * sqrt(out * out + side * side)
-        self.is_below = below > _LEVEL * self.body.reach[v]
-        if below > near:
+        if below > _LEVEL * self.body.reach[v]:
             return False
         if not self.has_before[i]:
             return True

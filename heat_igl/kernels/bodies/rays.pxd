@@ -40,6 +40,7 @@ cdef class Ray:
     cdef bint sees(self, int v, const double* goal) noexcept nogil
     cdef bint is_there(self, int t) noexcept nogil
     cdef bint is_lit(self, int v) noexcept nogil
+    cdef double away(self, int v, const double* x) noexcept nogil
     cdef bint arrives_from(self, int v, int begin) noexcept nogil
     cdef bint arrives(self, int v, int begin, int into, int toward) noexcept nogil
     cdef int cone(self, int v) noexcept nogil

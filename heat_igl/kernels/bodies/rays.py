@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE
 from cython.cimports.libc.math import fabs, sqrt
 
 # What lies behind a side that has not been looked at.
@@ -162,9 +163,11 @@ class Ray:
     def sees(self, v: cython.int, goal: cython.pointer[cython.const[cython.double]]) -> cython.bint:
         """Whether the line from v to a point stays in the tetrahedra."""
         self.goal = goal
-        for k in range(self.body.first[v], self.body.first[v + 1]):
-            if self.is_there(self.body.incident[k] // 4):
-                return True
+        # A point of a tetrahedron at v is at most as far away as a corner.
+        if self.away(v, goal) <= self.body.reach[v] * (1 + GAIN):
+            for k in range(self.body.first[v], self.body.first[v + 1]):
+                if self.is_there(self.body.incident[k] // 4):
+                    return True
         begin: cython.int = self.cone(v)
         if begin >= 0:
             return self.arrives_from(v, begin)
@@ -179,6 +182,13 @@ class Ray:
             if is_through and self.arrives_from(v, self.body.incident[k]):
                 return True
         return False
+
+    def away(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+        """The distance of v from a point in space."""
+        squared: cython.double = 0.0
+        for i in range(3):
+            squared += (self.body.positions[v, i] - x[i]) * (self.body.positions[v, i] - x[i])
+        return sqrt(squared)
 
     def arrives_from(self, v: cython.int, begin: cython.int) -> cython.bint:
         """Whether the line from v that begins in the tetrahedron of a corner arrives."""
@@ -284,21 +294,22 @@ class Ray:
             if u != self.a and u != self.b and u != self.c:
                 break
         self.t = self.body.behind[self.t, i]
-        if self.t >= 0:
-            for i in range(4):
-                u = self.body.corners[self.t, i]
-                if u != self.a and u != self.b and u != self.c:
-                    return u
-        return -1
+        if self.t < 0:
+            return -1
+        u = self.a ^ self.b ^ self.c
+        for i in range(4):
+            u ^= self.body.corners[self.t, i]
+        return u
 
     def turn(self, o: cython.int) -> cython.bint:
         """Find the triangle at o through which the line leaves t, which it entered through abc."""
         of_a: cython.double = self.sign * _side(self, o, self.a)
         of_b: cython.double = self.sign * _side(self, o, self.b)
-        of_c: cython.double = self.sign * _side(self, o, self.c)
         if of_a >= 0 and of_b <= 0:
             self.c = o
-        elif of_b >= 0 and of_c <= 0:
+            return True
+        of_c: cython.double = self.sign * _side(self, o, self.c)
+        if of_b >= 0 and of_c <= 0:
             self.a = o
         elif of_c >= 0 and of_a <= 0:
             self.b = o
