@@ -151,11 +151,8 @@ def folded_points(surface: Mesh) -> IntArray:
 def two_sided_cover(surface: Mesh) -> Mesh:
     """Both sides of a surface, glued where its neighbours are: the orientation cover.
 
-    Parameters
-    ----------
-    surface : Mesh
-        m triangles on n vertices, at most two at an edge. Neighbours need not be oriented alike, and a vertex may have
-        several fans of triangles.
+    The surface has m triangles on n vertices, at most two at an edge. Neighbours need not be oriented alike, and a
+    vertex may have several fans of triangles.
 
     Returns
     -------

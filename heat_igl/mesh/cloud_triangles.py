@@ -49,16 +49,9 @@ _NEAREST, _EDGES_AWAY = 12, 4
 
 
 def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) -> IntArray:
-    """Triangles (m, 3) int32 on points; an edge has at most two, and they may make several fans around a point.
+    """Triangles (m, 3) int32 on points P (n, 3); an edge has at most two, several fans may meet at a point.
 
-    Parameters
-    ----------
-    P : (n, 3) float64
-        The points.
-    near : Neighbourhoods
-        Their neighbours and tangent planes.
-    has_side : (n,) bool
-        Where the normals tell sheets apart: neighbours with opposite normals are left out.
+    Neighbours with opposite normals are left out where the normals tell sheets apart, which `has_side` (n,) says.
     """
     agreed, others, is_settled = _triangles_of_stars(P, near, np.where(has_side, _OTHER_SHEET, -2.0))
     # Around a settled point nothing is left to do.
