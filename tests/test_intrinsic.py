@@ -741,7 +741,6 @@ def test_degenerate_faces_and_edges_of_no_length():
     assert np.abs(distance[: fan.n_vertices] - clean).max() < 0.02
 
 
-@pytest.mark.filterwarnings("ignore:source_sets.* heat is off")  # on the cover, which it is compared on
 def test_undivided_fan():
     """From each tip the edge leads straight to every other, though the cover glues a triangle to two of the others."""
     fan = fan_of_five(0)
