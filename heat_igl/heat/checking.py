@@ -207,9 +207,12 @@ class Comparisons:
         return found
 
     def _is_asymmetric(self, distance: FloatArray, vertex: int) -> bool:
-        """Whether distances (n,) from a vertex differ in the median from those known in the other direction."""
-        off = sorted(abs(distance[v] / other[vertex] - 1) for v, other in self._known if 0 < other[vertex] < np.inf)
-        return len(off) > 0 and bool(off[len(off) // 2] > _DIFFERENT)
+        """Whether distances (n,) from a vertex differ in the median from those known in the other direction.
+
+        By a share of the mean distance: beside a vertex, where others may be known, a small error is a large share.
+        """
+        off = sorted(abs(distance[v] - other[vertex]) for v, other in self._known if 0 < other[vertex] < np.inf)
+        return len(off) > 0 and bool(off[len(off) // 2] > _DIFFERENT * distance[np.isfinite(distance)].mean())
 
     def _made(self) -> Engine:
         domain, surface = self._domain, self._domain.surface
