@@ -175,7 +175,7 @@ class Comparisons:
         self._near: dict[Kind, IntArray] = {}
         self._engine: Engine | None = None
         # Vertices that gave near answers, and the distances (n,) from them by the other engine.
-        self._known: list[tuple[int, FloatArray]] = []
+        self._known: dict[int, FloatArray] = {}
         #: Of all comparisons, the one that is farthest off on average; None before the first.
         self.worst: Comparison | None = None
 
@@ -201,7 +201,7 @@ class Comparisons:
         elif found.largest > _ROUNDING:
             near[components] += near[components] >= 0
             if is_vertex and len(self._known) < _MOST_KNOWN:
-                self._known.append((int(sources.vertices[0]), other))
+                self._known[int(sources.vertices[0])] = other
         # Tables that no later answer needs are not kept.
         self._engine = engine if (near < _ENOUGH).any() else None
         return found
@@ -211,7 +211,7 @@ class Comparisons:
 
         By a share of the mean distance: beside a vertex, where others may be known, a small error is a large share.
         """
-        off = sorted(abs(distance[v] - other[vertex]) for v, other in self._known if 0 < other[vertex] < np.inf)
+        off = sorted(abs(distance[v] - other[vertex]) for v, other in self._known.items() if 0 < other[vertex] < np.inf)
         return len(off) > 0 and bool(off[len(off) // 2] > _DIFFERENT * distance[np.isfinite(distance)].mean())
 
     def _made(self) -> Engine:
