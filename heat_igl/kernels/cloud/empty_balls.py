@@ -48,8 +48,12 @@ def roomiest_normals(
             reach: cython.double = _invert(P, index[row], axes[row], inverted)
             _shares(inverted, directions, shares)
             _average(directions, shares, local)
-            radius[row, 0] = reach * _share(inverted, local, 1.0)
-            radius[row, 1] = reach * _share(inverted, local, -1.0)
+            most: cython.double = 1.0
+            least: cython.double = -1.0
+            for j in range(index.shape[1]):
+                along: cython.double = inverted[j, 0] * local[0] + inverted[j, 1] * local[1] + inverted[j, 2] * local[2]
+                most, least = max(most, along), min(least, along)
+            radius[row, 0], radius[row, 1] = reach * (1.0 / most), reach * (-1.0 / least)
             for x in range(3):
                 normal[row, x] = local[0] * axes[row, 0, x] + local[1] * axes[row, 1, x] + local[2] * axes[row, 2, x]
     return normals, radii
@@ -112,15 +116,6 @@ def _shares(
 
 @cython.cfunc
 @cython.nogil
-def _share(inverted: cython.float[:, ::1], u: cython.double[::1], sign: cython.double) -> cython.double:
-    most: cython.double = 1.0
-    for j in range(inverted.shape[0]):
-        most = max(most, sign * (inverted[j, 0] * u[0] + inverted[j, 1] * u[1] + inverted[j, 2] * u[2]))
-    return 1.0 / most
-
-
-@cython.cfunc
-@cython.nogil
 def _average(
     directions: cython.const[cython.float][:, ::1],
     share: cython.float[:, ::1],
@@ -129,7 +124,6 @@ def _average(
     """The mean direction on the side of the largest ball."""
     best: cython.Py_ssize_t = 0
     of_best: cython.Py_ssize_t = 0
-    mean: cython.double[3]
     for side in range(2):
         for a in range(share.shape[1]):
             if share[side, a] > share[of_best, best]:
@@ -140,16 +134,16 @@ def _average(
         for a in range(share.shape[1]):
             share[side, a] = share[side, a] * share[side, a] * share[side, a] * share[side, a]
     for _ in range(ROUNDS):
-        mean[0] = mean[1] = mean[2] = 0.0
+        mx: cython.double = 0.0
+        my: cython.double = 0.0
+        mz: cython.double = 0.0
         for a in range(share.shape[1]):
             weight: cython.double = directions[0, a] * normal[0] + directions[1, a] * normal[1]
             weight += directions[2, a] * normal[2]
             weight *= share[0, a] if weight > 0.0 else share[1, a]
-            for x in range(3):
-                mean[x] += weight * directions[x, a]
-        size: cython.double = sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2])
-        for x in range(3):
-            normal[x] = mean[x] / size
+            mx, my, mz = mx + weight * directions[0, a], my + weight * directions[1, a], mz + weight * directions[2, a]
+        size: cython.double = sqrt(mx * mx + my * my + mz * mz)
+        normal[0], normal[1], normal[2] = mx / size, my / size, mz / size
 
 
 def on_one_side(
