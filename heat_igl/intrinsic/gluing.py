@@ -15,7 +15,7 @@ import igl
 import numpy as np
 
 from heat_igl.errors import MeshError, real_numbers
-from heat_igl.intrinsic.half_edges import mollify
+from heat_igl.intrinsic.half_edges import HalfEdges, mollify
 from heat_igl.intrinsic.triangulation import (
     BACK_CORNERS,
     Covered,
@@ -32,22 +32,15 @@ from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 _SAME_LENGTH = 1e-9
 
 
-def from_edge_lengths(
-    l: ArrayLike,
-    F: IntArray,
-    n: int,
-    facets: connectivity.Facets | None = None,
-    margin: float | None = None,
-) -> IntrinsicTriangulation:
+def from_edge_lengths(l: ArrayLike, F: IntArray, n: int) -> IntrinsicTriangulation:
     """Triangles with given edge lengths, glued along sides with the same two vertices; degenerate ones are mollified.
 
     ``l[f, c]`` is the length of the edge opposite corner ``c`` of face ``f``. F (m, 3) are faces on n vertices,
-    validated like those of a `Mesh`, and `facets` theirs, if they are known. `margin` is that of `mollify`.
+    validated like those of a `Mesh`.
 
     A MeshError if `l` has the wrong shape or an entry that is not a length, or gives an edge two lengths.
     """
-    found = connectivity.facets(F, n) if facets is None else facets
-    lengths = _checked_lengths(l, F)
+    found, lengths = connectivity.facets(F, n), _checked_lengths(l, F)
     half_edge = np.arange(F.size)
     first, last = np.empty((2, len(found.n_faces)), np.int64)
     # Of several values written to one place, the last stays.
@@ -59,7 +52,7 @@ def from_edge_lengths(
     twin[a], twin[b] = b, a
     aligned = np.ones(F.size, bool)
     aligned[a] = aligned[b] = F.ravel()[next_half_edge(a)] == F.ravel()[previous_half_edge(b)]
-    added = mollify(lengths, F, margin)
+    added = mollify(lengths, F)
     return IntrinsicTriangulation(F, lengths + added, twin, aligned, n, lengthening=float(added.max()))
 
 
@@ -123,7 +116,13 @@ def _require_one_length(lengths: FloatArray, a: IntArray, b: IntArray) -> None:
 
 def intrinsic_triangulation(mesh: Mesh, margin: float | None = None) -> IntrinsicTriangulation:
     """The triangles of `mesh` by their edge lengths; degenerate ones are mollified, see `mollify`."""
-    return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets, margin)
+    edges, exponent = HalfEdges.of_mesh(mesh)
+    lengths = np.ldexp(edges.length, exponent).reshape(-1, 3)
+    added = mollify(lengths, mesh.F, margin)
+    twin, aligned = edges.twin.astype(np.int64), edges.aligned.astype(bool)
+    return IntrinsicTriangulation(
+        mesh.F, lengths + added, twin, aligned, mesh.n_vertices, lengthening=float(added.max())
+    )
 
 
 def lengths_to_divide_by(mesh: Mesh) -> FloatArray:

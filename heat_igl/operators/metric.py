@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import names_guessed, real_numbers
-from heat_igl.intrinsic import IntrinsicTriangulation, from_edge_lengths, intrinsic_delaunay, lay_out, mollify
+from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, lay_out, mollify
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
@@ -281,14 +281,11 @@ def operators_in_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Lapl
 def _unfolded(mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian) -> Operators:
     """The operators of triangles with the lengths `sides` (m, 3), and with `simplices` where these are nearer."""
     domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
-    if simplices is not None and not hopf_lax_is_nearer(simplices.variation, mean_angle_defect(in_space(mesh), True)):
+    if simplices is not None and not hopf_lax_is_nearer(
+        simplices.variation, mean_angle_defect(intrinsic_triangulation(mesh), True)
+    ):
         simplices = None
     return replace(domain, simplices=simplices)
-
-
-def in_space(mesh: Mesh) -> IntrinsicTriangulation:
-    """The triangles with the lengths of space."""
-    return from_edge_lengths(igl.edge_lengths(mesh.V, mesh.F), mesh.F, mesh.n_vertices, mesh.facets)
 
 
 def _of_faces(mesh: Mesh, g: FloatArray, least: float) -> MetricSimplices:
@@ -351,7 +348,7 @@ def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, lapl
 
 def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
     """The triangles with lengths of their own, cut apart at the edges that they see at two lengths."""
-    apart = in_space(mesh)
+    apart = intrinsic_triangulation(mesh)
     twin = apart.twin.copy()
     glued = np.flatnonzero(twin >= 0)
     one, other = sides.ravel()[glued], sides.ravel()[twin[glued]]

@@ -347,10 +347,10 @@ def unfolding_surface(mesh: Mesh, margin: float | None = None, *, orients: bool 
 
     Triangles thinner than `margin` are mollified, see `mollify`; `orients` is that of `intrinsic_delaunay`.
     """
-    history: tuple[Change, ...] = ()
-    if has_nonmanifold_edges(mesh):
+    faces = intrinsic_triangulation(mesh, margin)
+    if (faces.twin == -2).any():
         mesh, history = _without_duplicates(mesh)
-    faces = replace(intrinsic_triangulation(mesh, margin), history=history)
+        faces = replace(intrinsic_triangulation(mesh, margin), history=history)
     return Surface(intrinsic_delaunay(faces, orients=orients), faces, V=mesh.V)
 
 
