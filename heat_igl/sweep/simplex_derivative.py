@@ -1,11 +1,11 @@
-"""The derivative of a distance by the Hopf-Lax formula, by offsets, positions and tensors.
+"""Derivatives of a Hopf-Lax distance with respect to offsets, positions and tensors.
 
-Each vertex has its distance and slope from the corners of one facet: y_v = F_v(y_corners, positions, tensors). The
-answer is the fixed point y = F(y) with the facets that the search chose. Its derivative goes by the adjoint: the
-transposed system (1 - dF/dy)^T x = g is solved once, and x times dF by positions and tensors is the gradient.
+The distance and slope y_v of a vertex follow from those of the corners of one facet: y_v = F_v(y, positions, tensors).
+The distance is the fixed point y = F(y) for the facets that the search chose. Its gradient is computed by the adjoint
+method: solve (1 - dF/dy)^T x = g once, then multiply x by the derivatives of F by positions and tensors.
 
-dF is found by complex steps: F is analytic but for its clips, so that Im F(y + i h) / h with h = 1e-100 is exact to
-rounding. The place on the facet, where a function f is least, moves by -H^-1 times the change of its gradient.
+dF is computed by complex-step differentiation: except at its clips, F is analytic, so Im F(y + i h) / h with h = 1e-100
+is exact to rounding. The minimizer of f on a facet, with Hessian H, moves by -H^-1 times the change of the gradient.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from heat_igl.operators import MetricSimplices
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
-# A complex step, whose square is no double.
+# Size of the complex step: its square underflows, so no second-order term remains.
 _STEP = 1e-100
-# Steps of Newton's methods, and the relative change at which they end.
+# Largest number of Newton steps, and the relative change below which the iteration has converged.
 _MOST_STEPS, _SETTLED = 12, 1e-12
-# Where the fixed point is farther away than this share of a distance, the search had not settled, and the derivative is
-# that at what it found. From the second share on, a distance is another than the engine gives.
+# Relative difference between the fixed point and the result of the search above which the search had not converged (the
+# derivative is then taken at its result), and above which a vertex counts as inexact.
 _UNSETTLED, _SAME = 1e-2, 1e-3
-# A share of a corner, and of a second difference, that is rounding.
+# Barycentric coordinates, ratios of second differences and relative changes of the velocity below this are zero.
 _ROUNDING = 1e-9
 
 
 class _Inputs(NamedTuple):
-    """What the values of k vertices are found from.
+    """The arguments of F for k vertices with facets of p corners.
 
     Attributes
     ----------
@@ -44,9 +44,9 @@ class _Inputs(NamedTuple):
     X : (k, p + 1, 3) float64
         Positions of the vertex and of the corners.
     tensors : (k, q, 3, 3) float64
-        The metric, or those at the vertex and the corners.
+        One metric for the simplex (q = 1), or the metrics at the vertex and at the corners (q = p + 1).
     start : (k,) float64
-        The least offset of the sources of the corners.
+        The smallest offset among the sources of the corners.
     """
 
     distance: AnyArray
@@ -57,16 +57,16 @@ class _Inputs(NamedTuple):
 
 
 class _FacetUpdate:
-    """The second-order update of k vertices, each through its own facet, with a derivative by everything.
+    """The second-order Hopf-Lax update of k vertices, each from its own facet; it accepts complex arguments.
 
     Parameters
     ----------
     is_sloped : (k, p) bool
         Whether the slope at a corner is known.
     same : (k, p, p) bool
-        Whether two corners have their distance from one source, and the second order counts between them.
+        Whether two corners have the same source, and the second-order term between them is used.
     share : (k, p) float64
-        The place on the facet; corners of share 0 keep it.
+        Barycentric coordinates of the minimizer on the facet; coordinates that are 0 stay 0.
     """
 
     def __init__(self, is_sloped: BoolArray, same: BoolArray, share: FloatArray) -> None:
@@ -75,7 +75,7 @@ class _FacetUpdate:
         self._of: AnyArray | None = None
 
     def place(self, at: _Inputs) -> None:
-        """Move the places to where values are least, by Newton's method; shares that come to 0 stay."""
+        """Move each point to the minimizer on its facet by Newton's method; coordinates that reach 0 stay 0."""
         p = self.share.shape[1]
         M = np.zeros((len(self.share), p + 1, p + 1))
         for _ in range(_MOST_STEPS):
@@ -85,19 +85,19 @@ class _FacetUpdate:
             self._is_corner = (~stays).sum(axis=1) == 1
             for i in range(p):
                 M[:, :p, i] = np.imag(self._gradient(at, self.share + 1j * _STEP * np.eye(p)[i])) / _STEP
-            # The shares sum to 1.
+            # The coordinates sum to 1.
             M[:, p, :p] = M[:, :p, p] = 1
             M[:, :p] = np.where(stays[:, :, None], np.eye(p, p + 1), M[:, :p])
             self.moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -_inverse(M)[:, :p, :p])
             step = np.einsum("kij,kj->ki", self.moves, self._gradient(at, self.share))
-            # Not beyond an edge of the facet.
+            # The step ends at the boundary of the facet.
             room = np.min(np.where(step < 0, -self.share / np.minimum(step, -1e-300), 1.0), axis=1)
             self.share += np.where(np.isfinite(step), np.minimum(room, 1.0)[:, None] * step, 0.0)
             if not (np.abs(step) >= _SETTLED).any():
                 break
 
     def values(self, at: _Inputs) -> AnyArray:
-        """The distance and slope (k, 4) of the vertices; from complex inputs, with what the places move."""
+        """The distance and slope (k, 4) of the vertices; complex inputs also move the minimizers."""
         share = self.share
         change = np.imag(self._gradient(at, share))
         if change.any():
@@ -111,16 +111,17 @@ class _FacetUpdate:
         return self._value(at, x)[2]
 
     def _value(self, at: _Inputs, x: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray, AnyArray]:
-        """T and the length at shares x (k, p), the gradient of their sum by x, and what the length gains by moving.
+        """Interpolated distance T and path length at the point x (k, p) of the facet, with two derivatives (k, p).
 
-        As `Facet.value` and `Facet.length`; the last is for the vertex moved towards each corner.
+        These are the gradient of T + length by x, and the derivative of the length when the vertex moves towards each
+        corner. The formulas are those of `Facet.value` and `Facet.length`.
         """
         D = at.distance - at.start[:, None]
         e = at.X[:, 1:] - at.X[:, :1]
         product = np.einsum("kix,kqxy,kjy->kqij", e, at.tensors, e, optimize=True)
         hang = 0.5 * np.einsum("kij,kj->ki", self._sag(at, D, e, product), x)
         mean = (x * D).sum(axis=1)
-        # At a corner T is its distance; that of a source is 0, where the square has no root to derive.
+        # At a corner T is the distance there. At a source it is 0, where the square root has no derivative.
         T = np.where(self._is_corner, mean, np.sqrt(np.where(self._is_corner, 1.0, mean**2 - (x * hang).sum(axis=1))))
         to_T = np.where(self._is_corner[:, None], D, (mean[:, None] * D - hang) / np.where(T == 0, 1, T)[:, None])
         if product.shape[1] == 1:
@@ -135,7 +136,7 @@ class _FacetUpdate:
         w = np.einsum("kab,kjb,kj->ka", middle, e, x)
         near = np.sqrt((w**2).sum(axis=1))
         u = np.einsum("kab,kb->ka", middle, w) / near[:, None]
-        # The gradient of the mean velocity, in the metric of the centre.
+        # The gradient of the mean velocity, in the metric at the centroid of the simplex.
         centre = W.mean(axis=1)
         steep = np.einsum("kab,kbc,kc->ka", centre, _inverse(e), mean[:, 1:] - mean[:, :1])
         root, growth = np.sqrt(one * two), np.sqrt((steep**2).sum(axis=1)) / mean.mean(axis=1)
@@ -152,7 +153,7 @@ class _FacetUpdate:
         return T, length, to_T + g, lean
 
     def _velocity(self, at: _Inputs, e: AnyArray) -> tuple[AnyArray, AnyArray]:
-        """The inverse roots (k, q, p, p) of tensors, and vectors e (k, p, p), in the planes of triangles."""
+        """The tensors to the power -1/2 (k, q, p, p) and the edge vectors (k, p, p), of triangles in their planes."""
         if e.shape[1] == 3:
             if np.iscomplexobj(at.tensors):
                 return _inverse_root(at.tensors), e
@@ -167,7 +168,7 @@ class _FacetUpdate:
         return W, e @ np.swapaxes(axes, 1, 2)
 
     def _sag(self, at: _Inputs, D: AnyArray, e: AnyArray, product: AnyArray) -> AnyArray:
-        """By how much squared distance sags between two corners (k, p, p), as `HopfLax.sag_between`."""
+        """Second difference of the squared distance between two corners (k, p, p), as `HopfLax.sag_between`."""
         k, p = D.shape
         metric = product if product.shape[1] == 1 else product[:, 1:]
         w = np.einsum("kix,kjx->kij", at.slope, e)
@@ -195,7 +196,7 @@ class _FacetUpdate:
                 doubted = np.abs(np.real(doubt)) >= np.abs(np.real(sag))
                 ratio = doubt / np.where(np.real(sag) == 0, 1, sag)
                 share = _larger(_size(ratio), 1 - _smaller(trust[:, i], trust[:, j]))
-                # Where fronts are those of one point, there is no doubt, and none arises when vertices move.
+                # The doubt is 0 for the distance from one point, and stays 0 when vertices move.
                 size = np.where(np.abs(np.real(ratio)) < _ROUNDING, 0, _size(doubt))
                 sag = sag - size * share * np.sign(np.real(sag))
                 sag = np.where(np.real(sag) < 0, sag * _smaller(trust[:, i], trust[:, j]), sag)
@@ -228,7 +229,7 @@ def _size(x: AnyArray) -> AnyArray:
 
 
 def _larger(x: AnyArray, y: Any) -> AnyArray:
-    """The larger by real parts; the first of equal ones, whatever their rounding."""
+    """The one with the larger real part; x if both are equal to rounding."""
     a, b = np.real(x), np.real(y)
     return np.where(a >= b - 1e-12 * np.abs(b), x, y)
 
@@ -238,24 +239,24 @@ def _smaller(x: AnyArray, y: AnyArray) -> AnyArray:
 
 
 def _inverse(A: AnyArray) -> AnyArray:
-    """The inverses of matrices (..., n, n); NaN where one is singular, as at places that no Newton step leads from."""
+    """The inverses of matrices (..., n, n); NaN for singular ones, for which there is no Newton step."""
     is_regular = (np.abs(np.linalg.slogdet(A)[0]) > 0)[..., None, None]
     return np.where(is_regular, np.linalg.inv(np.where(is_regular, A, np.eye(A.shape[-1]))), np.nan)
 
 
 class SimplexDerivative(ABC):
-    """The derivative of one distance through simplices: called with a gradient, it returns that by the positions.
+    """Reverse-mode derivative of a distance through simplices: maps gradients by distances to gradients by positions.
 
-    Where the way is not unique, the one that was found decides.
+    Where several shortest paths end, the derivative is that of the path that the engine found.
 
     Attributes
     ----------
     distance : (n,) float64
-        What is differentiated.
+        The distance that is differentiated.
     unreachable : (k,) int64
         Vertices at distance ``inf``. Their derivative is 0.
     inexact : (k,) int64
-        Vertices whose derivative is that of another distance than the engine gives.
+        Vertices at which `distance` differs from the distance of the engine.
     """
 
     distance: FloatArray
@@ -270,14 +271,14 @@ class SimplexDerivative(ABC):
         return np.flatnonzero(np.isinf(self.distance))
 
     def __call__(self, g: ArrayLike) -> FloatArray:
-        """The gradient (n, 3), or (k, n, 3), by positions, for g (n,) or (k, n) by distances; tensors stay.
+        """The gradient (n, 3) or (k, n, 3) by positions, for a gradient g (n,) or (k, n) by distances; fixed tensors.
 
         Raises
         ------
         ValueError
-            If g has another shape or is not finite at a reachable vertex, or if distance is found with other tensors
-            than those that were given: tensors per tetrahedron that are samples of a smooth field, those of triangles,
-            and one for all tetrahedra. Give the metric at the vertices then.
+            If g has another shape or is not finite at a reachable vertex, or if the solver does not use the given
+            tensors directly: tensors per tetrahedron that sample a smooth field, tensors of triangles, and one tensor
+            for all tetrahedra. Give the metric at the vertices then.
         """
         rows = gradient_rows(g, self.distance)
         self._require_given()
@@ -290,7 +291,7 @@ class SimplexDerivative(ABC):
         return np.asarray(np.bincount(sources.vertex_label, self._by_starts(row), sources.n_labels), np.float64)
 
     def push_forward(self, dV: ArrayLike) -> FloatArray:
-        """How the distances (n,) change when the vertices move by dV (n, 3), and tensors stay; 0 where unreachable."""
+        """Change of the distances (n,) when vertices move by dV (n, 3) and tensors are fixed; 0 if unreachable."""
         moved = velocities("dV", dV, (self._simplices.n, 3), "vertex")
         self._require_given()
         return self._moved(moved)
@@ -298,40 +299,40 @@ class SimplexDerivative(ABC):
     def _require_given(self) -> None:
         if not self._simplices.is_given:
             raise ValueError(
-                "distance is found with other tensors than those that were given, so that it has derivatives by "
-                "offsets alone: give metric_operators the metric at the vertices, (n, 3, 3)"
+                "the solver does not use the given tensors directly, so only derivatives by offsets are known: "
+                "give metric_operators the metric at the vertices, (n, 3, 3)"
             )
 
     @abstractmethod
     def _by_positions(self, rows: FloatArray) -> FloatArray:
-        """The gradients (k, n, 3) by positions, for checked ones (k, n)."""
+        """The gradients (k, n, 3) by positions, for checked gradients (k, n) by distances."""
 
     @abstractmethod
     def _by_starts(self, row: FloatArray) -> FloatArray:
-        """The gradient (s,) by the offset of each source vertex, for a checked one (n,)."""
+        """The gradient (s,) by the offset of each source vertex, for a checked gradient (n,) by distances."""
 
     @abstractmethod
     def _moved(self, dV: FloatArray) -> FloatArray:
-        """How the distances (n,) change when the vertices move by dV (n, 3)."""
+        """Change of the distances (n,) when the vertices move by dV (n, 3)."""
 
 
 class FixedPointDerivative(SimplexDerivative):
-    """The derivative of distance by the Hopf-Lax formula, each vertex through the facet that was chosen.
+    """The derivative of a Hopf-Lax distance, for the facet that the search chose at each vertex.
 
-    `distance` is the fixed point of the updates to rounding, and the engine ends once distances change by less than
-    1e-4. `inexact` are the vertices at which bounds give another distance by more than a thousandth, and all if the
-    search did not settle.
+    `distance` is the fixed point of the updates to rounding; the engine stops when distances change by less than 1e-4.
+    A vertex is `inexact` if `answer` differs from `distance` there by more than a thousandth, as after the engine
+    applied its bounds; all vertices are, if the search did not converge.
 
     Parameters
     ----------
     simplices : MetricSimplices
         With tensors.
     sources : SourceSet
-        Vertices.
+        Source vertices.
     answer : (n,) float64
-        The distance that the engine gives.
+        The distance that the engine returns.
     distance, label, facet, place, slope, is_sloped, is_linear
-        What `HopfLax` found before bounds were kept.
+        The result of `HopfLax` before the engine applied its bounds.
     """
 
     def __init__(
@@ -380,9 +381,9 @@ class FixedPointDerivative(SimplexDerivative):
             self.inexact = np.flatnonzero(off | (np.abs(self.distance - answer) > _SAME * answer))
 
     def _linearized(self) -> FloatArray:
-        """Derive the updates at the state, and return the step of Newton's method (n, 4) to the fixed point."""
+        """Linearize the updates at the current state, and return the Newton step (n, 4) to the fixed point."""
         self._at, v = self._inputs(), self._vertices[:, 0]
-        # On the way to the fixed point the square of T may have no root on a facet: then the vertex keeps its distance.
+        # During the iteration T^2 may be negative on a facet. Its vertex keeps its distance in this step.
         with np.errstate(invalid="ignore", divide="ignore"):
             self._update.place(self._at)
             rest = self._update.values(self._at) - self._state[v]
@@ -406,7 +407,7 @@ class FixedPointDerivative(SimplexDerivative):
         return np.asarray(adjoint[vertices, 0] + self._summed(self._first, adjoint, by, len(vertices)))
 
     def by_metric(self, g: ArrayLike) -> FloatArray:
-        """The gradient (n, 3, 3) or (m, 3, 3) by the tensors given to `metric_operators`; `g` (n,) as for a call.
+        """The gradient (n, 3, 3) or (m, 3, 3) by the tensors given to `metric_operators`; `g` is (n,).
 
         Raises
         ------
@@ -445,14 +446,14 @@ class FixedPointDerivative(SimplexDerivative):
         place = simplices.place
         if place is None:
             raise ValueError("these simplices have no positions")
-        # One tensor for all corners is one input.
+        # A metric that is constant in the simplex is one input for all corners.
         corner = self._corner if simplices.velocity is not None else self._corner[:, :1]
         tensors = simplices.metric(self._simplex[:, None], corner)
         start = self._sources.vertex_offset[self._first]
         return _Inputs(distance[facet], self._state[facet, 1:], place[self._vertices], tensors, start)
 
     def _derivatives(self, name: str) -> Iterator[tuple[tuple[int, ...], FloatArray]]:
-        """For each entry of an input, its index and the derivative (k, 4) of distances and slopes by it."""
+        """For each entry of an input: its index, and the derivative (k, 4) of distances and slopes by this entry."""
         given = getattr(self._at, name)
         for entry in np.ndindex(given.shape[1:]):
             moved = given.astype(complex)
@@ -462,7 +463,7 @@ class FixedPointDerivative(SimplexDerivative):
             yield entry, np.where(self._is_known[:, None], by, 0.0)
 
     def _factored(self) -> Any:
-        """The factors of 1 - dF/dy; vertices from near to far, where the matrix is nearly triangular."""
+        """LU factors of 1 - dF/dy. With vertices sorted by distance, the matrix is nearly triangular."""
         row, column, value = [np.arange(self._state.size)], [np.arange(self._state.size)], [np.ones(self._state.size)]
         for name in ("distance", "slope"):
             for (i, *x), by in self._derivatives(name):
@@ -484,12 +485,12 @@ class FixedPointDerivative(SimplexDerivative):
         return np.asarray(self._factor.solve(ordered.ravel(), way).reshape(-1, 4)[self._rank])
 
     def _adjoint(self, row: FloatArray) -> FloatArray:
-        """The derivative (n, 4) by what each update adds to distances and slopes, from that by distances (n,)."""
+        """The adjoint state x (n, 4) of (1 - dF/dy)^T x = g, for a gradient g (n,) by distances."""
         return self._solved(np.pad(row[:, None], ((0, 0), (0, 3))), "T")
 
 
 def gradient_rows(g: ArrayLike, distance: FloatArray, most: int = 2) -> FloatArray:
-    """The derivatives of functions by distances (n,), checked, as rows (k, n), 0 at unreachable vertices.
+    """Gradients of k functions by the distances, checked, as rows (k, n) that are 0 at unreachable vertices.
 
     Raises
     ------

@@ -119,8 +119,8 @@ def revolved(radius: FloatArray, height: FloatArray, around: int) -> Mesh:
     return lattice_mesh(radius[:, None] * x, radius[:, None] * y, height[:, None], wrap_columns=True)
 
 
-def tube(centre: FloatArray, along: FloatArray, up: FloatArray, radius: float, around: int) -> Mesh:
-    """An open tube: rings about points (k, 3) across the directions `along`, in frames that `up` turns."""
+def tube(centre: FloatArray, along: FloatArray, radius: float, around: int, up: ArrayLike = (0.31, 0.21, 0.93)) -> Mesh:
+    """An open tube: rings around points (k, 3), perpendicular to `along` (k, 3), that start perpendicular to `up`."""
     along = along / np.linalg.norm(along, axis=1, keepdims=True)
     u = np.cross(along, up)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
@@ -492,8 +492,7 @@ def _wide_funnel() -> Mesh:
 @shape("scattered", held_out=True)
 def _scattered_disk() -> Mesh:
     r, angle = seeded(5).random((2, 1500))
-    points = np.sqrt(r)[:, None] * np.stack([np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)], axis=1)
-    return planar(points)
+    return planar(np.sqrt(r)[:, None] * np.stack([np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)], axis=1))
 
 
 @shape("scattered")
@@ -513,8 +512,7 @@ def _slivers_at_the_rim() -> Mesh:
     s = np.linspace(-1, 1, 41) ** 3
     rim = np.concatenate([np.column_stack([s, np.full(41, side)]) for side in (-1.0, 1.0)])
     rim = np.concatenate([rim, rim[:, ::-1]])
-    points = np.unique(np.concatenate([rim, seeded(7).uniform(-0.9, 0.9, (120, 2))]), axis=0)
-    return planar(points)
+    return planar(np.unique(np.concatenate([rim, seeded(7).uniform(-0.9, 0.9, (120, 2))]), axis=0))
 
 
 @shape("scattered", held_out=True)
@@ -530,8 +528,7 @@ def _graded_square() -> Mesh:
 @shape("terrain", _5000=(5000, 0.3, 8), coarse=(47, 0.5, 9))
 def _height_field(n: int, height: float, seed: int) -> Mesh:
     points = seeded(seed).random((n, 2))
-    z = height * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1])
-    return planar(points, z)
+    return planar(points, height * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1]))
 
 
 @shape("terrain", held_out=True)
@@ -547,8 +544,7 @@ def _fractal_terrain() -> Mesh:
         new[::2, ::2] = False
         z = finer + amplitude * np.where(new, rng.standard_normal(finer.shape), 0)
         amplitude *= 0.6
-    mesh = grid(64)
-    return Mesh(raised(mesh.V[:, :2], z.ravel()), mesh.F)
+    return _heights(grid(64), z.ravel())
 
 
 @shape("terrain", held_out=True)
@@ -692,7 +688,7 @@ def _trefoil() -> Mesh:
     t = 2 * np.pi * np.arange(300) / 300
     centre = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1)
     along = np.roll(centre, -1, axis=0) - np.roll(centre, 1, axis=0)
-    V = tube(centre, along, np.array([0.3, 0.2, 1.0]), 0.35, 8).V
+    V = tube(centre, along, 0.35, 8, up=(0.3, 0.2, 1.0)).V
     return merged(Mesh(np.concatenate([V, V[:8]]), lattice_faces(301, 8, wrap_columns=True)))
 
 
@@ -723,8 +719,7 @@ def _sunflower() -> Mesh:
     """Seeds at the golden angle, denser towards the centre by the cube of the radius."""
     k = np.arange(1200) + 0.5
     radius, angle = (k / 1200) ** 1.5, k * np.pi * (3 - np.sqrt(5))
-    points = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return planar(points)
+    return planar(radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 @shape("terrain", held_out=True)
@@ -814,11 +809,6 @@ def _holed_rectangle(rng: Generator, around: int, n_inside: int) -> tuple[FloatA
     return points, F[~inner.any(axis=1)]
 
 
-def _tube(centre: FloatArray, radius: float, around: int) -> Mesh:
-    """An open tube of `around` sides along points (k, 3)."""
-    return tube(centre, np.gradient(centre, axis=0), np.array([0.31, 0.21, 0.93]), radius, around)
-
-
 def _band(middle: FloatArray, across: FloatArray, rows: int) -> Mesh:
     """A band of `rows` rows of vertices about a curve (k, 3), reaching by `across` (k, 3) to either side."""
     V = middle[None] + np.linspace(-1, 1, rows)[:, None, None] * across[None]
@@ -866,7 +856,7 @@ def helix(rng: Generator) -> Mesh:
     turns, n = rng.uniform(2, 8), int(rng.integers(60, 400))
     t = np.linspace(0, 2 * np.pi * turns, n)
     centre = np.stack([np.cos(t), np.sin(t), rng.uniform(0.05, 0.4) * t], axis=1)
-    return _tube(centre, rng.uniform(0.05, 0.25), int(rng.integers(3, 10)))
+    return tube(centre, np.gradient(centre, axis=0), rng.uniform(0.05, 0.25), int(rng.integers(3, 10)))
 
 
 @family("spiral ramp")
@@ -944,8 +934,7 @@ def nested_circles(rng: Generator) -> Mesh:
     """The Delaunay triangles of circles inside one another, with as many vertices on each, and holes or none."""
     n, around = int(rng.integers(2, 9)), int(rng.integers(16, 160))
     radius = np.sort(rng.uniform(0.1, 1, n))
-    points = np.concatenate([r * ring(around) + 0.05 * r * rng.uniform(-1, 1, 2) for r in radius])
-    return planar(points)
+    return planar(np.concatenate([r * ring(around) + 0.05 * r * rng.uniform(-1, 1, 2) for r in radius]))
 
 
 @family("spiky sphere")
@@ -975,7 +964,7 @@ def tube_of_few_sides(rng: Generator) -> Mesh:
     t = np.linspace(0, rng.uniform(5, 40), n)
     a = rng.uniform(0.1, 0.8, 4)
     centre = np.stack([t, np.sin(a[0] * t) / a[0], a[1] * np.cos(a[2] * t)], axis=1)
-    return _tube(centre, 0.2 + 0.3 * a[3], int(rng.integers(3, 9)))
+    return tube(centre, np.gradient(centre, axis=0), 0.2 + 0.3 * a[3], int(rng.integers(3, 9)))
 
 
 @family("vase")

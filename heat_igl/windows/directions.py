@@ -30,15 +30,15 @@ from heat_igl.windows.guards import Invariants
 from heat_igl.windows.tables import Tables, from_mesh
 
 _WHOLE = 2 * np.pi
-# By how much the lengths of an edge before and after mollification may differ, relatively, and two angles.
+# An edge before and after mollification: largest relative difference of its lengths, and of two angles in radians.
 _SAME_LENGTH, _SAME_ANGLE = 1e-7, 1e-5
-# So many edges have to tell how the angles around the source count.
+# Angles around the source are compared at this number of edges at least: with one, a wrong match is not noticed.
 _FEWEST_EDGES = 2
 
 
 def in_circle(angles: FloatArray) -> FloatArray:
     """Angles (k,) in [0, 2 pi)."""
-    # A fifth of the time of a remainder, which for tiny negative angles would be 2 pi, too.
+    # Takes a fifth of the time of np.mod, which returns 2 pi for tiny negative angles.
     found = angles - _WHOLE * np.floor(angles / _WHOLE)
     return np.where((found >= 0) & (found < _WHOLE), found, 0.0)
 
@@ -49,13 +49,13 @@ class PathAngles(NamedTuple):
     Attributes
     ----------
     departure : (n,) float64
-        Polar angle at which the path leaves its source vertex; from a source in a face, the angle from the side of
+        Polar angle at which the path leaves its source vertex; for a source inside a face, the angle from the side of
         corners 0 and 1 of the face.
     back : (n,) float64
-        Polar angle at the vertex at which the path sets out backwards.
+        Polar angle at the end vertex of the direction back along the path.
     turning : (n,) float64
-        Sum of the angles by which the path turns at the vertices where it bends, counterclockwise, in [-pi, pi]: in
-        their tangent planes, on the boundary in the plane of the faces.
+        Sum of the counterclockwise turning angles at the vertices where the path bends, in [-pi, pi]: measured in the
+        tangent planes of these vertices, on the boundary in the plane of the unfolded faces.
     """
 
     departure: FloatArray
@@ -64,33 +64,33 @@ class PathAngles(NamedTuple):
 
 
 class PathDirections:
-    """Angles in the triangles as polar angles of the mesh, on an oriented manifold of triangles whose faces are known.
+    """Converts directions in triangles to polar angles at the vertices of the mesh, an oriented manifold.
 
-    A MeshError if the surface has no polar angles, see `polar_angles`.
+    A MeshError if the faces of the mesh are not known, or if it has no polar angles, see `polar_angles`.
     """
 
     def __init__(self, surface: Surface) -> None:
         if surface.faces is None:
             raise MeshError("directions need the faces of the mesh, which this domain does not know")
         given = polar_angles(surface.faces)
-        #: Around the vertices of the triangulation.
+        #: Polar angles of the half-edges around the vertices of the triangulation.
         self.angles: PolarAngles = (
             given if surface.faces is surface.unfolding else carried_angles(given, surface.unfolding)
         )
         self._triangulation = surface.unfolding
-        # A corner of the faces at each vertex.
+        # One corner of the given faces at each vertex.
         self._first = np.maximum(given.first, 0)
 
     def of_windows(self, found: ExactSolution, sources: SourceSet) -> tuple[PathAngles, SurfacePoints]:
-        """The angles of exact paths, of which `found` knows how they leave, and the places (n,) at which they start.
+        """The angles of the shortest paths of a directed search, and the points (n,) at which they start.
 
-        A path from a place inside a face departs in that face, and from a corner around the vertex. Where no source is
-        reached, the place is a corner of face 0.
+        The departure of a path is measured in the face of its start point, or around the vertex if the point is at a
+        corner. Without a path, the point is a corner of face 0.
         """
         origin, vertices = found.origin, np.arange(len(found.distance))
         if origin.place is not None:
             return self._of_curves(self.of_ways(vertices, origin), origin)
-        # After vertices and points comes nothing, at which the index -1 looks.
+        # The last entry stands for no source, whose label is -1.
         corner, points, nothing = self._first[sources.vertices], sources.points, np.zeros(1, np.int64)
         faces = np.concatenate([corner // 3, points.faces, nothing])
         barycentric = np.concatenate([np.eye(3)[corner % 3], points.barycentric, np.eye(3)[:1]])
@@ -98,7 +98,7 @@ class PathDirections:
         return self.of_ways(vertices, origin, points), starts
 
     def _of_curves(self, angles: PathAngles, origin: Origin) -> tuple[PathAngles, SurfacePoints]:
-        """As `of_windows`, of paths from segments."""
+        """`of_windows` for paths from segments."""
         root, corner, place = origin.root, _known(origin.corner), _known(origin.place)
         n, first = len(root), first_parts(root)
         start = root[first]
@@ -108,7 +108,7 @@ class PathDirections:
         barycentric, faces = place[first], corner // 3
         others = np.append(at_vertex, np.flatnonzero(root < 0))
         barycentric[others] = np.eye(3)[corner[others] % 3]
-        # A segment that ends at a vertex leads there too, with an angle in the face.
+        # Paths from the end of a segment at a vertex: their angle in the face is converted to one around the vertex.
         at_corner = np.flatnonzero((start >= n) & (barycentric.max(axis=1) > 1 - ON_SIDE))
         corner = corner[at_corner] // 3 * 3 + barycentric[at_corner].argmax(axis=1)
         angles.departure[at_corner] = self.around_corners(corner, angles.departure[at_corner])
@@ -116,11 +116,10 @@ class PathDirections:
         return angles, unchecked_points(faces, barycentric)
 
     def of_ways(self, vertex: IntArray, ways: Origin, points: SourcePoints | None = None) -> PathAngles:
-        """The angles of n paths to vertices (n,), with p sources at `points` in faces.
+        """The angles of n paths to `vertex` (n,), with p sources at `points` in faces.
 
-        Roots in `ways` are the paths that lead to the last bends or source vertices; n + i for source point i.
-
-        Without `points`, the departure of a path from a place inside a face counts in the triangle of that place.
+        Roots in `ways` are indices of the paths to the last bend or to the source vertex, and n + i for source point i.
+        Without `points`, the departure of a path from a point inside a face is measured in the triangle of the point.
         """
         angles, n, corner = self.angles, len(vertex), _known(ways.corner)
         row = np.flatnonzero((corner >= 0) & (ways.root >= 0))
@@ -137,11 +136,11 @@ class PathDirections:
             if points is not None and ways.turn is not None:
                 inside = row[~at_vertex]
                 departure[inside] += ways.turn[inside] + self._turns(points)[root[~at_vertex] - n]
-        # Over the half-edge opposite, or from the source point in the same face.
+        # The path enters over the opposite half-edge, or comes from a source point in the same face.
         entered, crossing = ways.entered[row], ways.crossing[row]
         over = entered >= 0
         half_edge = entered[over]
-        # The vertex from the tail; from the angle, as libigl's areas are slow for a few thousand triangles.
+        # Position of the vertex relative to the tail, from the angle, since libigl's areas are slow for few triangles.
         side = self._triangulation.l.ravel()[previous_half_edge(half_edge)]
         turn = angles.corners.ravel()[next_half_edge(half_edge)]
         fx, fy = side * np.cos(turn), side * np.sin(turn)
@@ -158,12 +157,12 @@ class PathDirections:
         return PathAngles(*_handed_on(row, ways.root, departure, back, scale))
 
     def _at_corners(self, corner: IntArray, seen: FloatArray) -> FloatArray:
-        """Polar angles (k,) of directions that are turned by `seen` from the side to the next corner."""
+        """Polar angles (k,) of directions at angles `seen` from the side to the next corner."""
         angles, v = self.angles, self._triangulation.F.ravel()[corner]
         return _polar(angles.outgoing[previous_half_edge(corner)], seen, angles.scale[v], angles.on_boundary[v])
 
     def around_corners(self, corner: IntArray, departure: FloatArray) -> FloatArray:
-        """Polar angles (k,) of directions at corners, whose angles (k,) count from the first sides of the triangles."""
+        """Polar angles (k,) of directions at corners, given by angles (k,) from the side of corners 0 and 1."""
         seen = departure - self._direction(previous_half_edge(corner))
         return in_circle(self._at_corners(corner, seen - _WHOLE * np.rint(seen / _WHOLE)))
 
@@ -173,12 +172,12 @@ class PathDirections:
         return np.choose(half_edge % 3, [np.pi - angle[first + 1], angle[first] - np.pi, np.zeros(len(half_edge))])
 
     def _turns(self, points: SourcePoints) -> FloatArray:
-        """The angle (p,) of corners 0 and 1 of the triangles that hold points, in the given faces: flips turn them."""
+        """Angle (p,) by which flips turn the side of corners 0 and 1 of the triangles that contain the points."""
         faces, barycentric = points.faces, points.barycentric
         turn = np.zeros(len(faces))
         for flips in self._triangulation.history:
             if not isinstance(flips, Flipped):
-                continue  # with other changes there are no polar angles
+                continue  # surfaces with other changes have no polar angles
             after, barycentric = flips.carry(faces, barycentric)
             turn += flips.turn(faces, after)
             faces = after
@@ -187,14 +186,14 @@ class PathDirections:
 
 def _known(part: AnyArray | None) -> AnyArray:
     if part is None:
-        raise ValueError("angles of paths need a solution that was asked for with directed=True")
+        raise ValueError("angles of paths need a solution with directed=True")
     return part
 
 
 def first_parts(root: IntArray) -> IntArray:
-    """The vertex (n,) that the straight first part of each path leads to, from the vertices and sources `root` (n,).
+    """The vertex (n,) at which the first straight part of each path ends, from the roots of the last parts (n,).
 
-    Sources are their own roots, n and more are source points, and -1 is no path.
+    Source vertices are their own roots; roots of n and more are source points, and -1 means no path.
     """
     n = len(root)
     first = np.arange(n)
@@ -207,24 +206,24 @@ def first_parts(root: IntArray) -> IntArray:
 
 
 def _polar(begin: FloatArray, angles: FloatArray, scale: FloatArray, on_boundary: BoolArray) -> FloatArray:
-    """Polar angles (k,) of angles in fans; at the boundary no further than the faces."""
+    """Polar angles (k,) of angles in fans; at the boundary clipped to the range of the faces."""
     found = begin + scale * angles
     return np.where(on_boundary, np.clip(found, 0.0, np.pi), found)
 
 
 def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: FloatArray, scale: FloatArray) -> FloatArray:
-    """Departure, direction back and turning (3, n) of whole paths, from those of the straight last parts.
+    """Departure, direction back and turning (3, n) of whole paths, from those of their last straight parts.
 
-    `row` (k,) are the vertices that have a path, and `root` (n,) where its last part begins, n and more for source
-    points. Polar angles `departure` and `back` (n,) of that part are at the root and at the vertex; `scale` (n,) is
-    that of polar angles over angles as turns count them.
+    `row` (k,) are the vertices with a path, and `root` (n,) the vertices at which the last parts begin, or n and more
+    for source points. `departure` and `back` (n,) are polar angles of the last parts at the root and at the vertex;
+    `scale` (n,) is the ratio of polar angles to the angles in which turning is measured.
     """
     n = len(scale)
     has_path = np.zeros(n, bool)
     has_path[row] = True
     bends = row[root[row] < n]
     bends = bends[has_path[root[bends]]]
-    # The vertex that the part of the path before the first bend ends at. Each step doubles the number that is skipped.
+    # Pointer jumping to the vertex at which the first part of the path ends: each step doubles the number of bends.
     top, turning, bend = np.arange(n), np.zeros(n), root[bends]
     top[bends] = bend
     turning[bends] = (departure[bends] - back[bend]) / scale[bend] - np.pi
@@ -251,26 +250,26 @@ class Directions:
     labels : (n,) int64
         The nearest source, counted as by `HeatMethodSolver.voronoi`; -1 where none is reached.
     departure : (n,) float64
-        Polar angle in [0, 2 pi) at which the path leaves a source vertex, as `exp_map` takes it: scaled, see
-        `tangent_frames`. From a source inside a face, the angle from the side of corners 0 and 1 of that face, to the
-        side of corner 2.
+        Polar angle in [0, 2 pi) at which the path leaves a source vertex, as taken by `exp_map`: scaled, see
+        `tangent_frames`. For a source inside a face, the angle from the side of corners 0 and 1 of the face, towards
+        corner 2.
     arrival : (n,) float64
-        Angle in [0, 2 pi) in the frame of the vertex of the direction in which the path arrives there, away from the
-        source: ``frames.to_world(frames.from_angles(arrival))`` is `gradient`.
+        Angle in [0, 2 pi), in the frame of the vertex, of the direction of the path on arrival, away from the source:
+        ``frames.to_world(frames.from_angles(arrival))`` is `gradient`.
     turning : (n,) float64
-        Angle in [-pi, pi] by which the path turns at the vertices where it bends, counterclockwise, summed up. A vector
-        of angle ``a`` at a source inside the boundary, transported along the path, has the angle ``a + arrival -
+        Sum in [-pi, pi] of the counterclockwise turning angles at the vertices where the path bends. A vector of angle
+        ``a`` at a source that is not on the boundary, transported along the path, has the angle ``a + arrival -
         departure - turning``.
     gradient : (n, 3) float64
         Unit vectors in space, tangent at the vertices: the gradient of the distance.
     start : SurfacePoints
-        The n places at which the paths start: the source, or the place on a curve, in the face in which `departure`
-        counts; at a corner of this face `departure` counts around the vertex. Any place where no source is reached.
+        The n points at which the paths start: the source, or the nearest point of a curve. `departure` is measured in
+        the face of this point, or around the vertex if the point is a corner. Arbitrary where no source is reached.
 
     Notes
     -----
     Departure, arrival, turning and gradient are 0 at sources and where no source is reached. A path that bends at
-    a vertex of negative curvature, or on the boundary, has the departure of the path to the bend.
+    a vertex of negative curvature, or on the boundary, has the departure of its part before the first bend.
 
     Examples
     --------
@@ -302,7 +301,7 @@ class Directions:
 def directions(
     distance: FloatArray, labels: IntArray, angles: PathAngles, start: SurfacePoints, frames: TangentFrames
 ) -> Directions:
-    """The result for paths whose angles are known."""
+    """The `Directions` of paths with known angles."""
     has_path = ~np.isnan(angles.back)
     departure, turning = (np.where(has_path, angle, 0.0) for angle in (angles.departure, angles.turning))
     arrival = np.where(has_path, _arrival(angles.back, frames.angles), 0.0)
@@ -312,9 +311,9 @@ def directions(
 
 
 def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: PolarAngles) -> AnyArray:
-    """Unit numbers (n,) that components are multiplied by on the way from the source; 1 at sources, 0 without a path.
+    """Parallel transport from the source to each vertex as unit complex factors (n,); 1 at sources, 0 without a path.
 
-    Paths start at vertices: `sources` (k,) has the one of each label.
+    All paths start at vertices: `sources` (k,) are the vertices of the labels.
     """
     start = sources[np.maximum(labels, 0)]
     departure = polar.from_polar(start, angles.departure)
@@ -323,14 +322,14 @@ def carried(angles: PathAngles, labels: IntArray, sources: IntArray, polar: Pola
 
 
 def _arrival(back: FloatArray, polar: PolarAngles) -> FloatArray:
-    """The angle (n,) in the frame opposite the polar angle `back` (n,)."""
+    """The angle (n,), in the frame of each vertex, of the direction opposite to the polar angle `back` (n,)."""
     return in_circle(polar.from_polar(np.arange(len(back)), back) + np.pi)
 
 
 def directions_from_one_side(found: Directions, frames: TangentFrames, n: int, m: int) -> Directions:
-    """The directions of paths from the first side of a cover, see `two_sided_cover`, on the n vertices and m faces.
+    """Directions on n vertices and m faces, from those of paths from the first side of a cover, see `two_sided_cover`.
 
-    Of the two copies of a vertex that which is nearer; arrivals on the second side are seen from the first.
+    Of the two copies of a vertex, the nearer one counts; arrivals on the second side are converted to the first.
     """
     is_other = found.distance[n : 2 * n] < found.distance[:n]
     seen = found.of(np.arange(n) + n * is_other)
@@ -346,7 +345,7 @@ def axis_of_second_side(frames: TangentFrames, n: int) -> AnyArray:
 
 
 class _Spokes(NamedTuple):
-    """The edges from a vertex: other ends, lengths and angles (k,), and the corners between each and the next."""
+    """The k edges at a vertex: their other ends, lengths and angles, and the corners between each and the next edge."""
 
     end: IntArray
     length: FloatArray
@@ -355,11 +354,11 @@ class _Spokes(NamedTuple):
 
 
 def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
-    """Vectors (n, 2) of the exact distance, in the direction in which the path to each vertex leaves the source.
+    """The log map at a vertex: vectors (n, 2) of the exact distance, in the direction in which paths leave the source.
 
-    They are in the frame of the source; 0 at the source and where it does not reach. Neither the polar angles of other
-    vertices nor the history of the flips are needed. None if the faces are no oriented manifold, if fewer than two
-    edges of the mesh at the source are left in the Delaunay triangulation, or if the distance contradicts itself.
+    They are in the frame of the source, and 0 at the source and at unreachable vertices. Polar angles of other vertices
+    and a history of flips are not needed. None if the faces are no oriented manifold, if fewer than two edges of the
+    mesh at the source are left in the Delaunay triangulation, or if the distance violates its invariants.
     """
     given = _given_spokes(mesh, source)
     if given is None:
@@ -392,9 +391,9 @@ def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
 
 
 def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None:
-    """The edges of the mesh at a vertex with their polar angles, the scale of these, and whether it is on the boundary.
+    """The edges of the mesh at a vertex with polar angles, the scale of the angles, and whether it is on the boundary.
 
-    None if the faces there are not one oriented fan, or lie in one point.
+    None if the faces there are not one oriented fan, or are degenerate to a point.
     """
     F = mesh.F[np.unique(np.flatnonzero(mesh.F.ravel() == source) // 3)]
     if not len(F):
@@ -412,7 +411,7 @@ def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None
 
 
 def _around(tables: Tables, source: int) -> _Spokes:
-    """The edges at a vertex of the tables, counterclockwise, with the sums of the angles of the faces before them."""
+    """The edges at a vertex of the tables in counterclockwise order, with cumulative angles of the faces."""
     t = tables.edges
     start = int(tables.corner_of_vertex[tables.number[source]])
     clockwise, is_closed = _fan(t.twin, start, 2)
@@ -423,7 +422,7 @@ def _around(tables: Tables, source: int) -> _Spokes:
 
 
 def _fan(twin: AnyArray, start: int, step: int) -> tuple[list[int], bool]:
-    """The corners of a vertex from one on, counterclockwise for step 1 and clockwise for 2; whether they close up."""
+    """The corners around a vertex, counterclockwise for step 1 and clockwise for 2; whether the fan is closed."""
     corners = [start]
     while True:
         corner = corners[-1]
@@ -435,7 +434,7 @@ def _fan(twin: AnyArray, start: int, step: int) -> tuple[list[int], bool]:
 
 
 def _first_angle(given: _Spokes, around: _Spokes, scale: float) -> float | None:
-    """The polar angle of the first edge in the tables, from the edges of the mesh that are still there."""
+    """The polar angle of the first edge of the tables, from mesh edges that the flips have left in place."""
     i, j = np.nonzero(
         (given.end[:, None] == around.end)
         & (np.abs(given.length[:, None] - around.length) <= _SAME_LENGTH * around.length)
@@ -448,9 +447,9 @@ def _first_angle(given: _Spokes, around: _Spokes, scale: float) -> float | None:
 
 
 def _first_parts(done: Searched, leaving: Leaving, source: int) -> tuple[IntArray, IntArray, FloatArray]:
-    """Of each path, the vertex (n,) that the first straight part leads to; these vertices (k,), and angles (k,) there.
+    """Ends (n,) of the first straight parts of paths, the k vertices with straight paths, and the angles (k,) of these.
 
-    Angles count from the beginning of the corner out of which a path leaves the source.
+    Angles are measured from the first side of the corner through which a path leaves the source.
     """
     root = done.found.root.astype(np.int64)
     is_first = root == source

@@ -1,4 +1,4 @@
-"""Engines of distance along triangles, the triangles that they measure on, and their queries."""
+"""Distance engines on triangles, the surfaces on which they measure, and their queries."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Engine(ABC):
 
     @abstractmethod
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
-        """Distance (n,), and the source (n,) as the user counts them that it is measured from, -1 for none.
+        """Distance (n,) and nearest source (n,), counted as by the user, -1 for none.
 
-        A search may end at the cutoff, and what it has not found is ``inf``; it may use so many threads.
+        A search may end at the cutoff; vertices that it has not reached are ``inf``. It may use `threads` threads.
         """
 
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
@@ -52,11 +52,11 @@ class Triangles(ABC):
     @property
     @abstractmethod
     def surface(self) -> Surface:
-        """The triangles, with their history, which carries points and curves to them."""
+        """The triangles with their history of flips, which maps points and curves to them."""
 
     @abstractmethod
     def tables(self) -> Tables:
-        """Tables for distance from vertices, which need no history."""
+        """Tables for distance from vertices, which needs no history."""
 
     @property
     def mean_edge_length(self) -> float:
@@ -76,7 +76,7 @@ class Triangles(ABC):
 
 
 class MeshTriangles(Triangles):
-    """The triangles of a mesh; thin ones are mollified, see `mollify`. `orients`: see `intrinsic_delaunay`."""
+    """The triangles of a mesh, thin ones mollified by `margin`, see `mollify`. `orients`: see `intrinsic_delaunay`."""
 
     def __init__(self, mesh: Mesh, margin: float | None = MARGIN, *, orients: bool = True) -> None:
         self._mesh, self._margin, self._orients = mesh, margin, orients
@@ -125,9 +125,9 @@ class OperatorTriangles(Triangles):
 
 @dataclass(frozen=True, eq=False)
 class Query:
-    """Sources whose offsets count from the earliest source of their component, since tolerances are relative.
+    """Sources with offsets relative to the smallest offset of their component, since tolerances are relative.
 
-    `begin` (n,) is the offset of that source at each vertex; None if all are 0.
+    `begin` (n,) is this smallest offset in the component of each vertex; None if all offsets are 0.
     """
 
     sources: SourceSet
@@ -140,29 +140,29 @@ class Query:
             return cls(sources, None)
         components, F = triangles.components, triangles.given_faces
         at = np.concatenate([sources.vertices, F[sources.points.faces, 0], F[sources.segments.faces, 0]])
-        # On components without sources any value will do.
+        # The value on components without sources is arbitrary.
         earliest = np.full(int(components.max()) + 1, np.inf)
         np.minimum.at(earliest, components[at], sources.offsets)
         return cls(sources.with_offsets(sources.offsets - earliest[components[at]]), earliest[components])
 
     def cutoff(self, cutoff: float) -> float:
-        """Where a search may end, in distances of this query."""
+        """The cutoff of the search, relative to the smallest offset."""
         return cutoff if self.begin is None else cutoff - float(self.begin[np.isfinite(self.begin)].min())
 
     def with_begin(self, distance: FloatArray) -> FloatArray:
-        """Distances (n,) of the sources as they were given."""
+        """Distances (n,) from the sources with their given offsets."""
         return distance if self.begin is None else distance + np.where(np.isfinite(distance), self.begin, 0.0)
 
 
 class TriangleEngine(Engine):
-    """An engine on triangles, with the exact surfaces that points and curves need."""
+    """An engine on triangles, with the exact surfaces for points and curves."""
 
     def __init__(self, triangles: Triangles) -> None:
         self._triangles = triangles
 
     @cached_property
     def on_delaunay(self) -> ExactSurface:
-        """The triangles to which points are carried."""
+        """The Delaunay triangles, to which points are mapped."""
         return ExactSurface(self._triangles.surface.unfolding)
 
     @cached_property
@@ -176,7 +176,7 @@ class WindowEngine(TriangleEngine):
 
     def __init__(self, triangles: Triangles) -> None:
         super().__init__(triangles)
-        # Made at once, since nearly every query needs it; what points, curves and paths need is made on request.
+        # Created here, since nearly every query needs it; surfaces for points, curves and paths are created on demand.
         self._from_vertices = ExactSurface(triangles.tables())
 
     @cached_property
@@ -188,7 +188,7 @@ class WindowEngine(TriangleEngine):
 
     @cached_property
     def _curve_directions(self) -> PathDirections:
-        """The same on the faces before any flip."""
+        """Polar angles of the paths on the faces before any flip."""
         from heat_igl.windows.directions import PathDirections
 
         return PathDirections(replace(self._triangles.surface, triangulation=self._triangles.faces, uncovered=None))
@@ -200,23 +200,23 @@ class WindowEngine(TriangleEngine):
         return self._from_vertices.distance(sources, cutoff, threads)
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
-        """As of all engines; the search ends where others are nearer."""
+        """Distance (n,) where it is smaller than `than`, see `Engine`; the search ends where it is not."""
         return self._from_vertices.distance(sources, float(than.max()), threads, than)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
-        """Distance (n,), and the source (n,) that it is measured from."""
+        """Distance (n,) and nearest source (n,)."""
         query = Query.of(sources, self._triangles)
         found = self._surface(query.sources).solve(query.sources, cutoff=query.cutoff(cutoff), threads=threads)
         return query.with_begin(found.distance), sources.labels[found.origin.label]
 
     def _surface(self, sources: SourceSet, *, locates: bool = False) -> ExactSurface:
-        """The triangles to search in; `locates` asks for ones that know where points are."""
+        """The surface to search on; with `locates`, one that can locate points of the mesh."""
         if len(sources.segments.faces):
             return self.on_faces
         return self.on_delaunay if locates or not sources.on_vertices_alone else self._from_vertices
 
     def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:
-        """Distance (t,) of points or vertices; the search ends when all are known."""
+        """Distance (t,) of points or vertices; the search ends when all of them are known."""
         query = Query.of(sources, self._triangles)
         if not isinstance(targets, SurfacePoints):
             found = self._surface(query.sources).solve(query.sources, goals=targets)
@@ -229,7 +229,7 @@ class WindowEngine(TriangleEngine):
         return found.target_distance + np.where(np.isfinite(found.target_distance), begin, 0.0)
 
     def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
-        """Distance (n,), labels (n,), and of each path the directions and the place at which it starts; all exact.
+        """Distance (n,), labels (n,), and the directions and start points of the shortest paths, all exact.
 
         A MeshError if vertices have no tangent plane, see `polar_angles`.
         """
@@ -241,9 +241,9 @@ class WindowEngine(TriangleEngine):
 
 
 def _as_thin_as_given(surface: Surface) -> Surface:
-    """The surface without the lengthening that mollified edges got for the heat; it would lengthen paths as well.
+    """The surface mollified by the small margin of windows: the larger margin of the heat method would lengthen paths.
 
-    Mollified as little as windows need. A surface whose lengths are those of another metric is returned as it is.
+    A surface whose edge lengths are those of another metric is returned unchanged.
     """
     given, faces = surface.given_faces, surface.faces
     if given is None or faces is None or surface.V is None or faces.lengthening == 0:

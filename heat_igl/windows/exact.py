@@ -1,4 +1,4 @@
-"""Exact polyhedral distance by windows, from all kinds of sources; the algorithm is in `heat_igl.kernels.windows`."""
+"""Exact polyhedral distance by windows from all kinds of sources; `heat_igl.kernels.windows` has the algorithm."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from heat_igl.sources import Sources, SourceSet, source_set, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows.tables import NO_POINTS, NO_SEGMENTS, Located, Tables, from_mesh, from_triangulation
 
-#: A window is cut where another path is shorter by this fraction of the distance: more than rounding adds up to. A
-#: larger number keeps more windows, all of them paths, and changes no distance.
+#: A window is trimmed where another path is shorter by more than this fraction of the distance, which exceeds the
+#: accumulated rounding. A larger value keeps more windows, all of them valid paths, and changes no distance.
 TOLERANCE = 1e-11
-# On fewer vertices a search takes a few milliseconds, and starting a thread a good part of one.
+# With fewer vertices a search takes a few milliseconds, and starting a thread a large part of one.
 _FEWEST_SHARED = 10_000
-# Length of a round of two threads, in mean edge lengths. Shorter rounds cost time; longer ones make more windows that
-# cross the border of the two parts.
+# Length of a round of two threads, in mean edge lengths. Shorter rounds spend more time on synchronization; longer ones
+# let more windows cross the border of the two parts.
 _ROUND = 3.0
-# With about this many windows on the front, a round has work for two threads: a tenth of a millisecond.
+# From about this number of windows on the front, a round of two threads has enough work: a tenth of a millisecond.
 _PLENTY = 1000
 _NO_VERTICES = np.empty(0, np.int64)
 
 
 class Starts(NamedTuple):
-    """k vertices, p points and q segments that distance starts from, each with the offset at which it does.
+    """Sources of a search: k vertices, p points and q segments inside faces, each with an offset.
 
-    Points and segments are inside faces, and ends of segments are among the points. `place` (p + q + 1,) is the number
-    of each point and segment, counted as the caller does: points, then segments; then -1 for nothing. `label` has the
-    same after those of the vertices.
+    The ends of segments are among the points. `place` (p + q + 1,) is the caller's number of each point and segment,
+    where the caller counts points first; its last entry is -1, for no source. `label` (k + p + q + 1,) is the caller's
+    number of each source, counted vertices, points, segments, and again -1 at the end.
     """
 
     vertices: AnyArray
@@ -59,7 +59,7 @@ NO_STARTS = Starts(
 def starts_at(tables: Tables, sources: SourceSet) -> Starts:
     """Sources for the kernel; points at corners become vertices.
 
-    A ValueError if there are points or segments, and the tables do not know the faces that they refer to.
+    A ValueError if there are points or segments, and the tables cannot locate them.
     """
     vertices, begin, segments = tables.number[sources.vertices], tables.scaled(sources.vertex_offset), sources.segments
     k, p = len(vertices), len(sources.points.faces)
@@ -109,10 +109,10 @@ class Found(NamedTuple):
 
 
 class Targets(NamedTuple):
-    """Points whose distance is asked for: t places in the triangles, with the results there.
+    """Target points: t copies of points in the triangles, and the results there.
 
-    `first` (m,) is the first place in each triangle and `following` (t,) the next in the same one, -1 for none;
-    `largest_circle` is the diameter of the largest circle around a triangle with a place.
+    `first` (m,) is the first copy in each triangle and `following` (t,) the next in the same triangle, -1 for none;
+    `largest_circle` is the diameter of the largest circumcircle of a triangle with a target.
     """
 
     place: Located
@@ -123,9 +123,9 @@ class Targets(NamedTuple):
 
 
 class Leaving(NamedTuple):
-    """How paths to n vertices leave their roots, as a search notes it: `corner` and `direction` of `Origin`.
+    """How paths to n vertices leave their roots, as the kernel stores it: `corner` and `direction` of `Origin`.
 
-    For paths from segments it notes a length along the segment and a side in place of the direction, see `front.relax`.
+    For paths from segments, a length along the segment and a side take the place of the direction, see `front.relax`.
     """
 
     corner: AnyArray
@@ -138,7 +138,7 @@ class Leaving(NamedTuple):
 
 
 class Searched(NamedTuple):
-    """A search that is done: results at the vertices and at target points, and how paths leave if asked for."""
+    """Results of a search at the vertices and target points, and how paths leave their roots if requested."""
 
     starts: Starts
     found: Found
@@ -147,7 +147,7 @@ class Searched(NamedTuple):
     leaving: Leaving | None
 
     def nearest_copy(self, n_targets: int) -> IntArray:
-        """Of the copies of each target, the one with the smallest distance."""
+        """The copy of each target with the smallest distance."""
         order = np.lexsort((-self.targets.found.distance, self.targets.place.point))
         which = np.empty(n_targets, np.int64)
         which[self.targets.place.point[order]] = order
@@ -155,29 +155,29 @@ class Searched(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """Where the shortest paths to k places come from.
+    """Origins of the shortest paths to k vertices or points. The optional fields are set in directed searches.
 
     Attributes
     ----------
     label : (k,) int64
-        The source that the distance is measured from, counted vertices first, then points, then segments; -1 for none.
+        The nearest source, counted vertices first, then points, then segments; -1 for none.
     root : (k,) int64
-        The last vertex at which the path bends, or its source: n + i for source point i, and after all points likewise
-        for segments; -1 for none.
+        The last vertex at which the path bends, or else its source: a vertex, n + i for source point i, or n + p + i
+        for segment i after p points; -1 for none.
     entered : (k,) int64
-        The half-edge of the triangulation over which the straight last part of the path enters its last face; -1 where
-        the path starts in the place or runs inside one face.
+        The half-edge of the triangulation over which the last straight part of the path enters its last face; -1 if
+        the path has length 0 or runs inside one face.
     crossing : (k,) float64
-        How far from the tail of that half-edge, in the mesh's unit.
+        Distance of the crossing from the tail of this half-edge, in the unit of the mesh.
     corner : (k,) int64, optional
-        Corner ``3 f + c`` of the triangulation out of which the straight last part leaves the root, on faces oriented
-        alike; of a source point in face f, ``3 f``; -1 for none. This and what follows is there if it was asked for.
+        Corner ``3 f + c`` of the triangulation through which the last straight part leaves the root, on consistently
+        oriented faces; ``3 f`` for a source point in face f; -1 for none.
     direction : (k, 2) float64, optional
-        The direction there, of any length. The first axis is the side to the next corner.
+        The direction in the frame of this corner, not normalized. The first axis is the side to the next corner.
     turn : (k,) float64, optional
-        The angle that leads from a direction in that triangle to the same in the first triangle of a source point.
+        Angle to be added to a direction in this triangle to get it in the first triangle of the source point.
     place : (k, 3) float64, optional
-        Barycentric coordinates of the place that the path leaves, in that triangle; of paths from curves.
+        Barycentric coordinates in this triangle of the point at which the path starts, for paths from curves.
     """
 
     label: IntArray
@@ -192,10 +192,10 @@ class Origin(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ExactSolution:
-    """Distances of one query, and where the shortest paths come from.
+    """Distances at vertices (n,) and at target points (t,), and the origins of the shortest paths.
 
-    At vertices (n,) and at target points (t,); ``inf`` where no source is reached, or none within the cutoff. The
-    half-edge by which a path to a vertex enters lies opposite the vertex. `n_windows` were carried over an edge.
+    Distances are ``inf`` if no source is within reach or the cutoff. The half-edge over which a path to a vertex enters
+    its last face is opposite the vertex. `n_windows` is the number of windows that crossed an edge.
     """
 
     distance: FloatArray
@@ -206,10 +206,10 @@ class ExactSolution:
 
 
 class ExactSurface:
-    """Exact distance on one triangulated surface, for any number of queries; fastest on an intrinsic Delaunay one.
+    """Exact distance on a triangulated surface for any number of queries, fastest on an intrinsic Delaunay one.
 
-    Boundaries, holes, edges of more than two faces, surfaces that cannot be oriented, vertices whose faces are several
-    fans, and components are all allowed. Immutable; threads may share it, and a query releases the interpreter's lock.
+    Boundaries, edges of more than two faces, non-orientable surfaces, vertices with several fans, and several
+    components are allowed. Immutable; threads may share it, and a query releases the interpreter's lock.
     A MeshError if there are too many triangles for 32-bit indices.
     """
 
@@ -231,26 +231,20 @@ class ExactSurface:
     ) -> ExactSolution:
         """Distances from vertices, points and curves, exact on the polyhedral surface to rounding.
 
-        Points of the sources, and the t `targets` whose distance is asked for, lie in the faces that the triangulation
-        was made from; segments need a triangulation that was not flipped. Labels are not read. What is farther than the
-        `cutoff` is ``inf``, and the search ends there. It also ends once the distances of the vertices `goals` (g,), if
-        given, and of the targets are known; those of other vertices may then be too large or ``inf``. If it is
-        `directed`, it is asked for how paths to the vertices leave, see `Origin`, on faces that are oriented alike.
+        Source points, and the t `targets` whose distances are requested, lie in the faces from which the triangulation
+        was made; segments need a triangulation without flips. Labels of the sources are not used. Distances beyond the
+        `cutoff` are ``inf``, and the search ends there. With `goals` (g,), it also ends once the distances of these
+        vertices and of the targets are known; other distances may then be too large or ``inf``. A `directed` search
+        also finds how paths to the vertices leave their roots, see `Origin`, on consistently oriented faces.
 
-        With more than one of the `threads`, two share the search for distances of all vertices, on large surfaces. The
-        distances are the same; of paths that are equally long, another may be found.
+        With `threads` > 1, two threads share a search for the distances of all vertices of a large surface. The
+        distances are the same; among paths of equal length, another one may be found.
 
-        A MemoryError if the windows do not fit into memory, and a ValueError if there are segments or points, and the
-        surface does not know the faces that they refer to.
+        A MemoryError if the windows do not fit into memory, and a ValueError if there are segments or points that the
+        surface cannot locate.
         """
         done = search(
-            self.tables,
-            sources,
-            cutoff=cutoff,
-            targets=targets,
-            goals=goals,
-            directed=directed,
-            threads=threads,
+            self.tables, sources, cutoff=cutoff, targets=targets, goals=goals, directed=directed, threads=threads
         )
         which = done.nearest_copy(0 if targets is None else len(targets))
         distance, origin = self._result(done.found, done, self.tables.number, cutoff)
@@ -266,9 +260,9 @@ class ExactSurface:
         threads: int = 1,
         than: FloatArray | None = None,
     ) -> FloatArray:
-        """Distance (n,) as `solve` finds it, without the origins of the paths.
+        """Distance (n,) as by `solve`, without the origins of the paths.
 
-        With `than`, the distances (n,) from other sources, only what is nearer is searched, and the rest is ``inf``.
+        With `than` (n,), the distances from other sources, only smaller distances are found; the rest is ``inf``.
         """
         tables = self.tables
         upper = None if than is None else tables.scaled(than[tables.old_vertex])
@@ -279,27 +273,27 @@ class ExactSurface:
         return distance
 
     def _with_leaving(self, origin: Origin, done: Searched, leaving: Leaving) -> Origin:
-        """The origin of paths to the vertices with how they leave, in the caller's numbers."""
+        """The origin of the paths to the vertices with its optional fields, in the caller's numbering."""
         number, root = self.tables.number, done.found.root.astype(np.int64)
         origin = origin._replace(corner=self.tables.old_half_edge(leaving.corner[number]))
         if len(done.starts.segments.faces):
             place, direction = _from_curves(self.tables, done, leaving, root)
             return origin._replace(direction=direction[number], place=place[number])
-        # Which triangle a path leaves through does not say by which side of it, if two of them are glued to each other.
+        # By the copy of the point, not by its triangle: of two sides glued to each other, both have a copy in it.
         row = np.flatnonzero((leaving.corner >= 0) & (root >= self.n))
         turn = np.zeros(self.n)
         turn[row] = done.starts.points.turn[root[row] - self.n]
         return origin._replace(direction=leaving.direction[number], turn=turn[number])
 
     def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
-        """Distance and origin of some of the places that the kernel found, in the caller's numbers and unit."""
+        """Distance and origin of some of the kernel's results, in the caller's numbering and unit."""
         tables, starts, label = self.tables, done.starts, done.found.label
         distance = tables.unscaled(found.distance[which])
         within: BoolArray = (distance <= cutoff) & (found.root[which] >= 0)
         root = np.where(within, found.root[which], -1)
-        # Copies of a point or segment on a side are one, and the ends of a segment belong to it.
+        # All copies of a point or segment have one number, and the ends of a segment have that of the segment.
         names = np.concatenate([tables.old_vertex, np.where(starts.place < 0, -1, self.n + starts.place)])
-        # Roots are labelled as vertices are.
+        # A target has the label of its root.
         first = found.label[which] if len(found.label) else label[root]
         origin = Origin(
             starts.label[np.where(within, first, -1)],
@@ -323,7 +317,7 @@ def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources) -> FloatArray:
     return ExactSurface(from_mesh(mesh, int(chosen.vertices[0]))).distance(chosen, threads=n_threads())
 
 
-# A search of the kernel on a front, from some sources; it fills statistics, and returns whether memory sufficed.
+# A search of the kernel from some sources on a front; it fills statistics and returns false if memory ran out.
 _Run = Callable[[windows.Front, Starts, IntArray], bool]
 
 
@@ -338,9 +332,9 @@ def search(
     threads: int = 1,
     upper: FloatArray | None = None,
 ) -> Searched:
-    """Distances on the tables `edges`; keywords and errors are those of `ExactSurface.solve`.
+    """Distances on `tables`; keywords and errors are those of `ExactSurface.solve`.
 
-    Only distances smaller than `upper` (n,) are found, by the numbers of the tables.
+    Only distances smaller than `upper` (n,), in the numbering of the tables, are found.
     """
     n, starts, place = tables.n, starts_at(tables, sources), tables.located(targets)
     wanted = Targets(place, *tables.by_face(place), tables.largest_circle(place), Found.of(len(place.faces), 0))
@@ -352,7 +346,7 @@ def search(
         return windows.search(front, starts, goal, wanted, goals is not None, limit, statistics)
 
     statistics = None
-    # Vertices are found flat by the first search.
+    # Flat vertices are known only after a first search.
     asks_for_all = not len(wanted.place.faces) and goals is None and not directed
     shares = threads > 1 and n >= _FEWEST_SHARED and asks_for_all
     if shares and not (tables.kind == FLAT_VERTEX).any():
@@ -394,9 +388,9 @@ def _beside(tables: Tables, starts: Starts, found: Found, upper: FloatArray | No
 
 
 def _from_curves(tables: Tables, done: Searched, leaving: Leaving, root: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Where the straight last parts of paths leave their roots (n,), as places (n, 3), 0 for none; directions (n, 2).
+    """Barycentric coordinates (n, 3), 0 for none, and directions (n, 2) in which last parts of paths leave their roots.
 
-    All by the numbers of the tables.
+    All arrays are in the numbering of the tables.
     """
     starts, n = done.starts, tables.n
     first_segment = n + len(starts.points.faces)
@@ -414,17 +408,17 @@ def _from_curves(tables: Tables, done: Searched, leaving: Leaving, root: IntArra
 def _from_segments(
     tables: Tables, done: Searched, leaving: Leaving, row: IntArray, which: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Places (k, 3) and directions (k, 2) of the paths to vertices (k,) from segments (k,)."""
+    """Barycentric coordinates (k, 3) of the starts, and directions (k, 2), of paths from segments (k,) to vertices."""
     segments = done.starts.segments
     sides = tables.edges.length.reshape(-1, 3)[segments.faces]
-    # Of each segment, in the plane of the face, as complex numbers.
+    # The segments as complex numbers in the planes of their faces.
     corners = lay_out(sides) @ np.array([1, 1j])
     start, end = np.einsum("qec,qc->eq", segments.barycentric, corners)
     length = np.maximum(np.abs(end - start), np.finfo(float).tiny)
     unit = (end - start) / length
     along, side = leaving.direction[row].T
     way = 1j * side * unit[which]
-    # Corners of the same face: the nearest place.
+    # For corners of the same face: the nearest point of the segment.
     inside = np.flatnonzero(done.found.entered[row] < 0)
     if len(inside):
         i = which[inside]

@@ -1,7 +1,7 @@
-"""What every distance keeps: answers that do not are found again, or moved inside of these bounds.
+"""Invariants of distances. Results that violate them are recomputed by another engine, or moved inside the bounds.
 
-Distance is 0 at the sources, finite exactly on their components, no longer than paths along edges, and no shorter than
-straight lines through space.
+A distance is 0 at the sources, finite exactly on their components, at most the length of paths along edges, and at
+least the length of the straight line through space.
 """
 
 from __future__ import annotations
@@ -24,26 +24,25 @@ from heat_igl.windows.engine import Engine, MeshTriangles, Triangles, WindowEngi
 if TYPE_CHECKING:
     from heat_igl.windows.directions import PathAngles
 
-#: Violations by less than this share of the largest distance are rounding. Answers that are exact to rounding violate
-#: the bounds by up to 1e-9 of it, with coordinates far from the origin.
+#: Violations below this fraction of the largest distance are rounding. With coordinates far from the origin, results
+#: that are exact to rounding violate the bounds by up to 1e-9 of it.
 ROUNDING = 1e-7
-# Lines to so many sources are measured at every vertex; with k times as many, at every k-th.
+# Lines to this number of sources are measured at every vertex; with k times as many sources, at every k-th vertex.
 _SOURCES_AT_ALL = 8
 _NO_LENGTHS = np.empty((0, 3))
 _REPORT = "please report this as a bug, with the mesh and the sources"
-# Less than this fraction of a line is rounding.
+# Distances shorter than the straight line by less than this fraction are left, as rounding.
 _ROUNDING = 1e-12
-# With more sources, a tree finds the nearest sooner than a loop over all, but for the offsets.
+# For more sources, a k-d tree is faster than a loop over all of them; it does not take offsets into account.
 _MANY = 100
 
 
 class Invariants:
-    """Bounds of a distance on triangles or tetrahedra F that are known by the positions V (n, 3) of their vertices.
+    """Bounds of a distance on triangles or tetrahedra F with vertex positions V (n, 3).
 
-    An answer keeps four of them: it is 0 (or the offset) at the sources, finite exactly on their components, differs
-    along an edge by no more than the length of the edge, and is nowhere below the straight line to the nearest source.
-    In place of positions, triangles may have `lengths` (m, 3) of the sides opposite the corners; there are no lines
-    then.
+    A distance is 0 (or the offset) at the sources, is finite exactly on their components, differs along an edge by at
+    most the length of the edge, and is nowhere below the straight line to the nearest source. Triangles may have
+    `lengths` (m, 3) of the sides opposite the corners instead of positions; the last bound is not checked then.
     """
 
     def __init__(
@@ -61,9 +60,9 @@ class Invariants:
         cutoff: float = np.inf,
         than: FloatArray | None = None,
     ) -> str | None:
-        """How an answer (n,) contradicts the bounds, and where; None if it does not.
+        """Which bound a distance (n,) violates, and where; None if it violates none.
 
-        Beyond the cutoff distances may be ``inf``, and also where those `than` (n,) from other sources are not farther.
+        It may be ``inf`` beyond the cutoff, and where the distance `than` (n,) from other sources is not larger.
         """
         distance = np.ascontiguousarray(distance, np.float64)
         nearest = distance if than is None else np.minimum(distance, than)
@@ -80,7 +79,7 @@ class Invariants:
         return found(slack) and found(slack + self._rounding_of_lengths(sources))
 
     def _at_sources(self, distance: FloatArray, sources: SourceSet, cutoff: float, slack: float) -> str | None:
-        """Above what a source itself, or a straight line in its face, gives the vertices there."""
+        """Above the offset of a source, or above the straight line from a source to the corners of its face."""
         vertices, bound = sources.vertices, sources.vertex_offset
         if not sources.on_vertices_alone and self._V is not None:
             points = sources.points.joined(sources.segments.ends())
@@ -98,7 +97,7 @@ class Invariants:
     def contradiction_at(
         self, distance: FloatArray, sources: SourceSet, targets: SurfacePoints | IntArray
     ) -> str | None:
-        """How distances (t,) of vertices or points contradict lines and components; None if they do not."""
+        """How distances (t,) of vertices or points violate the bounds of lines and components; None if they do not."""
         vertices = self._F[targets.faces, 0] if isinstance(targets, SurfacePoints) else targets
         if self._n_components == 1:
             stray = ~np.isfinite(distance)
@@ -115,7 +114,7 @@ class Invariants:
         return self._below_lines(distance, sources, ROUNDING * checking.largest_finite(distance), places)
 
     def _elsewhere(self, distance: FloatArray, sources: SourceSet) -> str | None:
-        """Finite where no source is."""
+        """Finite on a component without a source."""
         if self._n_components == 1:
             return None
         stray = np.isfinite(distance) & ~self._has_source(sources)[self._components]
@@ -124,7 +123,7 @@ class Invariants:
         return None
 
     def _rounding_of_lengths(self, sources: SourceSet) -> float:
-        """By how much lengths are off in the components of sources: thin triangles are widened, places are rounded."""
+        """Error of lengths in the components of the sources, from mollification and from rounding of coordinates."""
         searched = self._has_source(sources)[self._components[self._F[:, 0]]]
         if self._V is None:
             return ROUNDING * float(self._l[searched].mean())
@@ -154,7 +153,7 @@ class Invariants:
     def _below_lines(
         self, distance: FloatArray, sources: SourceSet, slack: float, at: FloatArray | None = None
     ) -> str | None:
-        """Below the lines to vertices, or to positions `at` (t, 3)."""
+        """Below the straight lines to the vertices, or to positions `at` (t, 3)."""
         places = source_places(self._V, self._F, sources, of_curves=True)
         if places is None:
             return None
@@ -168,15 +167,15 @@ class Invariants:
 
 
 def contradicted(problem: str) -> RuntimeError:
-    """The error for an answer that contradicts itself and that nothing replaces."""
+    """The error for a distance that violates the bounds if no other engine can replace it."""
     return RuntimeError(f"the distance contradicts itself ({problem}): {_REPORT}")
 
 
 class GuardedEngine(Engine):
-    """Windows with a check of every answer. A contradiction never leaves it.
+    """Windows with a check of every result, so that no result that violates the invariants is returned.
 
-    Where an answer contradicts the invariants, `others` are asked instead, each made when it is needed, with an
-    `AccuracyWarning`; a RuntimeError if all contradict them.
+    Such a result is replaced by that of the first of the `others` that satisfies them, created on demand, with an
+    `AccuracyWarning`; a RuntimeError if none does.
     """
 
     def __init__(self, windows: WindowEngine, invariants: Invariants, others: tuple[Callable[[], Engine], ...]) -> None:
@@ -189,14 +188,14 @@ class GuardedEngine(Engine):
         return found if problem is None else self._replacement(problem, sources, cutoff, threads)[0]
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
-        """As of all engines."""
+        """Distance (n,) where it is smaller than `than`, see `Engine`."""
         found = self.windows.nearer(sources, than, threads)
         if self._invariants.contradiction(found, sources, np.inf, than) is None:
             return found
         return super().nearer(sources, than, threads)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
-        """Distance (n,), and the source (n,) that it is measured from."""
+        """Distance (n,) and nearest source (n,)."""
         found = self.windows.labelled(sources, cutoff, threads)
         problem = self.problem(found[0], sources, cutoff)
         return found if problem is None else self._replacement(problem, sources, cutoff, threads)
@@ -212,7 +211,7 @@ class GuardedEngine(Engine):
         return self._replacement(problem, sources, np.inf, 1)[0][targets]
 
     def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
-        """Distance and directions, see `WindowEngine.directed`: no other engine finds these."""
+        """Distance and directions, see `WindowEngine.directed`; no other engine computes directions."""
         found = self.windows.directed(sources)
         problem = self.problem(found[0], sources)
         if problem is not None:
@@ -220,7 +219,7 @@ class GuardedEngine(Engine):
         return found
 
     def problem(self, distance: FloatArray, sources: SourceSet, cutoff: float = np.inf) -> str | None:
-        """How an answer (n,) contradicts the invariants; None if it does not."""
+        """How a distance (n,) violates the invariants; None if it does not."""
         return self._invariants.contradiction(distance, sources, cutoff)
 
     def _replacement(
@@ -255,7 +254,7 @@ def guarded_windows(
 
 
 def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:
-    """Distances (k, n) from each of some vertices, in place of local answers that contradict themselves."""
+    """Distances (k, n) from each vertex, to replace results of local searches that violate the invariants."""
     if not len(vertices):
         return np.empty((0, mesh.n_vertices))
     warn_caller(
@@ -270,10 +269,10 @@ def distances_instead(mesh: Mesh, vertices: IntArray) -> FloatArray:
 def source_places(
     V: FloatArray | None, F: IntArray | None, sources: SourceSet, *, of_curves: bool = False
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Positions (k, 3) and offsets (k,) of the sources; None where they are not known.
+    """Positions (k, 3) and offsets (k,) of the sources; None if they are not known.
 
-    A curve has no one position; if asked for, the places `of_curves` are the ends of segments, with offsets that are
-    less by half the length of the segment: no point of it is farther from both.
+    With `of_curves`, a curve is represented by the ends of its segments, with offsets reduced by half the length of the
+    segment: this gives a lower bound, since each point of a segment is within this length of one of its ends.
     """
     if V is None:
         return None
@@ -291,10 +290,10 @@ def source_places(
 
 
 def raise_to_lines(distance: FloatArray, V: FloatArray | None, F: IntArray | None, sources: SourceSet) -> bool:
-    """Raise distances (n,) to the straight lines from the nearest source, in place, if its place is known.
+    """Raise distances (n,) in place to the straight line to the nearest source, if positions are known.
 
-    Of many sources with different offsets, they are raised to the line to the nearest with the least offset alone.
-    Returns whether no distance is below a line then.
+    For many sources with different offsets, the bound is weaker: the line to the nearest one plus the smallest offset.
+    Returns whether no distance is below the lines afterwards.
     """
     places = source_places(V, F, sources)
     if V is None or places is None:
@@ -311,7 +310,7 @@ def raise_to_lines(distance: FloatArray, V: FloatArray | None, F: IntArray | Non
 
 
 def edge_paths(*triangulations: IntrinsicTriangulation | None) -> Any:
-    """Paths along the edges of triangulations that have vertices in common, each edge once; None without any."""
+    """Paths along the edges of triangulations of the same vertices, each edge once; None without triangulations."""
     known = [each for each in triangulations if each is not None]
     kernel: Any = checking.EdgePaths
     paths = kernel(np.empty((0, 2), np.int32), np.empty(0), max((each.n for each in known), default=0))

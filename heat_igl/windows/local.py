@@ -1,6 +1,6 @@
-"""Exact distances between vertices that are near each other, each query at the cost of what it touches.
+"""Exact distances between nearby vertices; the cost of a query depends on the part of the mesh that it visits.
 
-Searches by windows from one vertex after the other run on all processors. Each ends when the question is answered.
+Window searches, each from a single vertex, run on all processors. Each ends once its distances are known.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from heat_igl.windows.exact import TOLERANCE, Found, Leaving
 from heat_igl.windows.guards import ROUNDING, distances_instead
 from heat_igl.windows.tables import Tables, from_mesh
 
-# Bytes that each distance of a sparse array takes while the array is put together.
+# Peak memory per stored distance while a sparse array is assembled, in bytes.
 _BYTES = 48
-# Where more are asked for than the mesh has vertices, the most entries of the result.
+# Largest result, in entries, if more vertices are requested than the mesh has.
 _MOST_PADDED = 2**28
-#: The most sources that a thread takes at a time.
+#: Largest number of sources that a thread takes at a time.
 CHUNK = 64
-# Initial number of results that a thread has room for.
+# Initial capacity of a thread's result arrays.
 _ROOM = 2**16
 _NO_VERTICES = np.empty(0, np.int32)
 _NONE_WRONG = np.empty(0, bool)
@@ -41,31 +41,32 @@ _NO_WAYS, _NO_LINES = np.empty((0, 3), np.int32), np.empty((0, 3))
 def distances_within(
     mesh: MeshLike, radius: float, sources: Sources | None = None, *, region: ArrayLike | None = None
 ) -> sp.csr_array:
-    """Exact distances from each of some vertices to all vertices up to a radius.
+    """Exact distances from each source vertex to all vertices within a radius.
 
     Parameters
     ----------
     mesh : mesh
         Triangles on n vertices: whatever `as_mesh` takes.
     radius : float
-        In the mesh's unit, positive; ``inf`` for all that can be reached.
+        Positive, in the unit of the mesh; ``inf`` for all reachable vertices.
     sources : int, sequence of int, or (n,) mask of bool, optional
-        The k vertices that are asked, each for itself; all n if not given.
+        The k source vertices, one row each; all n if not given.
     region : (n,) or (m,) array_like of bool, optional
-        What paths may enter, as for `GeodesicSolver`. Without sources, rows of vertices elsewhere are empty.
+        The vertices or faces that paths may enter, as for `GeodesicSolver`. Without sources, rows of vertices outside
+        the region are empty.
 
     Returns
     -------
     scipy.sparse.csr_array
-        Shape (k, n), in the mesh's unit, with sorted indices. What is stored is a distance, the 0 of a vertex from
-        itself too; what is not stored is farther than the radius.
+        Shape (k, n), in the unit of the mesh, with sorted indices. Stored entries are distances, including the 0 of a
+        vertex from itself; vertices without an entry are farther than the radius.
 
     Raises
     ------
     ValueError
         If `radius` is not a positive number.
     MemoryError
-        If the distances up to this radius will not fit into memory, as soon as the first searches tell.
+        If the distances within this radius are estimated, from the first searches, not to fit into memory.
     MeshError
         If the mesh cannot be used, or is tetrahedral.
     SourceError
@@ -90,10 +91,9 @@ def distances_within(
 def blocks_within(
     mesh: MeshLike, radius: float, sources: Sources | None = None, most_entries: int = 2**24
 ) -> Iterator[sp.csr_array]:
-    """The rows of `distances_within`, some after the other, so that not all need fit into memory.
+    """The rows of `distances_within` in blocks, so that the whole matrix need not fit into memory.
 
-    About `most_entries` distances are in memory at a time: the first block has few rows, and says how many the next
-    has.
+    Blocks have about `most_entries` distances; the first has few rows, and is used to estimate the next.
     """
     limit = positive("radius", radius, infinite=True)
     triangles, part = _triangles(mesh)
@@ -132,22 +132,21 @@ def _rows_within(triangles: Mesh, tables: Tables, chosen: IntArray, limit: float
 def nearest_vertices(
     mesh: MeshLike, k: int, sources: Sources | None = None, *, region: ArrayLike | None = None
 ) -> tuple[IntArray, FloatArray]:
-    """The k vertices nearest to each of some vertices, by exact distance.
+    """The k vertices nearest to each source vertex, by exact distance.
 
     Parameters
     ----------
     k : int
-        How many vertices; the vertex itself is the first of them.
+        Number of vertices, including the source itself, which comes first.
     mesh, sources, region
-        As for `distances_within`, s sources; without these, vertices outside the region have no nearest ones.
+        As for `distances_within`, with s sources; without sources, rows of vertices outside the region are -1.
 
     Returns
     -------
     indices : (s, k) int64
-        In the order of their distance, and of equally near ones of their index. If fewer than k can be reached, the
-        rest is -1.
+        By ascending distance, ties by ascending index; -1 in the last columns if fewer than k vertices are reachable.
     distances : (s, k) float64
-        In the mesh's unit; ``inf`` where the index is -1.
+        In the unit of the mesh; ``inf`` where the index is -1.
 
     Raises
     ------
@@ -170,7 +169,7 @@ def nearest_vertices(
     triangles, part = _triangles(mesh, region)
     chosen = _chosen(sources, triangles, part)
     tables = from_mesh(triangles, int(chosen[0]))
-    # More than all vertices cannot be found.
+    # No more vertices than the mesh has can be found.
     wanted = min(int(k), triangles.n_vertices)
     indices, distances = _unfilled(len(chosen), int(k), triangles.n_vertices)
     order, near = search_each(tables, chosen, triangles.V, lambda work, numbers, _: work.nearest(numbers, wanted))
@@ -190,8 +189,8 @@ def nearest_vertices(
 
 
 def _unfilled(s: int, k: int, n: int) -> tuple[IntArray, FloatArray]:
-    """Indices and distances (s, k) of nothing."""
-    # Before the arrays are filled, a system may give away more memory than it has.
+    """Indices -1 and distances ``inf`` (s, k)."""
+    # The operating system may grant more memory than it has, and fail only when the arrays are filled.
     if k <= n or s * k <= _MOST_PADDED:
         try:
             return np.full((s, k), -1, np.int64), np.full((s, k), np.inf)
@@ -205,22 +204,22 @@ def _unfilled(s: int, k: int, n: int) -> tuple[IntArray, FloatArray]:
 
 @names_guessed
 def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None = None) -> FloatArray:
-    """Exact distance between the two vertices of each of some pairs.
+    """Exact distance between the two vertices of each pair.
 
     Parameters
     ----------
     mesh : mesh
         Triangles: whatever `as_mesh` takes.
     pairs : (p, 2) array_like of int
-        Vertices. Pairs with the same first vertex share one search, which ends at the farthest of the second ones.
-        A search for one pair leaves out what is too far from the second vertex along a straight line in space.
+        Vertices. Pairs with the same first vertex share one search, which ends at the farthest second vertex. A search
+        for a single pair drops paths whose straight distance to the second vertex is too large.
     region : (n,) or (m,) array_like of bool, optional
-        What paths may enter, as for `GeodesicSolver`. The first vertices must lie there.
+        The vertices or faces that paths may enter, as for `GeodesicSolver`. The first vertices must be inside.
 
     Returns
     -------
     (p,) float64
-        In the mesh's unit; ``inf`` for vertices of different components.
+        In the unit of the mesh; ``inf`` for vertices of different components.
 
     Raises
     ------
@@ -264,7 +263,7 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None
 
 
 class _Count:
-    """Counts the distances from some of k sources: says how long the rest takes, or that they will be too many."""
+    """Counts the distances found from k sources: reports the remaining time; a MemoryError if they will not fit."""
 
     def __init__(self, k: int, most: float) -> None:
         self._k, self._most = k, most
@@ -286,7 +285,7 @@ class _Count:
 
 
 def _triangles(mesh: MeshLike, region: ArrayLike | None = None) -> tuple[Mesh, MeshPart | None]:
-    """The triangles that paths may enter, on all vertices; and the part of the mesh that they are."""
+    """The triangles that paths may enter, on all vertices, and the part of the mesh given by the region."""
     triangles = as_simplices(mesh)
     if triangles.is_tetrahedral:
         raise MeshError("exact distances need triangles, and the mesh holds tetrahedra: take distance_matrix")
@@ -304,7 +303,7 @@ def _chosen(sources: Sources | None, mesh: Mesh, part: MeshPart | None) -> IntAr
 
 
 def _with_empty_rows(found: sp.csr_array, rows: IntArray) -> sp.csr_array:
-    """A matrix (n, n) with these rows (k,), and others empty."""
+    """A matrix (n, n) with the k rows of `found` at `rows` (k,), and empty rows elsewhere."""
     n = found.shape[1]
     counts = np.zeros(n, found.indptr.dtype)
     counts[rows] = np.diff(found.indptr)
@@ -333,8 +332,8 @@ def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:
 class Near(NamedTuple):
     """The number of vertices found from each source, and the vertices and their distances, source after source.
 
-    From a directed search, `way` and `line` (r, 3) say how the path to each runs, see `windows.search_each`.
-    What was found from a source `is_wrong` if it contradicts straight lines or the lengths of edges.
+    From a directed search, `way` and `line` (r, 3) describe the path to each vertex, see `windows.search_each`.
+    `is_wrong` marks sources whose distances violate the bounds of straight lines or edge lengths.
     """
 
     counts: IntArray
@@ -346,14 +345,14 @@ class Near(NamedTuple):
 
     @classmethod
     def joined(cls, parts: list[Near]) -> Near:
-        """The answers of several searches, one after the other."""
+        """The concatenated results of several searches."""
         return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 class Workspace:
-    """The arrays that searches of one thread write. Every search leaves them in their initial state.
+    """The arrays that the searches of one thread write. Every search restores their initial state.
 
-    With `directed`, searches find in which directions paths leave; the faces must be oriented alike.
+    With `directed`, searches also find the directions of paths; this requires consistently oriented faces.
     """
 
     def __init__(self, tables: Tables, position: FloatArray, directed: bool = False) -> None:
@@ -363,7 +362,7 @@ class Workspace:
         self._front = windows.Front(tables, self._found, TOLERANCE, leaving, position.ravel())
 
     def checked(self, sources: AnyArray, near: Near, limit: FloatArray | float) -> Near:
-        """The answers with those that are wrong marked; each holds all vertices up to its limit."""
+        """The results with `is_wrong` set; each must hold all vertices within its limit."""
         tables, limits = self._tables, np.broadcast_to(limit, len(near.counts)).astype(np.float64)
         found = tables.number[near.vertex]
         answers = sources, near.counts, found, near.distance, limits
@@ -383,7 +382,7 @@ class Workspace:
         way: AnyArray = _NO_WAYS,
         line: FloatArray = _NO_LINES,
     ) -> IntArray:
-        """Search from each of `sources`; returns the end of the results of each source whose results fitted."""
+        """Search from each source; returns the ends of the results of those sources whose results fitted."""
         ends = np.zeros(len(sources), np.int64)
         n_done = windows.search_each(
             self._front,
@@ -405,7 +404,7 @@ class Workspace:
         return ends[:n_done]
 
     def within(self, sources: AnyArray, radius: float) -> Near:
-        """All vertices up to a radius; the arrays are doubled until the results of the next source fit."""
+        """All vertices within a radius; the arrays are doubled until the results of the next source fit."""
         rows, done, room = [], 0, _ROOM
         while done < len(sources):
             found, value = np.empty(room, np.int32), np.empty(room)
@@ -443,10 +442,10 @@ def search_each(
     search: Callable[[Workspace, AnyArray, slice], Near],
     directed: bool = False,
 ) -> tuple[IntArray, Near]:
-    """What is found from each of some vertices (k,): the order in which they were asked, and the answers in this order.
+    """Searches from k vertices on all processors: returns the order in which they ran, and the results in this order.
 
-    `search` is called on all processors, for some sources at a time, by their numbers in the tables, and their places
-    in the order. In ascending order, a search often finds its data in the processor's cache. V are the positions (n, 3)
+    `search` is called for several sources at a time, with their numbers in the tables and a slice of the order. In
+    ascending order of these numbers, a search often finds its data in the processor's cache. V (n, 3) are the positions
     of the vertices.
     """
     number = tables.number[vertices]

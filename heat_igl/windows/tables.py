@@ -1,4 +1,4 @@
-"""A triangulated surface as the windows read it: half-edges in the order of a front, and points in them."""
+"""A triangulated surface in the layout of the window kernels: renumbered half-edges, and points in them."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourcePoints, SourceSegments
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-#: Windows cross triangles that are this thin, in mean edge lengths: just more than rounding. With the margin of
-#: `mollify`, paths across needles were up to 3e-4 of themselves too long.
+#: Mollification for windows, in mean edge lengths: just more than rounding. With the default margin of `mollify`, paths
+#: across needles were too long by up to 3e-4 of their length.
 MARGIN = 1e-12
-# A point whose barycentric coordinate is below this lies on the side of its face.
+# A point with a barycentric coordinate below this lies on the side of its face.
 _ON_SIDE = 1e-13
-# Up to so many faces, the tables stay in the caches in any order in which most neighbours are at most so far apart.
-_FEW_FACES = 30_000
-_NEAR = 768
-# Powers of two up to here, and their inverses, are normal numbers.
+# Up to _FEW_FACES faces, the tables fit into the caches, and stay as they are if the numbers of most adjacent faces
+# differ by at most _NEAR.
+_FEW_FACES, _NEAR = 30_000, 768
+# Two to the power of this, and its inverse, are normal floating-point numbers.
 _LARGEST_EXPONENT = 1000
 
 
 class Located(NamedTuple):
-    """Points in the triangles, by their new numbers; one on a side, once for every triangle there; contiguous.
+    """Points in renumbered triangles. A point on a side has a copy in every triangle there. Arrays are contiguous.
 
     Attributes
     ----------
     faces : (q,) int32
-        Triangle of each.
+        Triangle of each copy.
     barycentric : (q, 3) float64
-        Coordinates in it; exactly 0 on a side.
+        Barycentric coordinates in it; exactly 0 on a side.
     point : (q,) int64
-        Which point it is.
+        Index of the point.
     turn : (q,) float64
-        What is added to the angle of a direction in the triangle to count it in the first triangle of the same point:
-        both count from the side of corners 0 and 1. On faces that are oriented alike.
+        Angle to be added to the angle of a direction in this triangle to get the angle in the first triangle of the
+        point; both are measured from the side of corners 0 and 1. Requires consistently oriented faces.
     """
 
     faces: AnyArray
@@ -65,20 +65,20 @@ NO_SEGMENTS = NO_POINTS._replace(barycentric=np.empty((0, 2, 3)))
 
 
 class Tables:
-    """What a search by windows reads of a surface, with vertices and faces numbered anew.
+    """The arrays that a window search reads of a surface, with renumbered vertices and faces.
 
     Parameters
     ----------
     edges : HalfEdges
-        The triangles, by the new numbers. Their lengths are scaled in place.
+        The renumbered triangles. Their lengths are scaled in place.
     number : (n,) int32
-        Number of each vertex of the caller.
+        The new number of each of the caller's vertices.
     face : (m,) int32
         The caller's number of each face.
     exponent : int
         Lengths are in units of ``2 ** exponent``.
     triangulation : IntrinsicTriangulation, optional
-        What the tables were made from, to locate points.
+        The triangulation from which the tables were made, to locate points.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Tables:
     ) -> None:
         self.edges, self.number, self.face = edges, number, face
         m, n = len(face), len(number)
-        # By a power of two: no digit changes, and no square leaves the range of doubles.
+        # Scaling by a power of two is exact, and keeps squares within the range of doubles.
         shift = mean_exponent(edges.length)
         _times_power(edges.length, -shift, out=edges.length)
         self.n, self.exponent = n, exponent + shift
@@ -108,7 +108,7 @@ class Tables:
 
     @cached_property
     def old_vertex(self) -> IntArray:
-        """The caller's number (n,) of each vertex."""
+        """The caller's number of each vertex (n,)."""
         vertex = np.empty(self.n, np.int64)
         vertex[self.number] = np.arange(self.n)
         return vertex
@@ -122,12 +122,12 @@ class Tables:
         return _times_power(lengths, self.exponent)
 
     def old_half_edge(self, half_edge: AnyArray) -> IntArray:
-        """Half-edges by the caller's numbers; -1 stays."""
+        """Half-edges in the caller's numbering; -1 stays."""
         old = 3 * self.face[half_edge // 3].astype(np.int64) + half_edge % 3
         return np.asarray(np.where(half_edge >= 0, old, -1))
 
     def located(self, points: SurfacePoints | SourcePoints | None) -> Located:
-        """Points of the mesh in the triangles; a ValueError if the tables keep no history, as those of `from_mesh`."""
+        """Points of the mesh in the triangles; a ValueError for tables without history, as those of `from_mesh`."""
         if points is None or not len(points.faces):
             return NO_POINTS
         if self._triangulation is None:
@@ -137,9 +137,9 @@ class Tables:
         return located._replace(barycentric=located.barycentric[:, 0])
 
     def located_segments(self, segments: SourceSegments) -> Located:
-        """Segments in the triangles: as `located`, with coordinates (q, 2, 3) of both ends.
+        """Segments in the triangles, as `located`, with coordinates (q, 2, 3) of both ends.
 
-        A ValueError if the triangles are not those that the segments were given in.
+        A ValueError if the triangles are not those in which the segments were given.
         """
         if not len(segments.faces):
             return NO_SEGMENTS
@@ -149,7 +149,7 @@ class Tables:
         return self._on_all_faces(ends[0][0], np.stack([end[1] for end in ends], axis=1))
 
     def _on_all_faces(self, faces: IntArray, barycentric: FloatArray) -> Located:
-        """Sets of places (k, e, 3), by new numbers; those on a side, once more for every other face there."""
+        """Sets of e points each (k, e, 3) in renumbered faces, with a copy for every further face at a side."""
         t = self.edges
         new_face = np.empty(self.face.max() + 1, np.int64)
         new_face[self.face] = np.arange(len(self.face))
@@ -162,7 +162,7 @@ class Tables:
         i, c = np.nonzero(is_zero & (is_zero.sum(axis=1) == 1)[:, None])
         start = here = 3 * faces[i] + c
         while len(here):
-            # To the other triangle at the side, or to the next of many, until all have been met.
+            # Go to the other triangle at the side, or to the next of several, until all have been visited.
             there = np.where(t.twin[here] >= 0, t.twin[here], t.ring[here]).astype(np.int64)
             go_on = there != start
             i, c, start, here = i[go_on], c[go_on], start[go_on], there[go_on]
@@ -172,13 +172,13 @@ class Tables:
             other, k = np.zeros((len(i), *barycentric.shape[1:])), np.arange(len(i))
             other[k, :, (here + 1) % 3] = np.where(same_way, tail, head)
             other[k, :, (here + 2) % 3] = np.where(same_way, head, tail)
-            # The same side runs the other way there.
+            # The direction of the side is reversed there.
             rows.append((here // 3, other, point[i], np.angle(-self._along(start) * self._along(here).conj())))
         faces, barycentric, point, turn = (np.concatenate(column) for column in zip(*rows, strict=True))
         return Located(faces.astype(np.int32), np.ascontiguousarray(barycentric), point, turn)
 
     def _along(self, half_edge: IntArray) -> AnyArray:
-        """Half-edges (k,) as complex numbers in their triangles, of which the side of corners 0 and 1 is real."""
+        """Half-edges (k,) as complex numbers in their triangles, in which the side of corners 0 and 1 is real."""
         corners = lay_out(self.edges.length.reshape(-1, 3)[half_edge // 3]) @ np.array([1, 1j])
         k = np.arange(len(half_edge))
         return np.asarray(corners[k, (half_edge + 2) % 3] - corners[k, (half_edge + 1) % 3])
@@ -197,7 +197,7 @@ class Tables:
         return first, following
 
     def largest_circle(self, located: Located) -> float:
-        """Diameter of the largest circle around a triangle that holds a point; 0 without points."""
+        """Diameter of the largest circumcircle of a triangle with a point; 0 without points."""
         if not len(located.faces):
             return 0.0
         sides = self.edges.length.reshape(-1, 3)[located.faces]
@@ -206,7 +206,7 @@ class Tables:
 
 def from_triangulation(triangulation: IntrinsicTriangulation) -> Tables:
     """The tables of a triangulation; a MeshError if there are too many triangles for 32-bit indices."""
-    # Windows would go on in every copy of a face, and multiply.
+    # Windows would be propagated in every copy of a face, and multiply.
     once, kept = each_face_once(triangulation)
     edges, number, face = HalfEdges.of(once).numbered(once.n)
     if once is not triangulation:
@@ -217,10 +217,10 @@ def from_triangulation(triangulation: IntrinsicTriangulation) -> Tables:
 
 
 def from_mesh(mesh: Mesh, start: int) -> Tables:
-    """The tables of the intrinsic Delaunay triangulation of a mesh that is asked once, for distances from vertices.
+    """The tables of the intrinsic Delaunay triangulation of a mesh without a history, for distances from vertices.
 
-    Without a history of the flips. What is near vertex `start` comes first in memory, unless the mesh is small and most
-    neighbours are near each other as they are: then numbers stay.
+    Faces are sorted in memory by their distance from vertex `start`, unless the mesh is small and most adjacent faces
+    have close numbers: then the numbering is kept.
     """
     edges, exponent = HalfEdges.of_mesh(mesh)
     if (edges.twin == -2).any():
@@ -241,4 +241,4 @@ def _times_power(lengths: FloatArray | float, exponent: int, out: FloatArray | N
     """Lengths times ``2 ** exponent``, in place of `out` if that is given."""
     if abs(exponent) > _LARGEST_EXPONENT:
         return np.asarray(np.ldexp(lengths, exponent, out=out))
-    return np.asarray(np.multiply(lengths, 2.0**exponent, out=out))  # the same bits, ten times as fast
+    return np.asarray(np.multiply(lengths, 2.0**exponent, out=out))  # the same bits as ldexp, ten times as fast

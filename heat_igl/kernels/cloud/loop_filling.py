@@ -1,4 +1,4 @@
-"""Triangles in the gaps of a surface of points: ears cut from the loops of the outer edges, in space."""
+"""Fill gaps of a triangulated point cloud: ears are clipped from the loops of boundary edges in space."""
 
 import cython
 import numpy as np
@@ -12,14 +12,14 @@ def torn_points(
     is_part: cython.const[cython.uchar][::1],
     edges_away: cython.Py_ssize_t,
 ):
-    """Of the first points of the rows `nearest` (k, j), those from which one of the others is many edges away.
+    """The first points of those rows of `nearest` (k, j) of which another point is more than `edges_away` edges away.
 
-    Beside another sheet, that is where a thin part is torn. Others that are in no part (n,) do not count.
+    Next to another sheet, thin parts are torn there. Other points outside all parts (`is_part` (n,)) are ignored.
     """
     n: cython.Py_ssize_t = is_part.shape[0]
     torn = np.zeros(nearest.shape[0], np.bool_)
     is_torn: cython.uchar[::1] = torn.view(np.uint8)
-    # The triangles at each point, one after the other, and the last row from which it was reached.
+    # Linked lists of the corners at each point, and the last row whose search reached the point.
     head: cython.int[::1] = np.full(n, -1, np.int32)
     following: cython.int[:, ::1] = np.empty((F.shape[0], 3), np.int32)
     row_of: cython.int[::1] = np.full(n, -1, np.int32)
@@ -61,12 +61,12 @@ def filling_triangles(
     most_bent: cython.double,
     most_folded: cython.double,
 ):
-    """Triangles between the fans of a point, and in the loops of outer edges.
+    """Triangles between the fans of a point, and in the loops of boundary edges.
 
-    Of each loop, the ear with the smallest circumscribed circle is cut off again and again, as long as one may be: a
-    small gap is filled, and of a hole or of the border the notches. Before these come ears that join two fans of a
-    point, however large, that with the shortest third side first. Ears that fold back are cut last, and only where
-    nothing is left of the loop then, as in creases.
+    The ear with the smallest circumcircle is clipped from a loop repeatedly, as long as an ear is admissible: this
+    fills small gaps, and notches of holes and of the boundary. Ears that join two fans of a point come first, whatever
+    their size, in ascending order of the third side. Ears that fold back come last, and are kept only if they close
+    the loop, as in creases.
 
     Parameters
     ----------
@@ -75,35 +75,35 @@ def filling_triangles(
     F : (m, 3) int32
         All triangles at the points of gaps.
     twin : (3 m,) int32
-        The side of another triangle on each side, which is opposite to the corner of its number; negative if outer.
+        The half-edge glued to each half-edge ``3 f + c``, which is opposite to corner c; negative on the boundary.
     is_gap : (n,) bool
-        The points of gaps, at the ends of outer edges.
+        The points of gaps, ends of boundary edges.
     largest : (n,) float64
-        Largest radius of circles through each point.
+        Largest admissible circumradius of triangles at each point.
     most_bent, most_folded : float
-        Cosines of the angle to the neighbour at an edge, 1 where the two lie on each other: the largest of triangles
-        that are cut first, and of those in loops of which nothing is left.
+        Largest admissible cosine of the dihedral angle to a neighbour, 1 for triangles folded onto each other: for
+        ears that are clipped first, and for ears that close a loop.
 
     Returns
     -------
     triangles : (t, 3) int32
     is_whole : (t,) bool
-        Whether they are in a loop of which nothing is left, and join no fans.
+        Whether the triangle is in a loop that was filled completely, and joins no fans.
     """
     n_sides: cython.Py_ssize_t = twin.shape[0]
     k: cython.Py_ssize_t = np.count_nonzero(np.asarray(twin) < 0)
     found, whole = np.empty((k, 3), np.int32), np.empty(k, np.bool_)
     is_whole: cython.uchar[::1] = whole.view(np.uint8)
     triangles: cython.int[:, ::1] = found
-    # Where a loop goes on that comes to end 2 h + d of the outer side h, its beginning for d = 0; -1 if nowhere.
+    # The end at which a loop continues after end 2 h + d of the boundary side h (d = 0 at its tail); -1 if nowhere.
     partner: cython.int[::1] = np.full(2 * n_sides, -1, np.int32)
-    # How many fans there are at each point beside the first. Triangles between them are counted down.
+    # The number of fans at each point minus one, decreased by each triangle between two fans.
     joints: cython.int[::1] = np.zeros(P.shape[0], np.int32)
     seen: cython.uchar[::1] = np.zeros(n_sides, np.uint8)
     ring: cython.int[:, ::1] = np.empty((2, k), np.int32)
     fans: cython.int[:, ::1] = np.empty((3, k), np.int32)
     cost: cython.double[::1] = np.empty(k)
-    # The edges at each lower end, one after the other.
+    # Linked lists of the edges, each at the end with the lower index.
     head: cython.int[::1] = np.full(P.shape[0], -1, np.int32)
     link: cython.int[:, ::1] = np.empty((n_sides + k, 2), np.int32)
     count: cython.Py_ssize_t = 0
@@ -159,9 +159,9 @@ def _find_loops(
     link: cython.int[:, ::1],
     fans: cython.int[:, ::1],
 ) -> cython.void:
-    """Find the partner of each end of an outer side: in its fan if that is the only one of its point, else in the next.
+    """Find the partner of each end of a boundary side: in the same fan if its point has one fan, else in the next fan.
 
-    Also the number of further fans; `head` is left as it was.
+    `joints` takes the number of further fans. `head` is restored.
     """
     for end in range(partner.shape[0]):
         v: cython.int = _at_end(F, end)
@@ -170,7 +170,7 @@ def _find_loops(
             continue
         at: cython.int = end
         while True:
-            # The other side of the triangle at the same point, and the same edge in the neighbour.
+            # Go to the other side of the triangle at the same point, and to the same edge in the neighbour.
             side = 3 * (at // 6) + (at // 2 % 3 + 2 - at % 2) % 3
             at = 2 * side + 1 - at % 2
             if twin[side] < 0:
@@ -179,7 +179,7 @@ def _find_loops(
             at += _at_end(F, at) != v
         partner[end] = at
         if end % 2 == 0 and at % 2 == 1:
-            # A fan whose border runs through it; those of a point are linked.
+            # An open fan, whose boundary runs through the point. The fans of a point are linked.
             joints[v] += head[v] >= 0
             link[end // 2, 0], head[v] = head[v], end
     for v in range(head.shape[0]):
@@ -201,9 +201,9 @@ def _in_one_round(
     fans: cython.int[:, ::1],
     k: cython.Py_ssize_t,
 ) -> cython.void:
-    """Make k fans of a point follow one another in a single round, the nearest ends first.
+    """Join k fans of a point into one cycle by setting `partner`, the nearest ends first.
 
-    Rows of `fans` are their two ends and the chain to which each belongs.
+    Rows of `fans` are the two ends of each fan and the chain to which the fan belongs.
     """
     first: cython.Py_ssize_t = 0
     second: cython.Py_ssize_t = 0
@@ -237,9 +237,9 @@ def _loop(
     seen: cython.uchar[::1],
     ring: cython.int[:, ::1],
 ) -> cython.Py_ssize_t:
-    """The points of the loop from an outer side on, and the corners opposite to the sides; their number, 0 if it ends.
+    """Collect the points of the loop from a boundary side on, and the opposite corners; their number, 0 if not closed.
 
-    It goes against the triangle of the first side, so that triangles in the loop run like those around it.
+    The loop runs against the orientation of the first side's triangle, so new triangles are oriented like those around.
     """
     size: cython.Py_ssize_t = 0
     at: cython.Py_ssize_t = 2 * start + 1
@@ -269,7 +269,7 @@ def _fill(
     triangles: cython.int[:, ::1],
     is_whole: cython.uchar[::1],
 ) -> cython.Py_ssize_t:
-    """Cut ears from a ring of points while there are any; how many. Each enters its third side as an edge."""
+    """Clip admissible ears from a ring of points; returns their number. The third side of each is added as an edge."""
     count: cython.Py_ssize_t = 0
     flat: cython.Py_ssize_t = -1
     limit: cython.double = most_bent
@@ -282,7 +282,7 @@ def _fill(
                 best = i
         if cost[best] == INFINITY:
             if flat >= 0:
-                # What was cut last closes nothing, and goes with its edges.
+                # The folded ears do not close the loop: remove them and their edges.
                 for i in range(count - 1, flat - 1, -1):
                     head[min(triangles[i, 0], triangles[i, 2])] = link[n_edges + i, 1]
                 return flat
@@ -292,7 +292,7 @@ def _fill(
             continue
         before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
         after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
-        # In the meantime its third side may have become an edge, or all fans there may be joined.
+        # Since its cost was computed, its third side may have become an edge, or all fans there may have been joined.
         is_edge: cython.bint = size > 3 and _is_edge(head, link, ring[POINT, before], ring[POINT, after])
         if is_edge or (cost[best] < 0.0 and joints[ring[POINT, best]] == 0):
             cost[best] = INFINITY if is_edge else _ear(P, ring, size, best, joints, largest, head, link, limit)
@@ -307,7 +307,7 @@ def _fill(
         size -= 1
         for i in range(best, size):
             ring[POINT, i], ring[BEYOND, i], cost[i] = ring[POINT, i + 1], ring[BEYOND, i + 1], cost[i + 1]
-        # The two neighbours have other ears now.
+        # The ears of the two neighbours have changed.
         for i in range(best - 1, best + 1):
             j: cython.Py_ssize_t = (i + size) % size
             cost[j] = _ear(P, ring, size, j, joints, largest, head, link, limit)
@@ -329,9 +329,9 @@ def _ear(
     link: cython.int[:, ::1],
     most_folded: cython.double,
 ) -> cython.double:
-    """Radius of the circle through point i of a ring and its neighbours; infinite if it may not be cut.
+    """Circumradius of the ear at point i of a ring; infinite if the ear is not admissible.
 
-    Negative if it joins two fans, and the smaller the shorter the third side is.
+    Negative if the ear joins two fans: minus the inverse square of the third side, so shorter sides come first.
     """
     before: cython.Py_ssize_t = size - 1 if i == 0 else i - 1
     after: cython.Py_ssize_t = 0 if i == size - 1 else i + 1
@@ -346,7 +346,7 @@ def _ear(
             square += (P[c, x] - P[a, x]) * (P[c, x] - P[a, x])
         return -1.0 / square if square > 0.0 else -INFINITY
     radius: cython.double = _circumradius(P, a, b, c)
-    # The last triangle has no edge of its own, and closes the gap even if its corners lie on a line.
+    # The last triangle adds no edge, and closes the gap even if its corners are collinear.
     if size > 3 and radius >= min(largest[a], min(largest[b], largest[c])):
         return INFINITY
     folded: cython.double = max(_fold(P, a, b, c, ring[BEYOND, before]), _fold(P, b, c, a, ring[BEYOND, i]))
@@ -391,7 +391,7 @@ def _circumradius(
         third += (to_a - to_c) * (to_a - to_c)
     double_area: cython.double = sqrt(max(u * v - along * along, 0.0))
     product: cython.double = sqrt(u) * sqrt(v) * sqrt(third)
-    # Without a bound, points on a line are not an error: their circle is larger than any.
+    # The circle through collinear points is larger than any other.
     return 0.5 * product / double_area if double_area > 1e-12 * sqrt(u) * sqrt(v) else 1e300
 
 
@@ -404,7 +404,7 @@ def _fold(
     c: cython.Py_ssize_t,
     d: cython.Py_ssize_t,
 ) -> cython.double:
-    """Cosine of the angle around the edge from a to b between the sides of c and d: 1 if they fold back."""
+    """Cosine of the angle at edge ab between the triangles with corners c and d: 1 if folded onto each other."""
     square: cython.double = 0.0
     of_c: cython.double = 0.0
     of_d: cython.double = 0.0

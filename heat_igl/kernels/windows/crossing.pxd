@@ -1,6 +1,4 @@
-from heat_igl.kernels.windows.structures cimport Search, Window
+from heat_igl.kernels.windows.structures cimport Search
 
-cdef int trim(Search* s, Window* windows, int n, int h) noexcept nogil
-cdef bint is_covered(Search* s, const Window* before, int n_before, const Window* windows, int n, int h) noexcept nogil
 cdef void cross(Search* s, int h) noexcept nogil
 cdef void over_corners(Search* s, int j) noexcept nogil

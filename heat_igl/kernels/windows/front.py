@@ -1,25 +1,25 @@
-"""The front of a search: windows that wait in lists at half-edges, the queue of what comes next, and distances found.
+"""The front of a search: lists of windows waiting at half-edges, the priority queue, and the distances found so far.
 
-The square of the key of a list is the power of the root with respect to the circle around the face that is entered
-next. On a Delaunay triangulation that power grows along every straight line from the root, it is no larger than the
-square of the distance of any vertex ahead, and it sorts faces from front to back. So a list is nearly always complete
-when its turn comes, a face is crossed once from each side, and no vertex can come nearer than the key. On other
-triangulations the key is the distance of the nearest point of the windows. The queue is a heap of its own, in which an
-entry that is out of date stays until its turn comes: `kernels.priority_queue` moves entries whose keys change, and for
-that keeps three numbers for every half-edge and vertex of the surface.
+The key of a list is the root's offset plus the square root of the power of the root with respect to the circumcircle
+of the face that the windows enter next. On a Delaunay triangulation this power increases along every straight line
+from the root, does not exceed the squared distance of any vertex ahead, and orders faces from front to back. Therefore
+a list is nearly always complete when it is processed, each face is crossed once from each side, and no vertex can still
+get a distance below the current key. On other triangulations the key is the distance of the nearest point of the
+windows. The queue is a binary heap in which outdated entries stay until they are popped. `kernels.priority_queue`
+updates keys in place instead, but needs three numbers for every half-edge and vertex of the surface.
 
-In a search for the distance of one goal, windows that cannot lead to it on a shortest path are left out.
+A search for a single goal drops windows that cannot contain a shortest path to it.
 
-Windows begin at source vertices, at points and segments inside faces, and at vertices where shortest paths bend.
-Segments emit parallel lines at a right angle on both sides (Bommes and Kobbelt 2007). Around their ends lines leave in
-all directions: the ends are source points as well.
+Windows start at source vertices, at points and segments inside faces, and at vertices where shortest paths bend.
+A segment emits lines at right angles on both sides (Bommes and Kobbelt 2007). Its two ends are source points as well,
+so that lines leave them in all directions.
 
-Paths bend at a vertex with angles that sum to more than 2 pi, into directions at least pi from the arriving path on
-both sides; at the boundary; and, into all faces, at a vertex with several fans. Two paths to the vertex whose lengths
-agree to rounding can differ in direction by the square root of that: excess grows with the square of the angle. What
-passes the vertex on its two sides may have come on the other path. So that nothing between is left out, the rays that
-bound the directions of windows from the vertex are moved apart by this angle. Such windows are paths too, and are cut
-where another is shorter.
+Shortest paths bend at boundary vertices, at vertices with several fans (into all faces), and at vertices whose angles
+sum to more than 2 pi: there, into directions that make an angle of at least pi with the arriving path on both sides.
+Two paths to a vertex with lengths equal to rounding may arrive in directions that differ by the square root of the
+rounding, since the extra length is quadratic in the angle; a window that passes the vertex may belong to the other
+path. The range of directions that leave the vertex is therefore widened by this angle, so that no gap remains. The
+additional windows are valid paths, and are trimmed where another path is shorter.
 """
 
 import cython
@@ -53,7 +53,7 @@ from cython.cimports.libc.string import memmove
 
 
 def allocate(s: cython.pointer(Search)) -> cython.void:
-    """Room for a front."""
+    """Allocate the memory of a front."""
     s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
     s.n_all_lists, s.n_all_heap = 256, 1024
     s.free_list = -1
@@ -70,7 +70,7 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
 
 
 def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
-    """Room for n windows on each side of an apex."""
+    """Allocate room for n windows on each side of an apex."""
     s.n_out = 2 * n
     free(s.to_left)
     free(s.to_right)
@@ -81,7 +81,7 @@ def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
 
 
 def empty_front(s: cython.pointer(Search)) -> cython.void:
-    """Drop all that waits; lists and queue keep their room."""
+    """Remove all waiting windows and queue entries; lists and queue keep their memory."""
     for i in range(s.n_lists):
         if s.lists[i].half_edge >= 0:
             s.slot[s.lists[i].half_edge] = -1
@@ -132,7 +132,7 @@ def pop(s: cython.pointer(Search)) -> Entry:
     below: cython.int = 1
     s.n_heap -= 1
     last: Entry = heap[s.n_heap]
-    # From below: the gap goes down to a leaf, without a branch that depends on keys, and the last entry seldom rises.
+    # Bottom-up: moving the gap down to a leaf needs no branch on keys, and the last entry seldom rises from there.
     while below + 1 < s.n_heap:
         below += heap[below + 1].key < heap[below].key
         heap[i] = heap[below]
@@ -152,10 +152,10 @@ def pop(s: cython.pointer(Search)) -> Entry:
 
 
 def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython.void:
-    """Let the search from v be one for the distance of `goal` alone, and bound that by a path along edges.
+    """Make the search from v one for the distance of `goal` alone, bounded by the length of a path along edges.
 
-    From each vertex, the path takes the edge that makes the way to the goal shortest, were it straight from there on.
-    Where that comes no nearer to the goal, there is no bound.
+    The path is greedy: each edge minimizes its length plus the straight distance from its end to the goal. There is no
+    bound if an edge does not end nearer to the goal.
     """
     length: cython.double = 0.0
     s.aim = goal
@@ -182,13 +182,14 @@ def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython
 
 
 def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int) -> cython.int:
-    """Keep the windows over e through which a path to the goal may be as short as the one known; how many they are.
+    """Keep the windows over e that may contain a path to the goal no longer than the known bound; returns their number.
 
-    No path from a point of e to the goal is shorter than the straight line from an end of e, less the way to that end.
-    With the distance of the point added, this falls from one end to the other, so it is least at an end of the window.
+    A path from a point of e to the goal is at least as long as the straight line from an end of e to the goal, minus
+    the distance of the point from that end. Together with the distance of the point, this lower bound is monotone along
+    e, so its minimum over a window is at one end of the window.
     """
     k: cython.int = 0
-    # As seen by the windows, whose frame begins at the head of e.
+    # In the frame of the windows, whose origin is the head of e.
     from_tail: cython.double = straight(s, s.vertex[previous_half_edge(e)])
     from_head: cython.double = straight(s, s.vertex[next_half_edge(e)]) - s.length[e]
     for i in range(n):
@@ -216,12 +217,12 @@ def relax(
     x: cython.double,
     y: cython.double,
 ) -> cython.void:
-    """Lower the distance of v to `distance` if that is shorter, and note the path: root, half-edge, and crossing.
+    """Lower the distance of v to `distance` if that is smaller, and store the path: root, half-edge, and crossing.
 
-    The straight last part of the path leaves the root out of a corner, in the direction (x, y). The frame of a corner
-    begins with the side to the next corner of the face. In the face f of a source point it is that of corner 3 f. Of a
-    segment in face f, x is the length along the segment at which the path starts, and y is 1 if the path leaves to the
-    left and -1 if to the right; both are 0 for corners of the same face.
+    The last straight part of the path leaves the root through a corner, in the direction (x, y). The first axis of the
+    frame of a corner is the side to the next corner of the face. For a source point in face f, the frame is that of
+    corner 3 f. For a segment in face f, x is the arc length along the segment at which the path starts, and y is 1 if
+    the path leaves to the left and -1 if it leaves to the right; both are 0 for corners of the same face.
     """
     if distance >= s.upper[v]:
         return
@@ -263,7 +264,7 @@ def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root
 
 
 def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> cython.void:
-    """Note a distance of vertex v for the other of two searches."""
+    """Record a distance of vertex v for the search on the other thread."""
     n: cython.int = s.n_news[s.parity]
     room: cython.int = s.n_all_news[s.parity]
     if n == room:
@@ -289,7 +290,7 @@ def _key(
 ) -> cython.double:
     """The key of a window, the same in both frames of its half-edge.
 
-    Of parallel lines, the power of the root becomes the distance of the circle's centre.
+    For parallel lines, the root of the power is replaced by the distance of the circumcentre.
     """
     if w.is_plane:
         x = w.x * length + w.depth * bulge
@@ -306,7 +307,7 @@ def _key(
 @cython.inline
 @cython.nogil
 def _has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
-    """Make room for n more windows of a list; false without memory."""
+    """Make room for n more windows of a list; false if memory runs out."""
     if one.count + n > one.capacity:
         capacity: cython.int = 2 * (one.count + n) + 4
         more: cython.pointer(Window) = cython.cast(
@@ -323,7 +324,7 @@ def _has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
 @cython.inline
 @cython.nogil
 def _mirrored(w: Window, length: cython.double) -> Window:
-    """A window in the frame that begins at the other end of its half-edge."""
+    """A window in the frame whose origin is the other end of its half-edge."""
     start: cython.double = w.start
     if w.is_plane:
         w.offset += w.x * length
@@ -388,7 +389,7 @@ def append(
 @cython.cfunc
 @cython.nogil
 def _free_list(s: cython.pointer(Search)) -> cython.int:
-    """A list that is not in use, with the room that it had before; -1 without memory."""
+    """An unused list, with the capacity that it has from earlier use; -1 if memory runs out."""
     place: cython.int = s.free_list
     if place >= 0:
         s.free_list = s.lists[place].count
@@ -414,7 +415,7 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
 def add(
     s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int, in_front: cython.bint
 ) -> cython.void:
-    """Windows over half-edge e, out of its face; their frame runs from the head of e to its tail."""
+    """Add windows that cross half-edge e out of its face; their frame runs from the head of e to its tail."""
     t: cython.int = s.twin[e]
     if s.aim >= 0:
         n = towards_goal(s, e, run, n)
@@ -430,7 +431,7 @@ def add(
 
 
 def start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, label: cython.int) -> cython.void:
-    """Let distance start at vertex v."""
+    """Make vertex v a source with the given offset."""
     if s.failed or offset >= s.distance[v]:
         return
     if s.distance[v] == INFINITY:
@@ -446,7 +447,7 @@ def start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, la
 
 
 def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
-    """Windows from a source inside a face over its three sides."""
+    """Emit windows from a source point inside a face over the three sides of the face."""
     f: cython.int = s.point_face[p]
     root: cython.int = s.n + p
     offset: cython.double = s.point_offset[p]
@@ -463,7 +464,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         h: cython.int = 3 * f + c
         at_corner(c, corner)
         distance: cython.double = offset + apart(s.length + 3 * f, corner, at)
-        # Not as a difference of two places: beside a corner that would be one of roundings.
+        # A difference of two positions would cancel if the point is close to the corner.
         x: cython.double = 0.0
         y: cython.double = 0.0
         for other in range(3):
@@ -471,7 +472,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
             y += at[other] * (place_y[c] - place_y[other])
         relax(s, s.vertex[h], distance, root, -1, 0.0, 3 * f, x, y)
         if at[c] <= 0.0:
-            continue  # on the side itself, the source belongs to the face beyond it too
+            continue  # a source on the side is also listed for the neighbouring face
         length: cython.double = s.length[h]
         left_length: cython.double = s.length[previous_half_edge(h)]
         right_length: cython.double = s.length[next_half_edge(h)]
@@ -495,7 +496,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
 
 
 def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
-    """Distances from source segment i inside its face, and windows over the sides of the face."""
+    """Distances from source segment i to the corners and targets of its face, and windows over the sides."""
     f: cython.int = s.segment_face[i]
     root: cython.int = s.n + s.n_points + i
     ends: cython.p_double = s.segment + 6 * i
@@ -503,7 +504,7 @@ def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
     for c in range(3):
         at_corner(c, corner)
         relax(s, s.vertex[3 * f + c], _segment_distance(s, i, corner), root, -1, 0.0, 3 * f, 0.0, 0.0)
-        # On the side itself, the segment belongs to the face beyond it too.
+        # A segment on the side is also listed for the neighbouring face.
         if ends[c] > 0.0 or ends[3 + c] > 0.0:
             _emit_parallel(s, 3 * f + c, ends, root, s.segment_offset[i])
     j: cython.int = s.first_target[f] if s.first_target != cython.NULL else -1
@@ -526,7 +527,7 @@ def _segment_distance(s: cython.pointer(Search), i: cython.int, point: cython.p_
 def _emit_parallel(
     s: cython.pointer(Search), h: cython.int, ends: cython.p_double, root: cython.int, offset: cython.double
 ) -> cython.void:
-    """The window over half-edge h, out of the face; its frame runs from the head of h to the tail."""
+    """Emit the window of a segment over half-edge h out of the face; its frame runs from the head of h to the tail."""
     c: cython.int = h % 3
     head: cython.int = previous_half_edge(h) % 3
     length: cython.double = s.length[h]
@@ -539,7 +540,7 @@ def _emit_parallel(
     norm: cython.double = sqrt(along * along + rise * rise)
     one: Window
     if fabs(along) <= NARROW * norm or norm <= 0.0:
-        return  # at a right angle to the half-edge: nothing leaves over it
+        return  # the segment is perpendicular to the half-edge, so its lines are parallel to it
     one.depth = fabs(along) / norm
     one.x = (-rise if along > 0.0 else rise) / norm
     one.start = x + depth * one.x / one.depth
@@ -568,7 +569,7 @@ def _emit_from_bend(
     root: cython.int,
     offset: cython.double,
 ) -> cython.void:
-    """A window over the half-edge k, from the vertex opposite; start and stop from the tail of k."""
+    """Emit a window from a vertex over the opposite half-edge k; start and stop are measured from the tail of k."""
     one: Window
     length: cython.double = s.length[k]
     right: cython.double = s.length[previous_half_edge(k)]  # tail to apex
@@ -606,9 +607,10 @@ def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset:
 def _straighten(
     s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Direction), margin: cython.double
 ) -> cython.bint:
-    """Turn around the vertex over a side of corner k by pi, less a margin; true if the fan reaches as far as pi.
+    """Rotate around the vertex by pi minus a margin, starting over a side of corner k; true if the fan spans pi.
 
-    `ray` takes the corner that holds the direction, the side over which it was entered, and the angle between them.
+    `ray` takes the corner that contains the direction, the side over which the rotation entered this corner, and the
+    angle between the two.
     """
     sine: cython.double = ray.sine
     ray.sine = sine + margin * ray.cosine
@@ -635,7 +637,7 @@ def _straighten(
 @cython.cfunc
 @cython.nogil
 def _reach(s: cython.pointer(Search), ray: cython.pointer(Direction)) -> cython.double:
-    """How far the ray meets the half-edge opposite its corner from the end on the side of the ray."""
+    """Where the ray meets the half-edge opposite its corner: the distance from the end that lies on `ray.side`."""
     k: cython.int = ray.corner
     length: cython.double = s.length[k]
     p: cython.double = s.length[ray.side]
@@ -654,7 +656,7 @@ def _reach(s: cython.pointer(Search), ray: cython.pointer(Direction)) -> cython.
 def _fill(
     s: cython.pointer(Search), v: cython.int, first: cython.pointer(Direction), last: cython.pointer(Direction)
 ) -> cython.void:
-    """Windows from v between two rays, or between the first ray and the boundary if there is no second."""
+    """Emit windows from v between two rays, or between the first ray and the boundary if `last` is NULL."""
     k: cython.int = first.corner
     side: cython.int = first.side
     near: cython.double = _reach(s, first)
@@ -680,7 +682,7 @@ def _fill(
 
 
 def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
-    """Windows from vertex v into all directions in which a shortest path can go on."""
+    """Emit windows from vertex v into all directions in which a shortest path can continue."""
     h: cython.int = s.entered[v]
     at: cython.double = s.crossing[v]
     left: Direction
@@ -693,7 +695,7 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
             _emit_from_bend(s, k, 0.0, s.length[k], v, s.distance[v])
             k = s.next_corner[k]
         return
-    # From the apex of h: the angles between the way back, to where the path crosses h, and the two sides.
+    # At v, which is opposite h: the angles between the direction back to the crossing of h and the two sides.
     length, left_length, right_length = s.length[h], s.length[previous_half_edge(h)], s.length[next_half_edge(h)]
     x: cython.double = 0.5 * twice_product(length, left_length, right_length) / length
     y: cython.double = s.double_area[h // 3] / length
@@ -707,7 +709,7 @@ def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
         margin = WIDEST
     has_left: cython.bint = _straighten(s, h, previous_half_edge(h), cython.address(left), margin)
     has_right: cython.bint = _straighten(s, h, next_half_edge(h), cython.address(right), margin)
-    # Around a closed fan both rays bound one shadow; in an open one there are two, each up to the boundary.
+    # In a closed fan, the two rays bound one range of directions; in an open fan, each ray and the boundary bound one.
     if s.kind[v] == BENDS:
         if has_left and has_right:
             _fill(s, v, cython.address(left), cython.address(right))

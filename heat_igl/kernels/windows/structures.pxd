@@ -2,7 +2,7 @@ from libc.math cimport sqrt
 
 cdef extern from *:
     """
-    // In 64 bytes: with 72, a search takes a tenth longer.
+    // 64 bytes, a cache line: with 72 bytes, a search takes 10 % longer.
     typedef struct {
         double x, depth, turn_x, turn_y, start, stop, offset;
         int root : 31;
@@ -11,44 +11,44 @@ cdef extern from *:
         unsigned side : 2;
     } Window;
 
-    // In the pieces that were written last: a processor waits for a wider copy of what it has just written.
+    // Copied in the sizes in which the fields were written: a wider load after narrower stores stalls the processor.
     static inline void keep_root(const Window* w, Window* out) {
         out->offset = w->offset;
         memcpy((char*) out + 56, (const char*) w + 56, 4);
         memcpy((char*) out + 60, (const char*) w + 60, 4);
     }
     """
-    # The part of a half-edge that straight lines from one root cross, in the frame of the half-edge: its tail is the
-    # origin, its head lies at (length, 0), the face that the lines enter above. If it is a plane, the lines are
-    # parallel, and the root is a segment all of whose points are sources (Bommes and Kobbelt 2007).
+    # The interval of a half-edge that straight lines from one root cross, in the frame of the half-edge: the tail is
+    # the origin, the head is at (length, 0), the lines enter the face above. With `is_plane`, the lines are parallel (a
+    # plane wave), and the root is a segment whose points are all sources (Bommes and Kobbelt 2007).
     ctypedef struct Window:
-        double x, depth      # the root laid out in the plane lies at (x, -depth); of a plane, the direction of the lines
-        # The half-edge as a unit vector in the frame of `corner`; of a plane, how far along the segment the line
-        # through the tail starts, and 1 if lines leave the segment to the left, -1 to the right.
+        double x, depth      # the unfolded root is at (x, -depth); for a plane wave, the direction of the lines
+        # The half-edge as a unit vector in the frame of `corner`. For a plane wave: the arc length on the segment at
+        # which the line through the tail starts, and 1 if lines leave the segment to the left, -1 to the right.
         double turn_x, turn_y
-        double start, stop   # from where to where along the half-edge
-        double offset        # distance of the root; of a plane, the distance that it gives the tail
+        double start, stop   # the interval, in arc length from the tail
+        double offset        # distance of the root; for a plane wave, distance of the tail
         int root             # vertex, n + p for source point p, or after those, n + p + i for source segment i
-        int corner           # of the root, out of which the lines leave it: see `relax`
-        unsigned int side    # of the apex: see the sides below
+        int corner           # the corner through which the lines leave the root: see `relax`
+        unsigned int side    # on which side of the apex the lines pass: see `Side`
         unsigned int is_plane
 
-    # Copy what windows of one root share: offset, root, corner and the flags.
+    # Copy the fields that all windows of a root share: offset, root, corner and the flags.
     void keep_root(const Window* w, Window* out) noexcept nogil
 
 cdef struct Apex:
-    # The corner opposite a half-edge in its frame, the directions of the two sides there, and how it is reached.
+    # The corner opposite a half-edge in the frame of the half-edge, the directions of the two sides, and its path.
     double x, y
-    double right_x       # how far before the head of the half-edge
+    double right_x       # length minus x
     double length, left_length, right_length
-    double excess        # the largest length of the last part of a path to it, times twice its rounding
+    double excess        # 2 ROUNDING times the largest length of the last part of a path to the apex
     double cos_left, sin_left, cos_right, sin_right
-    int best             # the window through which the apex is nearest, -1 if none sees it
+    int best             # the window that contains the shortest straight line to the apex, -1 if there is none
     double best_at       # where the path crosses the half-edge
     double nearest
 
 cdef struct List:
-    # Windows that wait at one half-edge, from its tail to its head.
+    # Windows waiting at one half-edge, sorted from its tail to its head.
     Window* windows
     int count, capacity
     int half_edge
@@ -85,7 +85,7 @@ cdef struct Search:
     int* corner          # NULL unless asked for, as the next
     double* leaving      # two for each vertex
     double* emitted
-    double* upper        # the least distance known: `distance` itself, unless another search goes on beside this one
+    double* upper        # smallest known distance: `distance` itself, unless another thread shares the search
     int* touched
     int n_touched
     # Sources inside faces.
@@ -98,13 +98,13 @@ cdef struct Search:
     int* segment_face
     double* segment      # both ends, one after the other
     double* segment_offset
-    # Vertices, and points inside faces, whose distance is asked for.
+    # Vertices (goals) and points inside faces (targets) whose distances are requested.
     int n_goals, n_targets, n_found
     int* goal
     bint stops_early
     double slack
-    # With one goal: which, -1 for none, positions of the vertices in the unit of the lengths, and what is longer, by more
-    # than rounding, than a path to the goal.
+    # With a single goal: its vertex (-1 for none), the positions of all vertices in the unit of the lengths, and an
+    # upper bound of its distance, with slack for rounding.
     int aim
     double* position
     double within
@@ -126,36 +126,36 @@ cdef struct Search:
     bint failed
     long long n_windows, n_lists_done
     double tolerance
-    # Where the search ends: at a distance, or, if so many vertices are asked for, once the nearest are known.
+    # The search ends at the cutoff, or once the `n_nearest` nearest vertices are known.
     double cutoff
-    double last_key      # what has a larger key can change nothing that is asked for
+    double last_key      # entries with larger keys cannot change a requested distance
     int n_nearest, n_next
     double* ranked
     int n_all_ranked
-    # Of two searches that share a surface, what each tells the other after a round: see `windows`.
+    # Two searches that share a surface exchange these after each round: see `windows`.
     Search* other        # NULL if there is none
     bint is_first
     double round_length
-    long long plenty, few  # with more than one on the front there is work for two threads, until it is less than the other
-    int parity           # rounds write the two places of these by turns
-    Entry* news[2]       # distances, and the vertices that they were found for
+    long long plenty, few  # loads above which two threads share the front, and below which one thread takes it all
+    int parity           # rounds write the two entries of the next arrays alternately
+    Entry* news[2]       # new distances and their vertices
     int n_news[2]
     int n_all_news[2]
-    double first_key[2]  # of what waits
-    long long load[2]    # how much waits
+    double first_key[2]  # smallest key in the queue
+    long long load[2]    # amount of waiting work
     bint has_failed[2]
     bint met_flat[2]
     bint meets_flat       # whether a flat vertex was reached
     bint is_shared       # whether windows were handed over
-    void* arrived[4]     # locks: the news of a round are there, windows can be handed over, or were
+    void* arrived[4]     # locks: two for the news of alternate rounds, then before and after windows are handed over
 
 cdef enum Kind:
     UNKNOWN = 0
-    PASSED = 1           # no shortest path runs through
+    PASSED = 1           # total angle below 2 pi: no shortest path runs through the vertex
     BENDS = 2            # total angle above 2 pi: paths bend here
     ENDS = 3             # on the boundary
     JOINS = 4            # several fans, or an edge of more than two faces: paths leave into all faces
-    FLAT = 5             # passed, and the angles sum to 2 pi to rounding: windows that it splits are joined behind it
+    FLAT = 5             # total angle 2 pi to rounding: windows that are split at the vertex are merged behind it
 
 cdef enum Order:
     UNDECIDED = 0        # which of two windows is nearer
@@ -174,23 +174,23 @@ cdef extern from *:
     """
     // Two paths are equally long if they differ by less than this fraction: fifty times the rounding of one step.
     #define ROUNDING 1e-14
-    // The largest angle, in radians, by which the directions from a bend are widened.
+    // The largest angle, in radians, by which the range of directions from a bend is widened.
     #define WIDEST 0.01
-    // What is narrower, as a fraction of a side, is no window.
+    // Windows narrower than this fraction of a side are dropped.
     #define NARROW 1e-14
     // Windows whose roots are closer than this fraction of their distance have the same root.
     #define SAME 2e-14
-    // Two halves of a window are turned against each other by less than this angle: a hundred flat vertices.
+    // The directions of two halves of a window differ by less than this angle, the sum over a hundred flat vertices.
     #define TURNED 1e-10
-    // Windows that overlap by less than this fraction of both are left as they are.
+    // Windows that overlap by less than this fraction of both are not trimmed against each other.
     #define OVERLAP 0.2
-    // A search goes on beyond its cutoff by this fraction, more than rounding of a key.
+    // A search continues beyond its cutoff by this fraction, more than the rounding of a key.
     #define MARGIN 1e-12
-    // A vertex is flat if its angles sum to 2 pi up to this: ten times what still lets halves of a window be joined.
+    // A vertex is flat if its angles sum to 2 pi up to this, ten times the error up to which halves can be merged.
     #define FLATNESS 1e-12
-    // Overlaps of less than this fraction of a half-edge are left too: rays from bends are widened by so much.
+    // Overlaps below this fraction of a half-edge are not trimmed either: about the widening of rays from bends.
     #define SLIVER 1e-5
-    // What a list costs beside its windows, in windows.
+    // The work per list in addition to its windows, as a number of windows.
     #define PER_LIST 4
     """
     double ROUNDING
@@ -205,11 +205,11 @@ cdef extern from *:
     int PER_LIST
 
 
-# Twice the scalar product of two sides p and q of a triangle, by the third side. The difference of squares is that of
-# the two longest sides: on needles too, the cosine is off by no more than rounding of one.
+# Twice the scalar product of two sides p and q of a triangle, from the three lengths. The squares that are subtracted
+# are those of the opposite and the longer side, so that the cosine is accurate to rounding of 1 on needles as well.
 cdef inline double twice_product(double p, double q, double opposite) noexcept nogil:
     cdef double longer = p if p > q else q
-    cdef double shorter = p if q > p else q  # not by the same comparison: then compilers make a branch of both
+    cdef double shorter = p if q > p else q  # with the same comparison twice, compilers would create a branch
     return (longer - opposite) * (longer + opposite) + shorter * shorter
 
 
@@ -239,7 +239,7 @@ cdef inline double apart(const double* side, const double* a, const double* b) n
     return sqrt(square) if square > 0.0 else 0.0
 
 
-# The point of a segment, given by the coordinates of its two ends, that is nearest to a point.
+# The point of a segment nearest to a given point; `ends` holds the barycentric coordinates of both ends.
 cdef inline void nearest_on(const double* side, const double* ends, const double* point, double* found) noexcept nogil:
     cdef double along[3]
     cdef double off[3]
@@ -263,29 +263,29 @@ cdef inline double straight(const Search* s, int v) noexcept nogil:
     return sqrt(x * x + y * y + z * z)
 
 
-# What a window adds to its offset at a point of its half-edge.
+# The length that a window adds to its offset at a point of its half-edge.
 cdef inline double reach(const Window* w, double at) noexcept nogil:
     if w.is_plane:
         return w.x * at
     return sqrt((at - w.x) * (at - w.x) + w.depth * w.depth)
 
 
-# Length of the path of a window through a point of its half-edge to a point of the face.
+# Length of the path from the root of a window through a point `at` of its half-edge to a point (x, y) of the face.
 cdef inline double bent(const Window* w, double at, double x, double y) noexcept nogil:
     return w.offset + reach(w, at) + sqrt((at - x) * (at - x) + y * y)
 
 
-# Whether a length exceeds another by no more than rounding, of that and of the sides of its last face.
+# Whether a length exceeds another by no more than rounding of that length and of the sides of its last face.
 cdef inline bint is_within(double length, double other, double side) noexcept nogil:
     return length <= other + MARGIN * (other + side)
 
 
-# How far the line of a window through a point of its half-edge goes along it while it rises by `depth`.
+# The component along the half-edge of the line through `at`, over a height of `depth`.
 cdef inline double lateral(const Window* w, double at) noexcept nogil:
     return w.x if w.is_plane else at - w.x
 
 
-# Where the line of a window through a point of the face meets the half-edge.
+# The point of the half-edge that the line from the root to a point of the face crosses.
 cdef inline double backward(const Window* w, double x, double y) noexcept nogil:
     if w.is_plane:
         return x - y * w.x / w.depth

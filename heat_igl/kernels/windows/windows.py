@@ -1,16 +1,16 @@
-"""Continuous Dijkstra: lists of windows cross their faces in ascending order of distance, until the result is known.
+"""Continuous Dijkstra: lists of windows cross their faces in ascending order of their keys, until the result is known.
 
-Python calls `search` from one set of sources, shared by two threads after `pair`, and `search_each`.
+Called from Python: `search` for one set of sources (on two threads after `pair`), and `search_each` for many vertices.
 
-One search may run on two threads: each carries the windows on a part of the front, with a queue, lists and distances of
-its own. It works in rounds: up to a key that both have agreed on. After a round the threads exchange the distances that
-they have found, and cut windows that are longer, as one thread would do. So only windows next to the border of the two
-parts go further than in a search on one thread, by the length of a round. If one part has much less work left, it gets
-a piece of the other. All decisions depend on the two queues alone, never on which thread is faster.
+In a search on two threads, each thread propagates the windows on a part of the front, with its own queue, lists and
+distances. The threads work in rounds, up to a key on which both have agreed. After each round they exchange the
+distances that they have found, and trim windows by them, as one thread does. Therefore only windows next to the border
+of the two parts go further than in a search on one thread, by the length of a round. If one part has much less work
+left, it gets a piece of the other. All decisions depend on the two queues alone, never on which thread is faster.
 
-Rounding of a distance depends on the faces that the path crosses, not on the thread. The exception are the halves of a
-window that are joined behind a flat vertex, since both must wait in one list: `_run_beside` then ends, and one thread
-repeats the search. Surfaces with flat parts have few windows anyway.
+The rounding of a distance depends on the faces that the path crosses, not on the thread. The exception are the halves
+of a window that are merged behind a flat vertex, since both must wait in one list: `_run_beside` then ends, and one
+thread repeats the search. Surfaces with flat parts have few windows in any case.
 """
 
 import cython
@@ -45,24 +45,24 @@ from cython.cimports.heat_igl.kernels.windows.structures import FLAT, MARGIN, PA
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdlib import free, malloc
 
-# Lists that cross a face before a signal is asked for: some milliseconds.
+# After this number of lists, some milliseconds, signals are checked.
 _ASK = cython.declare(cython.longlong, 4096)
-# Looks at the lock of another thread before it is waited for.
+# Attempts to take the lock of the other thread before this thread sleeps.
 _TRIES = cython.declare(cython.int, 2000)
 
 
 @cython.final
 @cython.cclass
 class Front:
-    """A surface, and the arrays that searches on it write, for `search` or `search_each`.
+    """A surface and the result arrays of its searches, for `search` or `search_each`.
 
-    `tables` are m triangles on n vertices; their kinds of vertices are filled further, the same by every search.
-    `found` takes distances, and where the shortest paths come from: nothing found yet at n vertices, with labels for as
-    many source points and segments as there will be. A window is cut where another path is shorter by more than the
-    fraction `tolerance` of the distance. On surfaces whose faces are oriented alike, `leaving` takes in which direction
-    the straight last parts of the paths leave their roots, see `front.relax`. With positions (3 n,) of the vertices, in
-    the unit of the lengths, `search_each` leaves out vertices that are too far along straight lines from the one goal
-    of a source.
+    `tables` are m triangles on n vertices; searches add to their array of kinds of vertices, all the same entries.
+    `found` takes distances and the origins of shortest paths at the n vertices, and labels for all source points and
+    segments as well. A window is trimmed where another path is shorter by more than the fraction `tolerance` of the
+    distance. On surfaces with consistently oriented faces, `leaving` takes the directions in which the last straight
+    parts of paths leave their roots, see `front.relax`. With `position` (3 n,), the positions of the vertices in the
+    unit of the lengths, a search of `search_each` for a single goal drops windows whose straight distance to the goal
+    is too large.
     """
 
     state: Search
@@ -131,8 +131,8 @@ def search(
 ) -> bool:
     """Exact distances from vertices, points and segments; false if memory runs out.
 
-    The front is used for one search only; of a pair (see `pair`), one gets all sources and the other none. A source of
-    `starts` on a side is listed once for every face there, and the ends of segments must be among the points. If it
+    A front serves one search only; of a pair (see `pair`), one gets all sources and the other none. A source of
+    `starts` on a side is listed once for every face there, and the ends of segments must be among the points. With
     `stops_early`, the search ends when the distances of the vertices `goal` and of all points `targets` are known.
     Distances up to the cutoff are exact, larger ones may be too large. `statistics` (3,) takes the numbers of vertices
     that were reached, of windows, and of lists that crossed a face.
@@ -192,10 +192,10 @@ def _write_within(
     way: cython.p_int,
     line: cython.p_double,
 ) -> cython.int:
-    """Store the vertices within the cutoff and their distances, and unless `way` is NULL, the paths; their number.
+    """Store the vertices within the cutoff, their distances and, unless `way` is NULL, their paths; returns the number.
 
-    Of each path the root, the corner out of which it leaves that and the half-edge by which it enters its last face;
-    and the direction out of the corner and the crossing of the half-edge.
+    `way` takes the root of a path, the corner through which it leaves the root, and the half-edge by which it enters
+    its last face; `line` takes the direction in the frame of the corner (2) and the crossing of the half-edge.
     """
     n: cython.int = 0
     for i in range(s.n_touched):
@@ -219,7 +219,7 @@ def _write_within(
 def _write_nearest(
     s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
 ) -> cython.int:
-    """Store the nearest vertices in order, equally near ones by ascending name; returns their number."""
+    """Store the nearest vertices by ascending distance, ties by ascending name; returns their number."""
     n: cython.int = 0
     for i in range(s.n_touched):
         v: cython.int = s.touched[i]
@@ -254,19 +254,18 @@ def search_each(
     way: cython.int[:, ::1],
     line: cython.double[:, ::1],
 ) -> int:
-    """Search from one vertex after the other; returns the number of sources done, -1 if memory ran out.
+    """A separate search from each vertex of `source` (k,); returns the number of sources done, -1 if memory ran out.
 
-    Searches end early, and clear the entries that they changed, so the cost does not depend on the size of the mesh.
+    Each search ends early and resets the entries that it changed, so its cost does not depend on the size of the mesh.
+    The front must be in its initial state, and is left in it.
 
-    The front is in its initial state, to which it returns, and distance starts at each vertex of `source` (k,) alone.
-    Distances of ``goal[first_goal[i] : first_goal[i + 1]]`` are asked for from source i; without goals all vertices up
-    to the cutoff are, or if `n_nearest` is not 0, at most this many of them, the nearest.
+    Source i finds the distances of ``goal[first_goal[i] : first_goal[i + 1]]``. Without goals, it finds all vertices up
+    to the cutoff, or if `n_nearest` is not 0, the nearest `n_nearest` of them.
 
-    `found` and `value` (r,) take vertices, by their `name` (n,), and distances, source after source, and `end` (k,)
-    where those of each source end; with goals each is one value, and `found` is not used. The search stops at the first
-    source whose results do not fit. If `way` and `line` (r, 3) are not empty, on a front that finds in which direction
-    paths leave, they take how the path to each vertex within the cutoff runs, see `_write_within`, by the numbers of
-    the tables.
+    `found` and `value` (r,) take vertices, by their `name` (n,), and distances, source after source, and `end` (k,) the
+    end of each source's results; with goals there is one value per goal, and `found` is not used. The function stops at
+    the first source whose results do not fit. If `way` and `line` (r, 3) are not empty, on a front with `leaving`, they
+    take the path to each vertex within the cutoff, see `_write_within`, in the numbering of the tables.
     """
     s: cython.pointer(Search) = cython.address(front.state)
     n_done: cython.int = 0
@@ -325,13 +324,12 @@ def pair(
     round_length: cython.double,
     plenty: cython.longlong,
 ) -> None:
-    """Prepare two fronts to share a search: `search` is called on both, on one with all sources, on the other with
-    none.
+    """Prepare two fronts to share a search: call `search` on both, on one with all sources, on the other with none.
 
-    Each has result arrays of its own; they share `kind` only. The distance of a vertex is the smaller of the two that
-    they find, and below `upper` (n,) each, see `bound`; infinity if there is no bound. The threads exchange distances
-    after every `round_length`. With about `plenty` windows on the front there is work for two threads. With less than a
-    third, one goes on alone.
+    They share the array `kind`; result arrays are separate, and the distance of a vertex is the smaller of the two.
+    `upper` and `other_upper` (n,) bound the distances, see `bound`; infinity for no bound. The threads exchange
+    distances after every `round_length`. They start to share the front when about `plenty` windows wait, and one
+    continues alone when less than a third of that is left.
     """
     bound(first, upper)
     bound(second, other_upper)
@@ -344,7 +342,7 @@ def pair(
 
 
 def bound(front: Front, upper: cython.double[::1]) -> None:
-    """Let a search find only distances that are smaller than `upper` (n,), which takes those that it finds."""
+    """Restrict a search to distances below `upper` (n,), which is updated to the distances found."""
     front.arrays += (upper.base,)
     front.state.upper = cython.address(upper[0])
 
@@ -365,7 +363,7 @@ def _join(one: Front, other: Front) -> None:
 
 
 def part(first: Front, second: Front) -> bool:
-    """Free what `pair` allocated; false if one thread must search again to get the bits of a search on one thread."""
+    """Free what `pair` allocated; false if bits may differ from those of one thread, which must then search again."""
     one: Front
     for one in (first, second):
         s: cython.pointer(Search) = cython.address(one.state)
@@ -380,7 +378,7 @@ def part(first: Front, second: Front) -> bool:
 @cython.cfunc
 @cython.nogil
 def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
-    """Whether the result cannot change any more by windows with this key or a larger one."""
+    """Whether all requested distances are final: entries with this key or a larger one cannot change them."""
     while s.n_found < s.n_goals:
         if s.distance[s.goal[s.n_found]] > key:
             return False
@@ -388,7 +386,7 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
     while s.n_found < s.n_goals + s.n_targets:
         j = s.n_found - s.n_goals
         over_corners(s, j)
-        # A window may lead to a point of a face before it has left the circle around the face.
+        # A window may reach a point of a face before it has left the circumcircle of the face.
         if s.target_distance[j] + s.slack > key:
             return False
         s.n_found += 1
@@ -399,7 +397,7 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 @cython.inline
 @cython.nogil
 def _carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
-    """Let a list cross its face, or windows leave a vertex, point or segment, unless the entry is out of date."""
+    """Process a queue entry unless it is outdated: a list crosses its face, or a vertex or source emits windows."""
     if entry.what < s.n_half_edges:
         place = s.slot[entry.what]
         if place >= 0 and s.lists[place].key == entry.key:
@@ -420,7 +418,7 @@ def _carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
 @cython.inline
 @cython.nogil
 def _first(s: cython.pointer(Search)) -> Entry:
-    """Take the first entry of the queue, and prefetch what the next one reads."""
+    """Pop the first entry of the queue, and prefetch the data of the next one."""
     first: Entry = pop(s)
     h: cython.int = s.heap[0].what
     if s.n_heap > 0 and h >= s.n_half_edges:
@@ -445,7 +443,7 @@ def _first(s: cython.pointer(Search)) -> Entry:
 @cython.cfunc
 @cython.nogil
 def _run(s: cython.pointer(Search)) -> cython.void:
-    """Carry lists, and let windows leave vertices, points and segments, in ascending order of their keys."""
+    """Process queue entries in ascending order of their keys until the requested distances are final."""
     entry: Entry
     s.last_key = s.cutoff * (1.0 + MARGIN) + s.slack
     while s.n_heap > 0 and not s.failed:
@@ -511,7 +509,7 @@ def _narrow(s: cython.pointer(Search)) -> cython.void:
 @cython.cfunc
 @cython.nogil
 def _forget(s: cython.pointer(Search)) -> cython.void:
-    """Clear the entries that a search wrote, for the next search on the same front."""
+    """Reset the entries that a search wrote, for the next search on the same front."""
     empty_front(s)
     for i in range(s.n_touched):
         v = s.touched[i]
@@ -525,7 +523,7 @@ def _forget(s: cython.pointer(Search)) -> cython.void:
 @cython.cfunc
 @cython.nogil
 def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
-    """Carry lists with keys below `until`; if that is infinite, until there is work for two threads."""
+    """Process entries with keys below `until`; if that is infinite, until there is enough work for two threads."""
     entry: Entry
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
         if until == INFINITY and _load(s) > s.plenty and not s.meets_flat:
@@ -538,14 +536,14 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
 @cython.inline
 @cython.nogil
 def _load(s: cython.pointer(Search)) -> cython.longlong:
-    """Estimated work on the front, counted in windows; 0 if there is none."""
+    """Estimated amount of work on the front, as a number of windows; 0 if there is none."""
     return s.n_waiting + PER_LIST * s.n_heap
 
 
 @cython.cfunc
 @cython.nogil
 def _meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
-    """Wait for the other thread: first without sleep, since rounds are short."""
+    """Wait for the other thread, at first by spinning, since rounds are short."""
     PyThread_release_lock(s.arrived[which])
     for _ in range(_TRIES):
         if PyThread_acquire_lock(s.other.arrived[which], NOWAIT_LOCK):
@@ -556,7 +554,7 @@ def _meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
 @cython.cfunc
 @cython.nogil
 def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int) -> cython.void:
-    """Take distances that the other search has found as upper bounds."""
+    """Use distances that the other search has found as upper bounds."""
     for i in range(n):
         if news[i].key < s.upper[news[i].what]:
             s.upper[news[i].what] = news[i].key
@@ -565,7 +563,7 @@ def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int)
 @cython.cfunc
 @cython.nogil
 def _run_beside(s: cython.pointer(Search)) -> cython.void:
-    """As `_run`, for one of two searches on two threads; both return at the same time."""
+    """`_run` for one of two searches on two threads; both return after the same round."""
     o: cython.pointer(Search) = s.other
     s.last_key = s.cutoff * (1.0 + MARGIN)
     while True:
@@ -589,7 +587,7 @@ def _run_beside(s: cython.pointer(Search)) -> cython.void:
 @cython.cfunc
 @cython.nogil
 def _balance(s: cython.pointer(Search)) -> cython.bint:
-    """Hand windows over if one thread has more work; true if one got all, because there is too little work for two."""
+    """Hand over windows if one thread has more work; true if one thread has all, because there is little work."""
     o: cython.pointer(Search) = s.other
     mine: cython.longlong = s.load[s.parity]
     theirs: cython.longlong = o.load[s.parity]
@@ -613,7 +611,7 @@ def _balance(s: cython.pointer(Search)) -> cython.bint:
 @cython.cfunc
 @cython.nogil
 def _next_seed(s: cython.pointer(Search)) -> cython.int:
-    """A half-edge with windows that wait, if possible next to the part of the other thread; -1 if there is none."""
+    """A half-edge with waiting windows, if possible next to the part of the other thread; -1 if there is none."""
     seed: cython.int = -1
     for i in range(s.n_lists):
         h = s.lists[i].half_edge
@@ -629,7 +627,7 @@ def _next_seed(s: cython.pointer(Search)) -> cython.int:
 @cython.cfunc
 @cython.nogil
 def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.int) -> cython.longlong:
-    """Hand over the windows that wait at half-edge h; returns their work."""
+    """Hand over the windows that wait at half-edge h; returns the amount of work."""
     place: cython.int = s.slot[h]
     one: cython.pointer(List) = cython.address(s.lists[place])
     n: cython.int = one.count
@@ -646,7 +644,7 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
 @cython.cfunc
 @cython.nogil
 def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython.int) -> cython.longlong:
-    """Hand over a vertex from which windows are to start; returns the work."""
+    """Hand over a vertex that has yet to emit windows; returns the amount of work."""
     if (
         s.kind[v] == PASSED
         or s.kind[v] == FLAT
@@ -676,7 +674,7 @@ def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython
 @cython.cfunc
 @cython.nogil
 def _hand_over(s: cython.pointer(Search), o: cython.pointer(Search), amount: cython.longlong) -> cython.void:
-    """Give a connected piece of the front to the other search, which waits until this is done."""
+    """Hand over a connected piece of the front to the other search, which waits until this is done."""
     queue: cython.p_int = cython.cast(cython.p_int, malloc((s.n_lists + 1) * cython.sizeof(cython.int)))
     n: cython.int = 0
     i: cython.int = 0

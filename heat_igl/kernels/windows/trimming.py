@@ -1,0 +1,473 @@
+"""Windows of a half-edge are trimmed to the points that no other path reaches at a smaller distance.
+
+The other path may run over an end of the half-edge (Xin and Wang 2009) or through another window of its list.
+"""
+
+import cython
+from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
+from cython.cimports.heat_igl.kernels.windows.structures import (
+    JOINS,
+    MARGIN,
+    NARROW,
+    OVERLAP,
+    ROUNDING,
+    SAME,
+    SLIVER,
+    TURNED,
+    U_NEARER,
+    U_THEN_W,
+    UNDECIDED,
+    W_NEARER,
+    W_THEN_U,
+    Search,
+    Window,
+    is_within,
+    reach,
+)
+from cython.cimports.libc.math import INFINITY, fabs
+from cython.cimports.libc.string import memmove
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
+    """Derivative along the half-edge of `reached`, the length that a window adds to its offset."""
+    return w.x if w.is_plane else (at - w.x) / reached
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _bend(w: cython.pointer(Window), reached: cython.double) -> cython.double:
+    """A bound on the derivative of `_slope` within a quarter of the distance from the root."""
+    return 0.0 if w.is_plane else 2.0 / reached
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _change(
+    u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, a: cython.double, b: cython.double
+) -> cython.double:
+    """Sign of the derivative of distance(u) - distance(w); a and b are their distances less the offsets."""
+    if u.is_plane or w.is_plane:
+        return _slope(u, at, a) - _slope(w, at, b)
+    return (at - u.x) * b - (at - w.x) * a
+
+
+@cython.cfunc
+@cython.nogil
+def _meeting(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    at_low: cython.double,
+    at_high: cython.double,
+    shift: cython.double,
+    room: cython.p_double,
+) -> cython.double:
+    """The root of distance(u) - distance(w) + `shift` in the bracket [low, high].
+
+    Newton's method with bisection; `at_low` and `at_high` are the values at both ends, of opposite signs. It ends as
+    soon as the step bounds the error: the second derivative of a distance is at most 1 / distance. On entry, `room` is
+    a margin of length; on return, it is how far on each side of the root windows must overlap. This covers the error of
+    the root and the part on which the difference is below the margin.
+    """
+    x: cython.double = low + (high - low) * at_low / (at_low - at_high)
+    margin: cython.double = room[0]
+    slope: cython.double = 0.0
+    shift += u.offset - w.offset
+    for _ in range(8):
+        a = reach(u, x)
+        b = reach(w, x)
+        y = shift + a - b
+        if (y < 0.0) == (at_low < 0.0):
+            low = x
+        else:
+            high = x
+        slope = _slope(u, x, a) - _slope(w, x, b)
+        # Twice the second derivative, a bound within steps below a quarter of both distances.
+        bend = _bend(u, a) + _bend(w, b)
+        step = -y / slope if slope != 0.0 else INFINITY
+        x += step
+        if 4.0 * bend * fabs(step) <= fabs(slope) and low <= x <= high:
+            # Along this step, the derivative stays above half of its value.
+            room[0] = (bend * step * step + 2.0 * margin) / fabs(slope)
+            return x
+        if not (low < x < high):
+            x = 0.5 * (low + high)
+    room[0] = high - low
+    return x
+
+
+@cython.cfunc
+@cython.nogil
+def _compare_squares(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    until: cython.p_double,
+) -> cython.int:
+    """`_compare` for roots with equal offsets: then the difference of the squared distances is linear."""
+    # |x - u|^2 - |x - w|^2 = b - a x
+    a: cython.double = 2.0 * (u.x - w.x)
+    b: cython.double = (u.x - w.x) * (u.x + w.x) + (u.depth - w.depth) * (u.depth + w.depth)
+    at_low: cython.double = b - a * low
+    at_high: cython.double = b - a * high
+    reached: cython.double = fabs(low - u.x) + u.depth
+    margin: cython.double = 2.0 * ROUNDING * (u.offset + reached) * reached
+    if at_low < -margin and at_high < -margin:
+        return U_NEARER
+    if at_low > margin and at_high > margin:
+        return W_NEARER
+    if a == 0.0:
+        return UNDECIDED
+    a = 1.0 / a
+    if a < 0.0:
+        until[0] = high if at_high <= margin else (b - margin) * a
+        until[1] = low if at_low >= -margin else (b + margin) * a
+        return U_THEN_W
+    until[0] = low if at_low <= margin else (b - margin) * a
+    until[1] = high if at_high >= -margin else (b + margin) * a
+    return W_THEN_U
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _ordered(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    at_low: cython.double,
+    at_high: cython.double,
+    slope_low: cython.double,
+    slope_high: cython.double,
+    margin: cython.double,
+    until: cython.p_double,
+) -> cython.int:
+    """`_compare` if u is nearer at `low` or equal; `at_` and `slope_` are distance(u) - distance(w) and its slope."""
+    if at_high < -margin:
+        # The difference has at most one extremum: where the line through both roots meets the half-edge.
+        if slope_low <= 0.0 or slope_high >= 0.0:
+            return U_NEARER
+        a = u.x - w.x
+        b = u.depth - w.depth
+        is_farther: cython.bint = u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2
+        return U_NEARER if is_farther and not (u.is_plane or w.is_plane) else UNDECIDED
+    if at_low < -margin and at_high > margin:
+        b = margin
+        a = _meeting(u, w, low, high, at_low, at_high, 0.0, cython.address(b))
+        until[0], until[1] = min(a + b, high), max(a - b, low)
+        return U_THEN_W
+    # The distances agree to rounding at one end, or at both.
+    until[0], until[1] = high, low
+    b = 0.0
+    if at_low < -margin:
+        if slope_high >= 0.0:
+            a = _meeting(u, w, low, high, at_low + margin, at_high + margin, margin, cython.address(b))
+            until[1] = max(a - b, low)
+        return U_THEN_W
+    if at_high > margin:
+        if slope_low >= 0.0:
+            a = _meeting(u, w, low, high, at_low - margin, at_high - margin, -margin, cython.address(b))
+            until[0] = min(a + b, high)
+        return U_THEN_W
+    return UNDECIDED
+
+
+@cython.cfunc
+@cython.nogil
+def _compare(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+    until: cython.p_double,
+) -> cython.int:
+    """Which of two windows gives the smaller distance between two points, by more than rounding.
+
+    If the order differs at the two ends, `until` takes the points up to which u and w are needed.
+    """
+    if u.offset == w.offset and not (u.is_plane or w.is_plane):
+        return _compare_squares(u, w, low, high, until)
+    a, b, c, d = reach(u, low), reach(w, low), reach(u, high), reach(w, high)
+    at_low, at_high = (u.offset - w.offset) + a - b, (u.offset - w.offset) + c - d
+    slope_low, slope_high = _change(u, w, low, a, b), _change(u, w, high, c, d)
+    margin = ROUNDING * (fabs(u.offset) + a)
+    # If w is nearer at the lower end, exchange u and w.
+    if at_low > margin or (at_low >= -margin and at_high < -margin):
+        order = _ordered(w, u, low, high, -at_low, -at_high, -slope_low, -slope_high, margin, until)
+        until[0], until[1] = until[1], until[0]
+        return W_NEARER if order == U_NEARER else W_THEN_U if order == U_THEN_W else UNDECIDED
+    return _ordered(u, w, low, high, at_low, at_high, slope_low, slope_high, margin, until)
+
+
+@cython.cfunc
+@cython.nogil
+def _gives_way(
+    u: cython.pointer(Window),
+    w: cython.pointer(Window),
+    low: cython.double,
+    high: cython.double,
+) -> cython.int:
+    """Remove from w the interval in which u is nearer. 2: nothing is left, 4: the rest precedes u, 0: it follows u."""
+    if low <= w.start:
+        if high >= w.stop:
+            return 2
+        w.start = high
+        return 0
+    if high >= w.stop:
+        w.stop = low
+        return 4
+    return 4 if w.start < u.start and w.stop < u.stop else 0
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.bint:
+    """Whether two windows overlap by too little to be worth a comparison: of the half-edge, or of both windows.
+
+    Evaluated without branches, since the cases alternate unpredictably.
+    """
+    low: cython.double = u.start if u.start > w.start else w.start
+    high: cython.double = u.stop if u.stop < w.stop else w.stop
+    overlap: cython.double = high - low
+    return (overlap < sliver) | ((overlap < OVERLAP * (u.stop - u.start)) & (overlap < OVERLAP * (w.stop - w.start)))
+
+
+@cython.cfunc
+@cython.nogil
+def _settle(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.int:
+    """Trim two windows where the other is nearer. 1: nothing is left of u, 2: nothing of w, 4: w precedes u."""
+    low: cython.double = u.start if u.start > w.start else w.start
+    high: cython.double = u.stop if u.stop < w.stop else w.stop
+    until: cython.double[2]
+    first: cython.int = 4 * ((w.start < u.start) & (w.stop < u.stop))
+    if _overlap_little(u, w, sliver):
+        return first
+    order = _compare(u, w, low, high, until)
+    if order == U_NEARER:
+        return _gives_way(u, w, low, high)
+    if order == W_NEARER:
+        order = _gives_way(w, u, low, high)
+        if order == 2:
+            return 1
+        # The rest of u precedes w, unless w starts first.
+        return 4 if order == 0 and w.start < u.start else 0
+    if order == U_THEN_W:
+        if high >= u.stop:
+            u.stop = until[0]
+        if low <= w.start:
+            w.start = until[1]
+    elif order == W_THEN_U:
+        if high >= w.stop:
+            w.stop = until[1]
+        if low <= u.start:
+            u.start = until[0]
+        return 4
+    return first
+
+
+@cython.cfunc
+@cython.nogil
+def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) -> cython.bint:
+    """Trim a window where the path over an end of the half-edge is shorter; whether anything is left.
+
+    At arc length s of the half-edge, the path over the tail is a + s longer than the offset of the window, and the path
+    over the head b - s.
+    """
+    if w.is_plane:
+        if w.x * w.stop > a + w.stop or w.x * w.start > b - w.start:
+            return False
+        if w.x * w.start > a + w.start:
+            w.start = a / (w.x - 1.0)
+        if w.x * w.stop > b - w.stop:
+            w.stop = b / (w.x + 1.0)
+        return True
+    square = w.depth * w.depth
+    p = (w.start - w.x) * (w.start - w.x) + square
+    q = (w.stop - w.x) * (w.stop - w.x) + square
+    # The usual case with one branch: the whole window is kept.
+    if (w.start >= -a) & (w.stop <= b) & (p <= (a + w.start) * (a + w.start)) & (q <= (b - w.stop) * (b - w.stop)):
+        return True
+    r = a + w.stop
+    if r < 0.0 or q > r * r:
+        return False
+    r = b - w.start
+    if r < 0.0 or p > r * r:
+        return False
+    r = a + w.start
+    if r < 0.0 or p > r * r:
+        r = a + w.x
+        if r > 0.0:
+            # In this form, there is no cancellation if the root is near the line of the half-edge.
+            r = 0.5 * (w.x - a + square / r)
+            if r > w.start:
+                w.start = r
+    r = b - w.stop
+    if r < 0.0 or q > r * r:
+        r = b - w.x
+        if r > 0.0:
+            r = 0.5 * (b + w.x - square / r)
+            if r < w.stop:
+                w.stop = r
+    return True
+
+
+@cython.cfunc
+@cython.nogil
+def _goes_on(
+    u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double, is_many: cython.bint
+) -> cython.bint:
+    """Whether u and w are two halves of one window, split at a flat vertex, and can be merged.
+
+    If the windows passed a vertex close to the root on its two sides, their roots may agree to rounding although their
+    lines leave in directions that differ by the curvature of the vertex: (turn_x, turn_y) then differs. Faces at an
+    edge of more than two (`is_many`) have no common orientation, so directions are not compared there.
+    """
+    if fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth):
+        return False
+    if not is_many and u.corner == w.corner and fabs(u.turn_x - w.turn_x) + fabs(u.turn_y - w.turn_y) > TURNED:
+        return False
+    return (
+        u.root == w.root
+        and fabs(u.offset - w.offset) <= (SAME * (fabs(w.offset) + length) if w.is_plane else 0.0)
+        and fabs(u.depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
+        and u.start <= w.stop + NARROW * length
+        and w.start <= u.stop + NARROW * length
+    )
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _is_next(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.bint:
+    """Whether w has another root, follows u and hardly overlaps it: then `_insert` would append it unchanged."""
+    is_before: cython.bint = (w.start < u.start) & (w.stop < u.stop)
+    is_other: cython.bint = fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth)
+    return is_other & (not is_before) & _overlap_little(u, w, sliver)
+
+
+@cython.cfunc
+@cython.nogil
+def _insert(
+    windows: cython.pointer(Window),
+    k: cython.int,
+    w: cython.pointer(Window),
+    length: cython.double,
+    is_many: cython.bint,
+) -> cython.int:
+    """Trim a window w and k trimmed windows against each other, and insert w; returns the new number of windows.
+
+    The k windows are sorted along the half-edge. Over an edge of more than two faces (`is_many`) their order is
+    arbitrary, so w is compared with all of them. `w` may point behind the k windows of the same array.
+    """
+    j: cython.int = k
+    moved: Window
+    u: cython.pointer(Window)
+    narrow: cython.double = NARROW * length
+    sliver: cython.double = 0.0 if is_many else SLIVER * length
+    while j > 0:
+        u = windows + (j - 1)
+        if (is_many or (j == k and u.start <= w.start)) and _goes_on(u, w, length, is_many):
+            u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
+            return k
+        outcome = _settle(u, w, sliver)
+        if outcome == 1 or u.stop - u.start <= narrow:
+            if j < k:
+                memmove(u, u + 1, (k - j) * cython.sizeof(Window))
+            k -= 1
+            j -= 1
+            if outcome == 2:
+                return k
+            continue
+        if outcome == 2 or w.stop - w.start <= narrow:
+            return k
+        if outcome != 4 and not is_many:
+            break
+        j -= 1
+    if is_many:
+        j = k
+    if j < k:
+        moved = w[0]
+        memmove(windows + (j + 1), windows + j, (k - j) * cython.sizeof(Window))
+        windows[j] = moved
+    elif w != windows + j:
+        windows[j] = w[0]
+    return k + 1
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double) -> cython.double:
+    """The distance at an end of a half-edge that paths over this end have: that of vertex v, with slack for rounding.
+
+    The slack has a share of the edge length too, since a straight path past a vertex near the root may have the length
+    of the path over it to rounding. The slack is negative at vertices from which paths leave into all faces: if more
+    than two faces meet at each of its edges, windows that pass it by rounding would multiply with the paths around it.
+    """
+    slack: cython.double = -MARGIN if not s.is_delaunay and s.kind[v] == JOINS else s.tolerance
+    return s.upper[v] + slack * (s.upper[v] + length)
+
+
+@cython.cfunc
+@cython.nogil
+def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
+    """Trim windows where a path over an end of h or through another window is shorter; returns how many are left."""
+    k: cython.int = 0
+    w: cython.pointer(Window)
+    length: cython.double = s.length[h]
+    # Over an edge of more than two faces, windows are not sorted, and those of one root may come along several paths.
+    is_many: cython.bint = s.twin[h] == -2
+    from_tail: cython.double = _bound_over(s, s.vertex[next_half_edge(h)], length)
+    from_head: cython.double = _bound_over(s, s.vertex[previous_half_edge(h)], length) + length
+    for i in range(n):
+        w = windows + i
+        if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
+            continue
+        if w.stop - w.start <= NARROW * length:
+            continue
+        # The usual case: the window follows the last one, and is not a half of it.
+        if k == 0 or (not is_many and _is_next(windows + (k - 1), w, SLIVER * length)):
+            if k < i:
+                windows[k] = w[0]
+            k += 1
+        else:
+            k = _insert(windows, k, w, length, is_many)
+    return k
+
+
+@cython.cfunc
+@cython.nogil
+def is_covered(
+    s: cython.pointer(Search),
+    before: cython.pointer(cython.const[Window]),
+    n_before: cython.int,
+    windows: cython.pointer(cython.const[Window]),
+    n: cython.int,
+    h: cython.int,
+) -> cython.bint:
+    """Whether n trimmed windows, or paths over the ends, give the windows before trimming no larger distance."""
+    length: cython.double = s.length[h]
+    j: cython.int
+    w: cython.pointer(cython.const[Window])
+    for i in range(n_before):
+        for j in range(5):
+            at = before[i].start + 0.25 * j * (before[i].stop - before[i].start)
+            reached = before[i].offset + reach(before + i, at)
+            nearest = s.upper[s.vertex[next_half_edge(h)]] + at
+            nearest = min(nearest, s.upper[s.vertex[previous_half_edge(h)]] + (length - at))
+            for k in range(n):
+                w = windows + k
+                if w.start - 2.0 * NARROW * length <= at <= w.stop + 2.0 * NARROW * length:
+                    nearest = min(nearest, w.offset + reach(w, at))
+            if not is_within(nearest, reached, length):
+                return False
+    return True
