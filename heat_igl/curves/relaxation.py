@@ -14,8 +14,8 @@ from heat_igl.runtime import over_rows
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-# A site that would raise the energy of its cell is tried at this many shorter steps.
-_SHORTER = 3
+# A site is moved by its step divided by the first of these that lowers the energy of its cell.
+_SHORTER = np.array([1, 2, 4, 8])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,9 +80,9 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
     -----
     Lloyd's algorithm (1982) on the vertices, each with a third of the area of its faces, for the energy
     sum of a_v d(v, nearest site)^2. The mean of a cell is the end of the mean of its log map at the site, at the
-    nearest corner. The site moves there if this lowers the energy of its cell, or else the same way in shorter steps.
-    So the energy falls in every round, and the last round is one in which no site moves. Distances and directions
-    are exact, see `GeodesicSolver.directions`: a round asks once for each site, and again for shorter steps.
+    nearest corner. The site moves there if this is in the cell and lowers its energy, or else by a half, a quarter or
+    an eighth of the step. So the energy falls in every round, until no site moves. Distances and directions are exact,
+    see `GeodesicSolver.directions`, which a round calls once for each site, and again for shorter steps.
 
     Examples
     --------
@@ -147,26 +147,27 @@ class _Relaxation:
         return labels, float(self._areas[reached] @ nearest[reached] ** 2)
 
     def _move(self, sites: IntArray, rows: FloatArray, angles: FloatArray, steps: FloatArray, labels: IntArray) -> bool:
-        """Move sites, with the distances and angles from them, by their steps or shorter ones; whether any moves."""
-        own = np.array([self._of_cell(row, labels == i) for i, row in enumerate(rows)])
-        waiting, moves_at_all = np.arange(len(sites)), False
-        for _ in range(_SHORTER + 1):
-            ends = self._tracer.exp(sites[waiting], steps[waiting])
-            corner = self._mesh.F[ends.faces, ends.barycentric.argmax(axis=1)]
-            # Inside the cell, so that no two sites meet.
-            moves = (corner != sites[waiting]) & (labels[corner] == waiting)
-            waiting, corner, steps = waiting[moves], corner[moves], steps / 2
-            if not len(waiting):
-                break
-            trial, leaving = self._rows(corner)
-            lower = np.array([self._of_cell(row, labels == i) < own[i] for i, row in zip(waiting, trial, strict=True)])
-            moved = waiting[lower]
-            sites[moved], rows[moved], angles[moved] = corner[lower], trial[lower], leaving[lower]
-            moves_at_all |= bool(lower.any())
-            waiting = waiting[~lower]
-            if not len(waiting):
-                break
-        return moves_at_all
+        """Move each site by its step or a shorter one if this lowers the energy of its cell; whether any site moves.
+
+        The distances and angles of sites that move are replaced, too.
+        """
+        tried = (steps[:, None] / _SHORTER[:, None]).reshape(-1, 2)
+        ends = self._tracer.exp(np.repeat(sites, len(_SHORTER)), tried)
+        corners = self._mesh.F[ends.faces, ends.barycentric.argmax(axis=1)].reshape(-1, len(_SHORTER))
+
+        def moves(i: int) -> bool:
+            cell = labels == i
+            for corner in dict.fromkeys(corners[i].tolist()):
+                # Inside the cell, so that no two sites meet.
+                if corner != sites[i] and cell[corner]:
+                    found = self._solver.directions(corner)
+                    if self._of_cell(found.distance, cell) < self._of_cell(rows[i], cell):
+                        sites[i], rows[i], angles[i] = corner, found.distance, found.departure
+                        return True
+            return False
+
+        moved = over_rows(lambda part: [moves(i) for i in range(part.start, part.stop)], len(sites), len(sites))
+        return any(map(any, moved))
 
     def _means(self, rows: FloatArray, angles: FloatArray, labels: IntArray) -> FloatArray:
         """The mean (k, 2) of the log map of each site over its cell."""

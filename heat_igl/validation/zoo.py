@@ -122,7 +122,7 @@ def revolved(radius: FloatArray, height: FloatArray, around: int) -> Mesh:
 def tube(centre: FloatArray, along: FloatArray, radius: float, around: int, up: ArrayLike = (0.31, 0.21, 0.93)) -> Mesh:
     """An open tube: rings around points (k, 3), perpendicular to `along` (k, 3), that start perpendicular to `up`."""
     along = along / np.linalg.norm(along, axis=1, keepdims=True)
-    u = np.cross(along, up)
+    u = np.cross(along, np.asarray(up))
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     v = np.cross(along, u)
     x, y = ring(around).T
