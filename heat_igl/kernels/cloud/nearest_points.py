@@ -144,7 +144,11 @@ def _sort(
         part = cython.cast(cython.int, scale * square[0, j])
         square[1, begin[part]], point[1, begin[part]] = square[0, j], point[0, j]
         begin[part] += 1
-    for j in range(size):
+    # Those behind the part that has the last of k are left out.
+    part = 0
+    while begin[part] < min(size, k):
+        part += 1
+    for j in range(begin[part]):
         at: cython.Py_ssize_t = j
         while at > 0 and square[0, at - 1] > square[1, j]:
             square[0, at], point[0, at] = square[0, at - 1], point[0, at - 1]
