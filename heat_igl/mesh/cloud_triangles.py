@@ -117,15 +117,13 @@ def _triangles_of_stars(
         lambda rows: delaunay_stars(P, near.axes, near.index, largest, least_cosine, rows.start, rows.stop), len(P)
     )
     first = np.append(0, np.cumsum(sizes, dtype=np.int64))
-    count, is_settled = by_rows(lambda rows: agreement(first, corners, is_closed, rows.start, rows.stop), len(P))
+    count, radius, is_settled = by_rows(
+        lambda rows: agreement(P, first, corners, is_closed, rows.start, rows.stop), len(P)
+    )
     others = np.flatnonzero((count == 1) | (count == 2))
     rows = ascending_rows(corners[others])
-    a, b, c = P[rows.T]
-    sides = [np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c)]
-    product = sides[0] * sides[1] * sides[2]
-    radius = product / np.maximum(np.linalg.norm(np.cross(b - a, c - a), axis=1), 1e-12 * product ** (2 / 3))
     # Those in more stars first, then those with smaller circles.
-    order = np.lexsort((*rows.T[::-1], radius, -count[others].astype(int)))
+    order = np.lexsort((*rows.T[::-1], radius[others], 3 - count[others]))
     return corners[count == 3], rows[order], is_settled.astype(bool)
 
 

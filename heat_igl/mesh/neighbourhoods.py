@@ -44,8 +44,8 @@ _NO_DISC = 0.15
 _NO_SURFACE = 0.5
 # Noise in the neighbours moves quadrics, too: with one pass errors on scans are 2 % larger, with eight no smaller.
 _PASSES = 2
-# Noise is looked for at this many points: deviations differ by a third from point to point, their median by 3 %. On 234
-# clouds, clean and with noise of 0.05 to 3 %, errors are the same with 500; with 125 seven are 1.2 to 2.8 times as large.
+# Noise is looked for at this many points: deviations differ by a third from point to point, their median by 3 %. With
+# 500, errors on 234 clouds, clean and with noise of 0.05 to 3 %, are the same; with 125 seven are 1.2 to 2.8 times so.
 _SAMPLE = 250
 # Deviations from a quadric of half as many neighbours, in shares of those from the quadric of all: noise deviates from
 # both alike, by 0.85 to 1 in measurements, detail from the smaller one by less, 0.14 to 0.74. Noise of about a spacing

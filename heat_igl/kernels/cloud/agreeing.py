@@ -2,16 +2,18 @@
 
 import cython
 import numpy as np
+from cython.cimports.libc.math import INFINITY, sqrt
 
 
 def agreement(
+    P: cython.const[cython.double][:, ::1],
     first: cython.const[cython.longlong][::1],
     triangles: cython.const[cython.int][:, ::1],
     is_closed: cython.const[cython.uchar][::1],
     begin: cython.Py_ssize_t,
     end: cython.Py_ssize_t,
 ):
-    """In how many stars the triangles are, for the stars of the points from `begin` to `end`.
+    """In how many stars the triangles are, for the stars of the points P (n, 3) from `begin` to `end`.
 
     Parameters
     ----------
@@ -27,12 +29,16 @@ def agreement(
     count : (b,) uint8
         For each row of these stars the number of stars that have the triangle, 1 to 3, in the star of its lowest point
         that has it; 0 in the others.
+    radius : (b,) float64
+        Of the circle around a triangle that is in one or two stars; 0 in the other rows.
     is_settled : (end - begin,) uint8
         Whether the star of a point is closed, and all its triangles are in three stars.
     """
     offset: cython.Py_ssize_t = first[begin]
     counts, settled = np.zeros(first[end] - offset, np.uint8), np.empty(end - begin, np.uint8)
+    radii = np.zeros(len(counts))
     count: cython.uchar[::1] = counts
+    radius: cython.double[::1] = radii
     is_settled: cython.uchar[::1] = settled
     with cython.nogil:
         for i in range(begin, end):
@@ -47,7 +53,9 @@ def agreement(
                 if (of_a >= 0 and a < i) or (of_b >= 0 and b < i):
                     continue
                 count[row - offset] = 1 + (of_a >= 0) + (of_b >= 0)
-    return counts, settled
+                if count[row - offset] < 3:
+                    radius[row - offset] = _circumradius(P, i, a, b)
+    return counts, radii, settled
 
 
 @cython.cfunc
@@ -67,3 +75,31 @@ def _row_of(
         if (p == a and q == b) or (p == b and q == a):
             return row
     return -1
+
+
+@cython.cfunc
+@cython.nogil
+def _circumradius(
+    P: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, b: cython.Py_ssize_t, c: cython.Py_ssize_t
+) -> cython.double:
+    """Of the circle through three points, times 2: the same number in whatever order they are given."""
+    first: cython.Py_ssize_t = min(a, min(b, c))
+    last: cython.Py_ssize_t = max(a, max(b, c))
+    middle: cython.Py_ssize_t = a + b + c - first - last
+    x: cython.double = P[middle, 0] - P[first, 0]
+    y: cython.double = P[middle, 1] - P[first, 1]
+    z: cython.double = P[middle, 2] - P[first, 2]
+    u: cython.double = P[last, 0] - P[first, 0]
+    v: cython.double = P[last, 1] - P[first, 1]
+    w: cython.double = P[last, 2] - P[first, 2]
+    dx: cython.double = P[last, 0] - P[middle, 0]
+    dy: cython.double = P[last, 1] - P[middle, 1]
+    dz: cython.double = P[last, 2] - P[middle, 2]
+    product: cython.double = sqrt(x * x + y * y + z * z) * sqrt(dx * dx + dy * dy + dz * dz)
+    product *= sqrt(u * u + v * v + w * w)
+    p: cython.double = y * w - z * v
+    q: cython.double = z * u - x * w
+    r: cython.double = x * v - y * u
+    across: cython.double = sqrt(p * p + q * q + r * r)
+    # Points on a line: their circle is larger than any.
+    return product / across if across > 0.0 else INFINITY
