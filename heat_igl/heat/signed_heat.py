@@ -12,7 +12,6 @@ from functools import cached_property, reduce
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
-import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, require_choice
 from heat_igl.heat.curve_sides import (
@@ -320,9 +319,7 @@ class NormalIntegration:
         self._V, self._F = mesh.V, mesh.F
         self._faces, self._triangulation = faces, triangulation
         self._poisson = parts.poisson
-        self._vector_flow = VectorHeatFlow(
-            domain, edge_rotations(domain), _one_or_all(parts.time_steps), backend, parts.fitted
-        )
+        self._vector_flow = VectorHeatFlow(domain, edge_rotations(domain), parts.heat_flow.t, backend, parts.fitted)
         self._to_faces, self._to_triangles = face_rotations(domain)
         gradient = TriangleElements(triangulation).matrix().tocsr()
         self._D = divergence_matrix(gradient, triangulation.areas)
@@ -333,10 +330,7 @@ class NormalIntegration:
 
         A `SourceError` if the normals of all curves cancel, or one of a point is that of the face.
         """
-        pieces = self._pieces(chosen)
-        phi = self._integrated(pieces)
-        smooth, rest = self._level(phi, pieces, level)
-        return phi - (smooth if level == "none" else smooth + self._extended(rest, pieces, self._heat(pieces)))
+        return self.distance_beside(lambda: None, chosen, level)[1]
 
     def distance_beside(
         self, other: Callable[[], Other], chosen: OrientedSet, level: Level
@@ -358,8 +352,7 @@ class NormalIntegration:
         # Step 1: diffuse the normals, integrated against the hat functions.
         share = pieces.weight[:, None] * pieces.barycentric
         at_corners = share * pieces.normal[:, None] * self._to_faces[pieces.faces].conj()
-        b = np.zeros(self._domain.n, complex)
-        np.add.at(b, pieces.corners, at_corners)
+        b = pieces.summed(at_corners.real) + 1j * pieces.summed(at_corners.imag)
         largest = np.abs(b).max()
         if largest <= _CANCELLED * share.max():
             raise SourceError(
@@ -499,11 +492,6 @@ class Pieces:
         return replace(self, **{field.name: getattr(self, field.name)[chosen] for field in fields(self)[1:]})
 
     @cached_property
-    def _B(self) -> sp.csr_matrix:
-        entries = (self.barycentric.ravel(), self.corners.ravel(), np.arange(0, self.corners.size + 1, 3))
-        return sp.csr_matrix(entries, shape=(len(self.corners), self.domain.n))
-
-    @cached_property
     def component(self) -> IntArray:
         """The component (q,) that each piece is on."""
         return self.domain.components[self.corners[:, 0]]
@@ -515,11 +503,15 @@ class Pieces:
 
     def values(self, of_vertices: FloatArray) -> FloatArray:
         """Values (q,) of a function (n,), linear in each face."""
-        return np.asarray(self._B @ of_vertices)
+        return np.asarray(np.einsum("qc,qc->q", self.barycentric, of_vertices[self.corners]))
 
     def integrals(self, values: FloatArray) -> FloatArray:
         """Integrals (n,) of values (q,) times the hat functions of the vertices."""
-        return np.asarray(self._B.T @ (self.weight * values))
+        return self.summed(self.barycentric * (self.weight * values)[:, None])
+
+    def summed(self, at_corners: FloatArray) -> FloatArray:
+        """The sums (n,) over the pieces at each vertex of values (q, 3) at their corners."""
+        return np.asarray(np.bincount(self.corners.ravel(), at_corners.ravel(), self.domain.n), np.float64)
 
     def total(self, values: FloatArray) -> FloatArray:
         """Integral (n_components,) of values (q,) over the pieces on each component."""
@@ -528,11 +520,6 @@ class Pieces:
     def mean(self, values: FloatArray) -> FloatArray:
         """Mean (n_components,) of values (q,) on each component; 0 without pieces."""
         return _ratio(self.total(values), self.length)
-
-
-def _one_or_all(steps: FloatArray) -> float | FloatArray:
-    """Time steps (n_components,) as one number if they are equal."""
-    return float(steps[0]) if (steps == steps[0]).all() else np.array(steps)
 
 
 def _unit(numbers: AnyArray) -> AnyArray:

@@ -195,9 +195,8 @@ class WindowEngine(TriangleEngine):
 
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
         """Distance (n,)."""
-        if not sources.on_vertices_alone or sources.vertex_offset.any():
-            return super().distance(sources, cutoff, threads)
-        return self._from_vertices.distance(sources, cutoff, threads)
+        query = Query.of(sources, self._triangles)
+        return query.with_begin(self._surface(query.sources).distance(query.sources, query.cutoff(cutoff), threads))
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
         """Distance (n,) where it is smaller than `than`, see `Engine`; the search ends where it is not."""

@@ -13,7 +13,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
 from heat_igl.kernels.signals import raise_caught
 from heat_igl.kernels.windows import windows
 from heat_igl.kernels.windows.surface import FLAT_VERTEX
-from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, SourceSet, source_set, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
@@ -73,12 +73,18 @@ def starts_at(tables: Tables, sources: SourceSet) -> Starts:
     counted = np.concatenate([np.arange(p), number, number])[place.point]
     is_corner = (place.barycentric == 0).sum(axis=1) == 2
     corner = 3 * place.faces[is_corner] + place.barycentric[is_corner].argmax(axis=1)
-    numbers = np.concatenate([counted[~is_corner], p + lines.point, [-1]])
+    inside = np.flatnonzero(~is_corner)
+    # A segment begins where the one before it ends: once in each face.
+    rows = np.column_stack([place.faces, points.label[place.point], late, place.barycentric])[inside]
+    order = np.lexsort(rows.T)
+    differs = np.abs(np.diff(rows[order], axis=0)).max(axis=1) >= ON_SIDE
+    inside = inside[np.sort(np.append(order[:1], order[1:][differs]))]
+    numbers = np.concatenate([counted[inside], p + lines.point, [-1]])
     return Starts(
         np.concatenate([vertices, tables.edges.vertex[corner]]),
         np.concatenate([begin, late[is_corner]]),
-        Located(*(column[~is_corner] for column in place)),
-        late[~is_corner],
+        Located(*(column[inside] for column in place)),
+        late[inside],
         lines,
         tables.scaled(segments.offset)[lines.point],
         numbers,

@@ -151,9 +151,7 @@ class Tables:
     def _on_all_faces(self, faces: IntArray, barycentric: FloatArray) -> Located:
         """Sets of e points each (k, e, 3) in renumbered faces, with a copy for every further face at a side."""
         t = self.edges
-        new_face = np.empty(self.face.max() + 1, np.int64)
-        new_face[self.face] = np.arange(len(self.face))
-        faces = new_face[faces]
+        faces = self._new_face[faces]
         barycentric = np.where(barycentric < _ON_SIDE, 0.0, barycentric)
         barycentric /= barycentric.sum(axis=-1, keepdims=True)
         point = np.arange(len(faces))
@@ -176,6 +174,13 @@ class Tables:
             rows.append((here // 3, other, point[i], np.angle(-self._along(start) * self._along(here).conj())))
         faces, barycentric, point, turn = (np.concatenate(column) for column in zip(*rows, strict=True))
         return Located(faces.astype(np.int32), np.ascontiguousarray(barycentric), point, turn)
+
+    @cached_property
+    def _new_face(self) -> IntArray:
+        """The number of each face of the caller."""
+        number = np.empty(self.face.max() + 1, np.int64)
+        number[self.face] = np.arange(len(self.face))
+        return number
 
     def _along(self, half_edge: IntArray) -> AnyArray:
         """Half-edges (k,) as complex numbers in their triangles, in which the side of corners 0 and 1 is real."""

@@ -221,6 +221,9 @@ def steepest_edge(
         for f in range(F.shape[0]):
             for a in range(n_corners):
                 d[a] = distance[F[f, a]]
+            if d[0] == INFINITY and d[1] == INFINITY and d[2] == INFINITY and d[n_corners - 1] == INFINITY:
+                continue
+            for a in range(n_corners):
                 for b in range(0 if has_lengths else 3):
                     x[3 * a + b] = V[F[f, a], b]
             for a in range(n_corners - 1):
@@ -269,13 +272,15 @@ def shortfall(
     with cython.nogil:
         for k in range((vertices.shape[0] + step - 1) // step):
             v: cython.longlong = vertices[k * step]
+            if not distance[v] < INFINITY:
+                continue
             line: cython.double = INFINITY
             for s in range(places.shape[0]):
                 x: cython.double = V[v, 0] - places[s, 0]
                 y: cython.double = V[v, 1] - places[s, 1]
                 z: cython.double = V[v, 2] - places[s, 2]
                 line = min(line, sqrt(x * x + y * y + z * z) + offsets[s])
-            if distance[v] < INFINITY and line > start:
+            if line > start:
                 count += 1
                 farthest = max(farthest, distance[v] - start)
                 missing: cython.double = max(line - distance[v], 0.0)
