@@ -57,9 +57,8 @@ def filling_triangles(
     F: cython.const[cython.int][:, ::1],
     twin: cython.const[cython.int][::1],
     is_gap: cython.const[cython.uchar][::1],
-    largest: cython.const[cython.double][::1],
-    most_bent: cython.double,
-    most_folded: cython.double,
+    reach: cython.const[cython.double][::1],
+    limits: cython.const[cython.double][:, ::1],
 ):
     """Triangles between the fans of a point, and in the loops of boundary edges.
 
@@ -122,12 +121,11 @@ def filling_triangles(
                         cost,
                         size,
                         joints,
-                        largest,
+                        reach,
                         head,
                         link,
                         n_sides + count,
-                        most_bent,
-                        most_folded,
+                        limits,
                         triangles[count:],
                         is_whole[count:],
                     )
@@ -260,21 +258,20 @@ def _fill(
     cost: cython.double[::1],
     size: cython.Py_ssize_t,
     joints: cython.int[::1],
-    largest: cython.const[cython.double][::1],
+    reach: cython.const[cython.double][::1],
     head: cython.int[::1],
     link: cython.int[:, ::1],
     n_edges: cython.Py_ssize_t,
-    most_bent: cython.double,
-    most_folded: cython.double,
+    limits: cython.const[cython.double][:, ::1],
     triangles: cython.int[:, ::1],
     is_whole: cython.uchar[::1],
 ) -> cython.Py_ssize_t:
     """Clip admissible ears from a ring of points; returns their number. The third side of each is added as an edge."""
     count: cython.Py_ssize_t = 0
     flat: cython.Py_ssize_t = -1
-    limit: cython.double = most_bent
+    limit: cython.const[cython.double][::1] = limits[0]
     for i in range(size):
-        cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit)
+        cost[i] = _ear(P, ring, size, i, joints, reach, head, link, limit)
     while size > 2:
         best: cython.Py_ssize_t = 0
         for i in range(1, size):
@@ -286,16 +283,16 @@ def _fill(
                 for i in range(count - 1, flat - 1, -1):
                     head[min(triangles[i, 0], triangles[i, 2])] = link[n_edges + i, 1]
                 return flat
-            flat, limit = count, most_folded
+            flat, limit = count, limits[1]
             for i in range(size):
-                cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit)
+                cost[i] = _ear(P, ring, size, i, joints, reach, head, link, limit)
             continue
         before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
         after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
         # Since its cost was computed, its third side may have become an edge, or all fans there may have been joined.
         is_edge: cython.bint = size > 3 and _is_edge(head, link, ring[POINT, before], ring[POINT, after])
         if is_edge or (cost[best] < 0.0 and joints[ring[POINT, best]] == 0):
-            cost[best] = INFINITY if is_edge else _ear(P, ring, size, best, joints, largest, head, link, limit)
+            cost[best] = INFINITY if is_edge else _ear(P, ring, size, best, joints, reach, head, link, limit)
             continue
         is_whole[count] = cost[best] >= 0.0
         joints[ring[POINT, best]] -= joints[ring[POINT, best]] > 0
@@ -310,9 +307,9 @@ def _fill(
         # The ears of the two neighbours have changed.
         for i in range(best - 1, best + 1):
             j: cython.Py_ssize_t = (i + size) % size
-            cost[j] = _ear(P, ring, size, j, joints, largest, head, link, limit)
+            cost[j] = _ear(P, ring, size, j, joints, reach, head, link, limit)
         if size == 3:  # one triangle is left
-            cost[0] = cost[1] = cost[2] = _ear(P, ring, size, 0, joints, largest, head, link, limit)
+            cost[0] = cost[1] = cost[2] = _ear(P, ring, size, 0, joints, reach, head, link, limit)
     return count
 
 
@@ -324,10 +321,10 @@ def _ear(
     size: cython.Py_ssize_t,
     i: cython.Py_ssize_t,
     joints: cython.int[::1],
-    largest: cython.const[cython.double][::1],
+    reach: cython.const[cython.double][::1],
     head: cython.int[::1],
     link: cython.int[:, ::1],
-    most_folded: cython.double,
+    limits: cython.const[cython.double][::1],
 ) -> cython.double:
     """Circumradius of the ear at point i of a ring; infinite if the ear is not admissible.
 
@@ -347,12 +344,12 @@ def _ear(
         return -1.0 / square if square > 0.0 else -INFINITY
     radius: cython.double = _circumradius(P, a, b, c)
     # The last triangle adds no edge, and closes the gap even if its corners are collinear.
-    if size > 3 and radius >= min(largest[a], min(largest[b], largest[c])):
+    if size > 3 and radius >= limits[0] * min(reach[a], min(reach[b], reach[c])):
         return INFINITY
     folded: cython.double = max(_fold(P, a, b, c, ring[BEYOND, before]), _fold(P, b, c, a, ring[BEYOND, i]))
     if size == 3:
         folded = max(folded, _fold(P, c, a, b, ring[BEYOND, after]))
-    return INFINITY if folded > most_folded else radius
+    return INFINITY if folded > limits[1] else radius
 
 
 @cython.cfunc
