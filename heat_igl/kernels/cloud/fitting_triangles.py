@@ -27,10 +27,8 @@ def fitting_triangles(
         for f in range(m):
             fits: cython.bint = True
             for c in range(3):
-                if not _find_sector(P, axes, triangles, f, c, sector) and f >= n_accepted:
-                    fits = False
-                    break
-                if f >= n_accepted and _overlaps(triangles[f, c], f, c, head, following, sector):
+                has_angle: cython.bint = _find_sector(P, axes, triangles, f, c, sector)
+                if f >= n_accepted and (not has_angle or _overlaps(f, c, triangles, head, following, sector)):
                     fits = False
                     break
             if fits:
@@ -89,15 +87,15 @@ def _direction(
 @cython.inline
 @cython.nogil
 def _overlaps(
-    vertex: cython.Py_ssize_t,
     f: cython.Py_ssize_t,
     c: cython.Py_ssize_t,
+    triangles: cython.const[cython.int][:, ::1],
     head: cython.int[::1],
     following: cython.int[:, ::1],
     sector: cython.double[:, :, ::1],
 ) -> cython.bint:
     """Whether the angle of triangle f at corner c overlaps one that was accepted at the same vertex."""
-    other: cython.Py_ssize_t = head[vertex]
+    other: cython.Py_ssize_t = head[triangles[f, c]]
     while other >= 0:
         g: cython.Py_ssize_t = other // 3
         e: cython.Py_ssize_t = other % 3
