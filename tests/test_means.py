@@ -102,6 +102,10 @@ def test_single_points_are_their_means(sphere):
     np.testing.assert_array_equal(found.faces, [7])
     np.testing.assert_allclose(found.barycentric, [[0.2, 0.3, 0.5]])
     np.testing.assert_array_equal(karcher_mean(sphere, [5, 9, 30], [0, 1, 0]).positions(sphere)[0], sphere.V[9])
+    grid = shapes.grid(8)
+    for unit in (1e-6, 1e6):  # in these, powers of distances would vanish or overflow
+        centre = karcher_mean(Mesh(unit * grid.V, grid.F), [0, 8, 72, 80], p=64)
+        np.testing.assert_allclose(centre.positions(grid), [[0.5, 0.5, 0]], atol=1e-6)
     mixed = karcher_mean(sphere, [point, 40])
     assert geodesic_distance(sphere, mixed)[40] == pytest.approx(geodesic_distance(sphere, point)[40] / 2, rel=1e-6)
 
