@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.cloud_triangles import FOLDED_BACK, corner, glued_sides, pinched_vertices
+from heat_igl.mesh.cloud_triangles import FOLDED_BACK, corner, glued_sides
+from heat_igl.mesh.connectivity import pinched_vertices
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -130,8 +131,8 @@ def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolA
 
 def is_oriented_manifold(surface: Mesh) -> bool:
     """Whether neighbours of a surface with at most two faces at an edge run alike, and no point has several fans."""
-    glued = glued_sides(surface.F, surface.n_vertices)
-    return not (glued[2].any() or len(pinched_vertices(surface.F, surface.n_vertices, glued)))
+    F, n = surface.F, surface.n_vertices
+    return not (glued_sides(F, n)[2].any() or len(pinched_vertices(F, n)))
 
 
 def _points_between(F: IntArray, pairs: IntArray) -> IntArray:

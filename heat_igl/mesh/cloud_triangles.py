@@ -9,6 +9,7 @@ points of parts that are too small for a surface are inserted into the nearest t
 
 from __future__ import annotations
 
+import igl
 import numpy as np
 
 from heat_igl.kernels.cloud.agreeing import agreement
@@ -16,8 +17,8 @@ from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles, torn_points
 from heat_igl.kernels.mesh.gluing import glue
-from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.connectivity import ascending_rows, connected_components, group_by_label
+from heat_igl.kernels.mesh.incidence import corners_by_vertex
+from heat_igl.mesh.connectivity import Groups, ascending_rows, connected_components, fans
 from heat_igl.mesh.neighbourhoods import K, Neighbourhoods, PointTree, by_rows
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -104,10 +105,7 @@ def _to_full(near: Neighbourhoods) -> float:
 
 def _angles(P: FloatArray, F: IntArray) -> FloatArray:
     """The sum (n,) of the angles of triangles F (m, 3) at each point."""
-    side = P[F[:, [1, 2, 0]]] - P[F]
-    side /= np.maximum(np.linalg.norm(side, axis=2), np.finfo(float).tiny)[..., None]
-    cosine = -np.einsum("fcx,fcx->fc", side, side[:, [2, 0, 1]])
-    return np.asarray(np.bincount(F.ravel(), np.arccos(np.clip(cosine, -1, 1)).ravel(), len(P)))
+    return np.asarray(np.bincount(F.ravel(), igl.internal_angles(P, F).ravel(), len(P)))
 
 
 def _triangles_of_stars(
@@ -153,7 +151,7 @@ def _with_small_parts(tree: PointTree, F: IntArray, part: IntArray, size: IntArr
         has_one = np.isfinite(distance)
         points, beside, distance = points[has_one], beside[has_one], distance[has_one]
         # Of the triangles at the nearest point, that with the nearest middle.
-        corners, row = group_by_label(F.ravel(), len(P)).of(beside)
+        corners, row = Groups(*corners_by_vertex(F, len(P))).of(beside)
         faces = corners // 3
         away = np.linalg.norm(P[F[faces]].mean(axis=1) - P[points[row]], axis=1)
         first = np.lexsort((away, row))[np.searchsorted(row, np.arange(len(points)))]
@@ -191,21 +189,6 @@ def at_all_corners(is_chosen: BoolArray, F: IntArray) -> BoolArray:
 def at_some_corner(is_chosen: BoolArray, F: IntArray) -> BoolArray:
     """Which of the triangles F (m, 3) have a chosen corner."""
     return ~at_all_corners(~is_chosen, F)
-
-
-def pinched_vertices(F: IntArray, n: int, glued: GluedSides) -> IntArray:
-    """The vertices (k,), of n, at which several fans of the triangles F (m, 3) meet, for their `glued_sides`."""
-    fan = _fans(F, glued)
-    of_fan = np.zeros(int(fan.max(initial=-1)) + 1, np.int64)
-    of_fan[fan] = F.ravel()
-    return np.flatnonzero(np.bincount(of_fan, minlength=n) > 1)
-
-
-def _fans(F: IntArray, glued: GluedSides) -> IntArray:
-    """The fan (3 m,) of each corner: corners of a vertex are in one fan if edges join their triangles."""
-    first, second, runs_alike = glued
-    ends = [np.stack([corner(first, e), corner(second, np.where(runs_alike, e, 3 - e))], axis=1) for e in (1, 2)]
-    return np.asarray(components(np.concatenate(ends), F.size))
 
 
 def glued_sides(F: IntArray, n: int) -> GluedSides:
@@ -254,14 +237,12 @@ def _with_largest_fans(F: IntArray, is_gap: BoolArray) -> IntArray:
     while True:
         is_around = at_some_corner(is_gap, F)
         inside, around = np.concatenate([inside, F[~is_around]]), F[is_around]
-        fan, vertex = _fans(around, glued_sides(around, n)), around.ravel()
-        size = np.bincount(fan)
-        of_fan, largest = np.empty(len(size), np.int64), np.empty(n, np.int64)
-        of_fan[fan] = vertex
+        fan, vertex = fans(around, n)
+        size, largest = np.bincount(fan), np.empty(n, np.int64)
         # Of several values written to one place, the last stays.
         order = np.lexsort((-np.arange(len(size)), size))
-        largest[of_fan[order]] = order
-        stays = ((fan == largest[vertex]) | ~is_gap[vertex]).reshape(-1, 3).all(axis=1)
+        largest[vertex[order]] = order
+        stays = ((fan == largest[around.ravel()]) | ~is_gap[around.ravel()]).reshape(-1, 3).all(axis=1)
         if not stays.all():
             part = connected_components(np.concatenate([inside, around[stays]]), n)[around]
             stays |= (part != part[:, :1]).any(axis=1)

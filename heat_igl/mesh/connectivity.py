@@ -156,27 +156,24 @@ def duplicate_faces(F: IntArray, n: int) -> IntArray:
 def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     """Vertices whose faces do not form one fan: two cones that touch in a point, or more than two faces on an edge.
 
-    For triangle meshes. The nodes of a graph are the ends of all edges. Each corner of a face joins two nodes: the ends
-    there of the two sides. The nodes at a manifold vertex form one connected component.
+    For triangle meshes.
     """
-    edge = found.of_face.T.astype(np.int32)  # opposite each corner
-    joined = []
-    from scipy.sparse import csgraph  # brings scipy.linalg, which takes as long to import as numpy
-
-    for c in range(3):
-        right, left = (c + 1) % 3, (c + 2) % 3
-        # In the order of found.vertices: the smaller end of each edge, and the larger.
-        is_larger = F[:, c] > F[:, left], F[:, c] > F[:, right]
-        joined.append((2 * edge[right] + is_larger[0], 2 * edge[left] + is_larger[1]))
-    one, other = np.concatenate(joined, axis=1)
-    size = found.vertices.size
-    graph = sp.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(size, size))
-    n_fans, fan = csgraph.connected_components(graph, directed=False)
-    centre = np.empty(n_fans, np.int64)
-    centre[fan] = found.vertices.ravel()
-    bad = np.bincount(centre, minlength=n) > 1
-    bad[found.vertices[found.n_faces > 2]] = True
+    bad = np.zeros(n, bool)
+    bad[pinched_vertices(F, n)] = bad[found.vertices[found.n_faces > 2]] = True
     return np.flatnonzero(bad)
+
+
+def fans(F: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """The fan (3 m,) of each corner of triangles F (m, 3) on n vertices, and the vertex (k,) of each fan."""
+    fan: IntArray = incidence.fans(np.ascontiguousarray(F, np.int32), n)
+    vertex = np.empty(int(fan.max(initial=-1)) + 1, np.int64)
+    vertex[fan] = F.ravel()
+    return fan, vertex
+
+
+def pinched_vertices(F: IntArray, n: int) -> IntArray:
+    """The vertices (k,), of n, at which several fans of the triangles F (m, 3) meet."""
+    return np.flatnonzero(np.bincount(fans(F, n)[1], minlength=n) > 1)
 
 
 def longest_paths(graph: sp.csr_array, components: IntArray) -> FloatArray:

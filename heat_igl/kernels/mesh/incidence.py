@@ -100,18 +100,50 @@ def components(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
     """
     labels = np.arange(n)
     above: cython.longlong[::1] = labels  # a vertex of the same component, not above this one; then the label
-    count: cython.longlong = 0
     with cython.nogil:
         for f in range(F.shape[0]):
             for c in range(1, F.shape[1]):
                 _join(above, F[f, 0], F[f, c])
-        for v in range(n):
-            if above[v] == v:
-                above[v] = count
-                count += 1
-            else:
-                above[v] = above[above[v]]
+        _number(above)
     return labels
+
+
+def fans(F: cython.const[cython.int][:, ::1], n: cython.Py_ssize_t):
+    """Labels (3 m,) int64 of the fans of corners of triangles F (m, 3), ascending by the first corner of each.
+
+    Corners of one of the n vertices are in one fan if edges join their triangles.
+    """
+    begins, found = corners_by_vertex(F, n)
+    labels = np.arange(len(found))
+    first: cython.int[::1] = begins
+    incident: cython.int[::1] = found
+    above: cython.longlong[::1] = labels
+    # The last corner from which an edge to each vertex was seen.
+    seen: cython.int[::1] = np.full(n, -1, np.int32)
+    with cython.nogil:
+        for v in range(n):
+            for i in range(first[v], first[v + 1]):
+                h: cython.int = incident[i]
+                for turn in range(1, 3):
+                    w: cython.int = F[h // 3, (h % 3 + turn) % 3]
+                    if seen[w] >= 0 and F[seen[w] // 3, seen[w] % 3] == v:
+                        _join(above, seen[w], h)
+                    seen[w] = h
+        _number(above)
+    return labels
+
+
+@cython.cfunc
+@cython.nogil
+def _number(above: cython.longlong[::1]) -> cython.void:
+    """The number of the component in place of what is above each element."""
+    count: cython.longlong = 0
+    for v in range(above.shape[0]):
+        if above[v] == v:
+            above[v] = count
+            count += 1
+        else:
+            above[v] = above[above[v]]
 
 
 @cython.cfunc
