@@ -13,10 +13,9 @@ from heat_igl.mesh.report import CloudReport
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
-# Points lie on a line if their second variance is at most this share of the first.
-_ON_A_LINE = 1e-20
-# Above this share they do not, whatever the rounding: singular values, which take longer, need not tell.
-_BESIDE_A_LINE = 1e-9
+# Points lie on a line if their root mean square distance from it is at most this fraction of that along it. At a
+# million extents from the origin, rounding of coordinates is a tenth of it.
+_ON_A_LINE = 1e-9
 # Squared mean over mean square of deviations: at most 3 / 4, that of a uniform one, for noise of any distribution with
 # one maximum and two like sides (a Gaussian has 2 / pi), and 1 for two sheets; two planes and shells .3 to 1.3 spacings
 # apart have .84 to .97.
@@ -296,11 +295,12 @@ def _check_extent(P: FloatArray) -> None:
         raise MeshError(f"P spans {extent:.3g} units, outside what areas in double precision allow: rescale P")
     centred = (P - P[0]) / extent
     centred -= centred.mean(axis=0)
-    variances = np.linalg.eigvalsh(centred.T @ centred)
-    if variances[1] > _BESIDE_A_LINE * variances[2]:
-        return
-    if variances[1] <= _ON_A_LINE * variances[2] or np.linalg.matrix_rank(centred, tol=1e-9) < 2:
-        raise MeshError(f"all {len(P)} points in P lie on a line: a surface needs points beside it")
+    # Variances, squares of the singular values, are found in less time, and decide unless they are nearly rounding.
+    squares = np.linalg.eigvalsh(centred.T @ centred)
+    if squares[1] <= _ON_A_LINE * squares[2]:
+        spread = np.linalg.svd(centred, compute_uv=False)
+        if spread[1] <= _ON_A_LINE * spread[0]:
+            raise MeshError(f"all {len(P)} points in P lie on a line: a surface needs points beside it")
 
 
 def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:

@@ -37,8 +37,10 @@ __all__ = ["FAMILIES", "SHAPES", "Shape"]
 
 Generator = np.random.Generator
 
-# Times six: a tetrahedron is left out below it, since its corners lie in a plane up to rounding.
+# Tetrahedra with less than this, six times the volume, are left out: their corners lie in a plane up to rounding.
 _LEAST_VOLUME = 1e-12
+# From a cell to its six neighbours.
+_STEPS = np.concatenate([np.eye(3, dtype=int), -np.eye(3, dtype=int)])
 
 SHAPES: list[Shape] = []
 """All shapes, family after family."""
@@ -102,9 +104,9 @@ def delaunay(points: FloatArray) -> IntArray:
     return np.asarray(Delaunay(points).simplices, np.int64)
 
 
-def ring(around: int) -> FloatArray:
-    """Points (around, 2) of the unit circle."""
-    angle = 2 * np.pi * np.arange(around) / around
+def ring(around: int, begin: float = 0.0) -> FloatArray:
+    """Points (around, 2) of the unit circle, the first of them at `begin` steps from the x axis."""
+    angle = 2 * np.pi * (np.arange(around) + begin) / around
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
@@ -161,6 +163,29 @@ def corridors(rng: Generator, n: int) -> BoolArray:
         is_open[2 * a, 2 * b] = is_open[i + a, j + b] = True
         stack.append((a, b))
     return is_open
+
+
+def holed_plate(
+    centre: FloatArray, radius: FloatArray, rim: FloatArray, corners: ArrayLike, inside: FloatArray, gap: float
+) -> tuple[FloatArray, IntArray]:
+    """Points (k, 2) and Delaunay triangles of a plate with round holes.
+
+    Centres (h, 2) and radii (h,) of the holes, points (a, 2) of a rim of radius 1, corners of the plate, and further
+    points, which are left out if they are nearer to a hole than `gap`.
+    """
+    apart = np.linalg.norm(inside[:, None] - centre, axis=2) > radius + gap
+    rims = (centre[:, None] + radius[:, None, None] * rim).reshape(-1, 2)
+    points = np.concatenate([rims, corners, inside[apart.all(axis=1)]])
+    F = delaunay(points)
+    depth = np.linalg.norm(points[F].mean(axis=1)[:, None] - centre, axis=2)
+    return points, F[(depth > radius * np.cos(np.pi / len(rim))).all(axis=1)]
+
+
+def opened(is_open: BoolArray) -> Mesh:
+    """The open cells (n, n) of a grid over the unit square."""
+    mesh = grid(len(is_open))
+    i, j = (mesh.V[mesh.F].mean(axis=1)[:, :2] * len(is_open)).astype(int).T
+    return compact(mesh.V, mesh.F[is_open[i, j]])
 
 
 def walls(F: IntArray, above: int) -> IntArray:
@@ -225,25 +250,20 @@ def hull(points: FloatArray) -> Mesh:
 
 def boxes(cells: IntArray, size: FloatArray | float = 1.0) -> Mesh:
     """The surface of a union of unit cells (k, 3), scaled by `size`: the squares between a cell and empty space."""
-    occupied = {tuple(cell) for cell in cells.tolist()}
-    corners: list[list[int]] = []
-    for cell in sorted(occupied):
-        for axis in range(3):
-            for side in (0, 1):
-                beyond = list(cell)
-                beyond[axis] += 2 * side - 1
-                if tuple(beyond) in occupied:
-                    continue
-                u, v = (axis + 1) % 3, (axis + 2) % 3
-                square = []
-                for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
-                    corner = list(cell)
-                    corner[axis] += side
-                    corner[u] += du
-                    corner[v] += dv
-                    square.append(corner)
-                corners.extend(square if side else square[::-1])
-    unique, which = np.unique(np.array(corners), axis=0, return_inverse=True)
+    cells = np.unique(cells, axis=0)
+    occupied = np.zeros(np.ptp(cells, axis=0) + 3, bool)
+    occupied[tuple((cells - cells.min(axis=0) + 1).T)] = True
+    # Of each axis and side, where the next cell lies, and the corners of the square.
+    ahead = np.stack([-np.eye(3, dtype=int), np.eye(3, dtype=int)], axis=1)
+    square = np.zeros((3, 2, 4, 3), int)
+    for axis in range(3):
+        square[axis, 1, :, axis] = 1
+        square[axis, :, :, (axis + 1) % 3] = [[0, 1, 1, 0], [0, 1, 1, 0]]
+        square[axis, :, :, (axis + 2) % 3] = [[1, 1, 0, 0], [0, 0, 1, 1]]
+    beyond = cells[:, None, None] - cells.min(axis=0) + 1 + ahead
+    cell, across, side = np.nonzero(~occupied[tuple(np.moveaxis(beyond, -1, 0))])
+    corners = (cells[cell][:, None] + square[across, side]).reshape(-1, 3)
+    unique, which = np.unique(corners, axis=0, return_inverse=True)
     a, b, c, d = which.reshape(-1, 4).T
     F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     return Mesh(unique * np.asarray(size, float), F)
@@ -427,15 +447,9 @@ def _pill() -> Mesh:
 
 def _plate_with_holes(holes: FloatArray, around: int, seed: int) -> Mesh:
     """The rectangle 10 by 6 with round holes (k, 3): centres and radii; vertices on the rims and few elsewhere."""
-    angle = 2 * np.pi * (np.arange(around) + 0.5) / around
-    rims = [np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=1) for x, y, r in holes]
     corners = np.array([[0, 0], [10, 0], [10, 6], [0, 6], [5, 0], [5, 6.0]])
     inside = seeded(seed).uniform([0.3, 0.3], [9.7, 5.7], (30, 2))
-    inside = inside[(np.linalg.norm(inside[:, None] - holes[:, :2], axis=2) > holes[:, 2] + 0.2).all(axis=1)]
-    points = np.concatenate([*rims, corners, inside])
-    F = delaunay(points)
-    middle = points[F].mean(axis=1)
-    F = F[(np.linalg.norm(middle[:, None] - holes[:, :2], axis=2) > holes[:, 2] * np.cos(np.pi / around)).all(axis=1)]
+    points, F = holed_plate(holes[:, :2], holes[:, 2], ring(around, 0.5), corners, inside, 0.2)
     return compact(raised(points), F)
 
 
@@ -579,11 +593,8 @@ def _voxel_blob() -> Mesh:
 @shape("maze")
 def _maze() -> Mesh:
     """A square with walls one cell wide from alternate sides."""
-    mesh, n = grid(45), 45
-    cell = mesh.V[mesh.F].mean(axis=1)[:, :2] * n
-    column, row = np.floor(cell[:, 0]).astype(int), np.floor(cell[:, 1]).astype(int)
-    is_wall = (column % 5 == 4) & np.where(column // 5 % 2 == 0, row < n - 4, row >= 4)
-    return compact(mesh.V, mesh.F[~is_wall])
+    column, row = np.indices((45, 45))
+    return opened((column % 5 != 4) | np.where(column // 5 % 2 == 0, row >= 41, row < 4))
 
 
 @shape("maze")
@@ -661,8 +672,7 @@ def _dust() -> Mesh:
     """Twenty hulls of 60 points beside one another, from 1 to a thousandth in size."""
     parts, at = [], 0.0
     for k, size in enumerate(np.logspace(0, -3, 20)):
-        points = seeded(40 + k).standard_normal((60, 3))
-        part = hull(points / np.linalg.norm(points, axis=1, keepdims=True))
+        part = hull(_on_sphere(60, 40 + k))
         parts.append(Mesh(size * part.V + [at, 0, 0], part.F))
         at += 3 * size
     return joined(*parts)
@@ -733,18 +743,15 @@ def _dunes() -> Mesh:
 @shape("voxels", held_out=True)
 def _wandering_cells() -> Mesh:
     """Cells that a random walk visits."""
-    steps = seeded(32).integers(0, 6, 150)
-    step = np.concatenate([np.eye(3, dtype=int), -np.eye(3, dtype=int)])[steps]
-    return boxes(np.unique(np.cumsum(step, axis=0), axis=0))
+    return boxes(np.cumsum(_STEPS[seeded(32).integers(0, 6, 150)], axis=0))
 
 
 @shape("maze", held_out=True)
 def _fern() -> Mesh:
     """A stem of cells with leaves on both sides, which are two cells wide and one cell apart."""
-    mesh, n = grid(36), 36
-    cell = np.floor(mesh.V[mesh.F].mean(axis=1)[:, :2] * n).astype(int)
-    is_leaf = (cell[:, 1] % 3 < 2) & (np.abs(cell[:, 0] - 18) < 17 - cell[:, 1] // 3)
-    return compact(mesh.V, mesh.F[is_leaf | (np.abs(cell[:, 0] - 17.5) < 1)])
+    column, row = np.indices((36, 36))
+    is_leaf = (row % 3 < 2) & (np.abs(column - 18) < 17 - row // 3)
+    return opened(is_leaf | (np.abs(column - 17.5) < 1))
 
 
 @shape("topology", held_out=True)
@@ -798,15 +805,9 @@ def _holed_rectangle(rng: Generator, around: int, n_inside: int) -> tuple[FloatA
         x, y = rng.uniform([r + 0.1, r + 0.1], [9.9 - r, 5.9 - r])
         if all(np.hypot(x - a, y - b) > r + s + 0.08 for a, b, s in holes) and len(holes) < rng.integers(3, 25):
             holes.append((x, y, r))
-    centre, radius = np.array(holes)[:, :2], np.array(holes)[:, 2]
-    rims = (centre[:, None] + radius[:, None, None] * ring(around)).reshape(-1, 2)
     inside = rng.uniform([0.2, 0.2], [9.8, 5.8], (n_inside, 2))
-    apart = np.linalg.norm(inside[:, None] - centre, axis=2) > radius + 0.05
-    points = np.concatenate([rims, [[0, 0], [10, 0], [10, 6], [0, 6]], inside[apart.all(axis=1)]])
-    F = delaunay(points)
-    middle = points[F].mean(axis=1)
-    inner = np.linalg.norm(middle[:, None] - centre, axis=2) < radius * np.cos(np.pi / around)
-    return points, F[~inner.any(axis=1)]
+    corners = [[0, 0], [10, 0], [10, 6], [0, 6]]
+    return holed_plate(np.array(holes)[:, :2], np.array(holes)[:, 2], ring(around), corners, inside, 0.05)
 
 
 def _band(middle: FloatArray, across: FloatArray, rows: int) -> Mesh:
@@ -873,11 +874,7 @@ def spiral_ramp(rng: Generator) -> Mesh:
 def maze(rng: Generator) -> Mesh:
     """The corridors of a random tree on cells, each corridor one cell wide, walls one cell wide."""
     size, fine = int(rng.integers(4, 9)), int(rng.integers(1, 4))
-    is_open = corridors(rng, size)
-    n = fine * len(is_open)
-    mesh = grid(n)
-    x, y = np.minimum((mesh.V[mesh.F].mean(axis=1)[:, :2] * len(is_open)).astype(int), len(is_open) - 1).T
-    return compact(mesh.V, mesh.F[is_open[x, y]])
+    return opened(np.kron(corridors(rng, size), np.ones((fine, fine), bool)))
 
 
 @family("CAD plate")
@@ -993,10 +990,8 @@ def terrain(rng: Generator) -> Mesh:
 @family("handles")
 def handles(rng: Generator) -> Mesh:
     """The boundary of a random walk through cells, thickened here and there: a surface with many handles."""
-    step = np.concatenate([np.eye(3, dtype=int), -np.eye(3, dtype=int)])[rng.integers(0, 6, int(rng.integers(10, 60)))]
-    nodes = 2 * np.cumsum(step, axis=0)
-    between = (nodes[1:] + nodes[:-1]) // 2
-    return boxes(np.unique(np.concatenate([nodes, between]), axis=0))
+    nodes = 2 * np.cumsum(_STEPS[rng.integers(0, 6, int(rng.integers(10, 60)))], axis=0)
+    return boxes(np.concatenate([nodes, (nodes[1:] + nodes[:-1]) // 2]))
 
 
 @family("hull")

@@ -364,11 +364,12 @@ def search(
         front = windows.Front(tables, found, TOLERANCE, leaving)
         if upper is not None:
             windows.bound(front, upper)
-        _require(run(front, starts, statistics))
+        require_memory(run(front, starts, statistics))
     return Searched(starts, found, wanted, int(statistics[1]), leaving)
 
 
-def _require(is_done: bool) -> None:
+def require_memory(is_done: bool) -> None:
+    """Raise a MemoryError, or the signal that was caught, if a search of the kernel was not done."""
     if not is_done:
         raise_caught()
         raise MemoryError("the windows of the exact distance do not fit into memory")
@@ -388,7 +389,7 @@ def _beside(tables: Tables, starts: Starts, found: Found, upper: FloatArray | No
         side_by_side(lambda call: done.append(call()), calls)
     finally:
         is_same = windows.part(first, second)
-    _require(all(done))
+    require_memory(all(done))
     found.take_nearer(also)
     return np.asarray(statistics.sum(axis=0)) if is_same else None
 

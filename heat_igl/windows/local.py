@@ -14,13 +14,12 @@ import scipy.sparse as sp
 
 from heat_igl.errors import MeshError, SourceError, names_guessed, positive, shown
 from heat_igl.kernels.mesh import checking
-from heat_igl.kernels.signals import raise_caught
 from heat_igl.kernels.windows import windows
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
 from heat_igl.runtime import TimeLeft, available_memory, n_threads, over_rows
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
-from heat_igl.windows.exact import TOLERANCE, Found, Leaving
+from heat_igl.windows.exact import TOLERANCE, Found, Leaving, require_memory
 from heat_igl.windows.guards import ROUNDING, distances_instead
 from heat_igl.windows.tables import Tables, from_mesh
 
@@ -398,19 +397,15 @@ class Workspace:
             way,
             line,
         )
-        if n_done < 0:
-            raise_caught()
-            raise MemoryError("the windows of the exact distance do not fit into memory")
+        require_memory(n_done >= 0)
         return ends[:n_done]
 
     def within(self, sources: AnyArray, radius: float) -> Near:
         """All vertices within a radius; the arrays are doubled until the results of the next source fit."""
         rows, done, room = [], 0, _ROOM
         while done < len(sources):
-            found, value = np.empty(room, np.int32), np.empty(room)
-            way, line = np.empty((room, 3), np.int32), np.empty((room, 3))
-            if not self._is_directed:
-                way, line = _NO_WAYS, _NO_LINES
+            found, value, of_paths = np.empty(room, np.int32), np.empty(room), room if self._is_directed else 0
+            way, line = np.empty((of_paths, 3), np.int32), np.empty((of_paths, 3))
             ends = self.search(sources[done:], found, value, cutoff=radius, way=way, line=line)
             if not len(ends):
                 room *= 2
