@@ -275,6 +275,7 @@ def test_lines_for_other_programs_are_as_long_as_the_curves(tmp_path, suffix):
     write_curves(tmp_path / f"a{suffix}", mesh, {"levels": loops, "path": path})
     text = (tmp_path / f"a{suffix}").read_text()
     if suffix == ".csv":
+        assert {row.partition(",")[0] for row in text.splitlines()[1:]} == {'"levels"', '"path"'}
         rows = np.genfromtxt(text.splitlines()[1:], delimiter=",", usecols=(1, 2, 3, 4))
         lines = [rows[rows[:, 0] == i, 1:] for i in range(3)]
     elif suffix == ".vtp":
