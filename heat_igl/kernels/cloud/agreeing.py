@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.libc.math import sqrt
 
 
 def agreement(
@@ -54,7 +54,7 @@ def agreement(
                     continue
                 count[row - offset] = 1 + (of_a >= 0) + (of_b >= 0)
                 if count[row - offset] < 3:
-                    radius[row - offset] = _circumradius(P, i, a, b)
+                    radius[row - offset] = circumradius(P, i, a, b)
     return counts, radii, settled
 
 
@@ -79,10 +79,10 @@ def _row_of(
 
 @cython.cfunc
 @cython.nogil
-def _circumradius(
+def circumradius(
     P: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, b: cython.Py_ssize_t, c: cython.Py_ssize_t
 ) -> cython.double:
-    """Of the circle through three points, times 2: the same number in whatever order they are given."""
+    """Radius of the circle through three points: the same number in whatever order they are given."""
     first: cython.Py_ssize_t = min(a, min(b, c))
     last: cython.Py_ssize_t = max(a, max(b, c))
     middle: cython.Py_ssize_t = a + b + c - first - last
@@ -101,5 +101,5 @@ def _circumradius(
     q: cython.double = z * u - x * w
     r: cython.double = x * v - y * u
     across: cython.double = sqrt(p * p + q * q + r * r)
-    # Points on a line: their circle is larger than any.
-    return product / across if across > 0.0 else INFINITY
+    # The circle through collinear points is larger than any other.
+    return 0.5 * product / across if across > 0.0 else 1e300

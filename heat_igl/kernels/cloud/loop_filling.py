@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.cloud.agreeing import circumradius
 from cython.cimports.heat_igl.kernels.cloud.loop_filling import BEYOND, POINT
 from cython.cimports.libc.math import INFINITY, sqrt
 
@@ -342,7 +343,7 @@ def _ear(
         for x in range(3):
             square += (P[c, x] - P[a, x]) * (P[c, x] - P[a, x])
         return -1.0 / square if square > 0.0 else -INFINITY
-    radius: cython.double = _circumradius(P, a, b, c)
+    radius: cython.double = circumradius(P, a, b, c)
     # The last triangle adds no edge, and closes the gap even if its corners are collinear.
     if size > 3 and radius >= limits[0] * min(reach[a], min(reach[b], reach[c])):
         return INFINITY
@@ -368,28 +369,6 @@ def _is_edge(head: cython.int[::1], link: cython.int[:, ::1], a: cython.int, b: 
     while e >= 0 and link[e, 0] != max(a, b):
         e = link[e, 1]
     return e >= 0
-
-
-@cython.cfunc
-@cython.nogil
-def _circumradius(
-    P: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, b: cython.Py_ssize_t, c: cython.Py_ssize_t
-) -> cython.double:
-    u: cython.double = 0.0
-    v: cython.double = 0.0
-    along: cython.double = 0.0
-    third: cython.double = 0.0
-    for x in range(3):
-        to_a: cython.double = P[a, x] - P[b, x]
-        to_c: cython.double = P[c, x] - P[b, x]
-        u += to_a * to_a
-        v += to_c * to_c
-        along += to_a * to_c
-        third += (to_a - to_c) * (to_a - to_c)
-    double_area: cython.double = sqrt(max(u * v - along * along, 0.0))
-    product: cython.double = sqrt(u) * sqrt(v) * sqrt(third)
-    # The circle through collinear points is larger than any other.
-    return 0.5 * product / double_area if double_area > 1e-12 * sqrt(u) * sqrt(v) else 1e300
 
 
 @cython.cfunc
