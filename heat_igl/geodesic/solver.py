@@ -280,7 +280,8 @@ class GeodesicSolver(BatchedSolver):
         if chosen.engine == "sweep":
             # Whatever the triangles between points are, their own error is a multiple of what a sweep adds.
             sweep = None if isinstance(self._domain, PointCloud) else _sweep_engine(triangles)
-            measures = sweep.measures if sweep else SurfaceMeasures(triangles.surface.unfolding.n_used, 0.0, 0.0, False)
+            n_used = int(np.count_nonzero(np.bincount(triangles.given_faces.ravel())))
+            measures = sweep.measures if sweep else SurfaceMeasures(n_used, 0.0, 0.0, False)
             chosen = sweep_plan(measures, chosen)
             if chosen.engine == "sweep":
                 return chosen, sweep or _sweep_engine(triangles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import igl
 import numpy as np
 
 from heat_igl.kernels.mesh.incidence import components
@@ -84,8 +85,7 @@ def _parts(pairs: IntArray, runs_alike: BoolArray, m: int) -> tuple[IntArray, Bo
 
 def _folds(P: FloatArray, F: IntArray, pairs: IntArray, runs_alike: BoolArray) -> FloatArray:
     """Cosine (k,) of the angle between neighbours around their edge: -1 where they are flat, 1 where they fold back."""
-    normal = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    normal = igl.per_face_normals(P, F, np.zeros(3))
     return np.asarray(np.einsum("kx,kx->k", normal[pairs[:, 0]], normal[pairs[:, 1]]) * np.where(runs_alike, 1, -1))
 
 

@@ -305,4 +305,5 @@ def _onto_quadrics(P: FloatArray, index: AnyArray) -> FloatArray:
 
 def by_rows(work: Callable[[slice], tuple[AnyArray, ...]], n: int) -> tuple[AnyArray, ...]:
     """The arrays that `work` returns for slices of n rows, one after the other."""
-    return tuple(map(np.concatenate, zip(*over_rows(work, n, _BLOCK), strict=True)))
+    parts = over_rows(work, n, _BLOCK)
+    return parts[0] if len(parts) == 1 else tuple(map(np.concatenate, zip(*parts, strict=True)))
