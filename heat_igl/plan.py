@@ -117,7 +117,8 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
             return Plan("lines", None, "shortest paths through tetrahedra are straight lines that bend around edges")
         return Plan("hopf-lax", None, "the metric changes between simplices, and the Hopf-Lax formula converges there")
     if kind == "varying metric" and method == "auto" and tolerance > 0:
-        return Plan("hopf-lax", None, "the metric varies within triangles, where the Hopf-Lax formula is nearer")
+        reason = "the metric varies within triangles: Hopf-Lax is nearer; from points and curves, windows answer"
+        return Plan("hopf-lax", None, reason)
     if method == "sweep":
         return Plan("sweep", None, "a sweep was asked for")
     if method == "auto" and kind == "points":

@@ -13,6 +13,7 @@ from heat_igl import (
     Mesh,
     OffsetSources,
     SourceError,
+    SurfacePoints,
     activation_times,
     fibre_metric,
     metric_operators,
@@ -314,16 +315,17 @@ def test_derivatives_against_central_differences(name):
 
     def answer(dV=0.0, dg=0.0, later=0.0):
         domain = metric_operators(mesh.with_vertices(mesh.V + dV), g + dg)
-        return GeodesicSolver(domain).distance_vjp(OffsetSources([7, 100], start + later))
+        return GeodesicSolver(domain).distance_vjp(OffsetSources([7, 100], start + later))[1]
 
-    phi, pull_back = answer()
+    pull_back = answer()
+    phi = pull_back.distance
     assert phi == pytest.approx(solver(mesh, g).distance(OffsetSources([7, 100], start)), rel=5e-3)
     assert len(pull_back.inexact) <= 1
     random = rng.standard_normal(len(phi))
 
     def differences(**direction):
         ((name, by),) = direction.items()
-        two = [answer(**{name: s * step * by})[0] for s in (1, -1)]
+        two = [answer(**{name: s * step * by}).distance for s in (1, -1)]
         smooth = np.abs(two[0] + two[1] - 2 * phi) < 1e-3 * step
         assert smooth.mean() > 0.95
         return (two[0] - two[1]) / (2 * step), random * smooth
@@ -349,7 +351,8 @@ def test_derivatives_against_central_differences(name):
 def test_derivatives_have_the_degrees_of_lengths():
     """Euler: lengths are of degree 1 in positions and 1/2 in the metric; a later start delays all that it reaches."""
     mesh, g = differentiable("fibres", np.random.default_rng(1))
-    phi, pull_back = solver(mesh, g).distance_vjp(40)
+    pull_back = solver(mesh, g).distance_vjp(40)[1]
+    phi = pull_back.distance
     weight = np.random.default_rng(2).standard_normal(len(phi))
     assert pull_back.push_forward(mesh.V) == pytest.approx(phi, rel=1e-9, abs=1e-12)
     assert (pull_back.by_metric(weight) * g).sum() == pytest.approx(weight @ phi / 2, rel=1e-9)
@@ -361,16 +364,27 @@ def test_derivatives_have_the_degrees_of_lengths():
 def test_derivatives_by_speeds_of_layers():
     mesh = shapes.box(4)
     speed = np.where(mesh.V[mesh.F].mean(axis=1)[:, 2] < 0.5, 1.0, 3.0)
-    phi, pull_back = GeodesicSolver(speed_operators(mesh, speed)).distance_vjp(0)
-    by_speed = pull_back.by_speed(phi)
+    pull_back = GeodesicSolver(speed_operators(mesh, speed)).distance_vjp(0)[1]
+    phi = pull_back.distance
     # Of degree -1 in the speeds, and no slower when faster.
-    assert by_speed @ speed == pytest.approx(-phi @ phi, rel=1e-9)
-    with pytest.raises(ValueError, match=r"give metric_operators the metric at the vertices, \(n, 3, 3\)"):
-        GeodesicSolver(speed_operators(mesh, 1 + mesh.V[mesh.F].mean(axis=1)[:, 2])).distance_vjp(0)[1](phi)
-    with pytest.raises(ValueError, match=r"g must have shape \(125,\) or \(k, 125\)"):
-        pull_back(phi[1:])
-    with pytest.raises(ValueError, match=r"dV must be \(125, 3\) finite numbers"):
-        pull_back.push_forward(mesh.V[1:])
+    assert pull_back.by_speed(phi) @ speed == pytest.approx(-phi @ phi, rel=1e-9)
+
+
+@pytest.mark.parametrize("at", ["faces", "vertices"])
+def test_the_value_of_a_derivative_is_the_distance(at):
+    """From vertices by the Hopf-Lax formula, from points by windows; that it changes tensors of faces is said."""
+    mesh = shapes.grid(12)
+    x = mesh.V[:, 0] if at == "vertices" else mesh.V[mesh.F, 0].mean(axis=1)
+    domain = metric_operators(mesh, (1 + x[:, None, None]) ** -2 * np.eye(3))
+    found = GeodesicSolver(domain)
+    for sources in ([5, 60], SurfacePoints([7], [[0.2, 0.3, 0.5]])):
+        phi, pull_back = found.distance_vjp(sources)
+        np.testing.assert_array_equal(phi, found.distance(sources))
+        assert pull_back.distance == pytest.approx(phi, rel=1e-3)
+    assert (pull_back.by_lengths(phi) * domain.surface.faces.l).sum() == pytest.approx(phi @ phi)
+    if at == "faces":
+        with pytest.raises(ValueError, match=r"metric at the vertices, \(n, 3, 3\), or on triangles .*'exact'"):
+            found.distance_vjp(5)[1](phi)
 
 
 @pytest.mark.parametrize(

@@ -430,28 +430,26 @@ class GeodesicSolver(BatchedSolver):
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative | SimplexDerivative]:
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
-        Arguments and errors as for `distance`; a ValueError also if the engine is a sweep, and for what has no
-        derivative, see `differentiable_surface`. Both are those of the exact paths, also in a metric per face for which
-        triangles have one length for each edge. Of the Hopf-Lax formula elsewhere, the derivative is that of its fixed
-        point, which ``phi`` is to rounding: `SimplexDerivative`.
+        Arguments and errors as for `distance`, whose values ``phi`` are; a ValueError also if the engine is a sweep,
+        and for what has no derivative, see `differentiable_surface`. Of windows, the derivative is that of exact paths;
+        where `plan` names lines or the Hopf-Lax formula, it is a `SimplexDerivative`. ``pull_back.distance`` is what is
+        differentiated: of the formula its fixed point, which ``phi`` is near.
         """
         from heat_igl.sweep.simplex_engine import SimplexEngine
 
-        if isinstance(self._engine, SimplexEngine) and not getattr(self._domain, "metric", None):
-            answer = self._engine.derivative(self._source_set(sources))
-            return answer.distance, answer
+        chosen, domain = self._source_set(sources), self._domain
+        if isinstance(asked := self._asked(chosen), SimplexEngine):
+            return asked.distance(chosen), asked.derivative(chosen)
         from heat_igl.geodesic.derivatives import DistanceDerivative, differentiable_surface
         from heat_igl.operators import SideLengths
 
-        engine, chosen, domain = self._windows("derivatives are those of"), self._source_set(sources), self._domain
+        engine = self._windows("derivatives are those of")
         surface = differentiable_surface(
             None if self._triangles is None else self._triangles.surface,
             chosen,
             None if isinstance(domain, Operators) else domain,
         )
-        sides = SideLengths(domain) if isinstance(domain, Mesh) else None
-        if isinstance(domain, Operators):
-            sides = domain.metric
+        sides = domain.metric if isinstance(domain, Operators) else SideLengths(cast(Mesh, domain))
         distance = engine.distance(chosen, np.inf, n_threads())
         return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_faces)
 

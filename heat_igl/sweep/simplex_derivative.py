@@ -300,7 +300,7 @@ class SimplexDerivative(ABC):
         if not self._simplices.is_given:
             raise ValueError(
                 "the solver does not use the given tensors directly, so only derivatives by offsets are known: "
-                "give metric_operators the metric at the vertices, (n, 3, 3)"
+                "give metric_operators the metric at the vertices, (n, 3, 3), or on triangles take method='exact'"
             )
 
     @abstractmethod
