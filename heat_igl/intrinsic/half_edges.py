@@ -89,12 +89,13 @@ class HalfEdges(NamedTuple):
             triangulation.l.ravel(),
         )
 
-    def flip(self, F: IntArray, margin: float) -> None:
-        """Mollify and flip in place to the intrinsic Delaunay triangulation; F (m, 3) are the faces before."""
-        sides = self.length.reshape(-1, 3)
-        added = mollify(sides, F, margin)
-        if added.any():
-            sides += added
+    def flip(self, margin: float) -> None:
+        """Mollify and flip in place to the intrinsic Delaunay triangulation."""
+        sides, F = self.length.reshape(-1, 3), self.vertex.reshape(-1, 3)
+        if mollify(sides, F, margin).any():
+            # A corner on the side opposite it is flipped away first: longer edges would raise it above that side.
+            self.make_delaunay()
+            sides += mollify(sides, F, margin)
         self.make_delaunay()
 
     def make_delaunay(self, *, records: bool = False) -> tuple[IntArray, FloatArray]:

@@ -19,6 +19,7 @@ from heat_igl.intrinsic import (
     has_nonmanifold_edges,
     intrinsic_delaunay,
     intrinsic_triangulation,
+    mollify,
     tufted_cover,
 )
 from heat_igl.kernels.linear import assembling
@@ -351,7 +352,12 @@ def unfolding_surface(mesh: Mesh, margin: float | None = None, *, orients: bool 
     if (faces.twin == -2).any():
         mesh, history = _without_duplicates(mesh)
         faces = replace(intrinsic_triangulation(mesh, margin), history=history)
-    return Surface(intrinsic_delaunay(faces, orients=orients), faces, V=mesh.V)
+    triangulation = faces
+    if faces.lengthening:
+        # As `HalfEdges.flip`: what lies flat is flipped away before edges are lengthened.
+        flat = intrinsic_delaunay(replace(faces, l=igl.edge_lengths(mesh.V, mesh.F)), orients=orients)
+        triangulation = replace(flat, l=flat.l + mollify(flat.l, flat.F, margin))
+    return Surface(intrinsic_delaunay(triangulation, orients=orients), faces, V=mesh.V)
 
 
 def _without_duplicates(mesh: Mesh) -> tuple[Mesh, tuple[Change, ...]]:

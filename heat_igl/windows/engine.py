@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import igl
 import numpy as np
 
 from heat_igl.mesh import Mesh, SurfacePoints
@@ -242,14 +241,11 @@ class WindowEngine(TriangleEngine):
 def _as_thin_as_given(surface: Surface) -> Surface:
     """The surface mollified by the small margin of windows: the larger margin of the heat method would lengthen paths.
 
-    A surface whose edge lengths are those of another metric is returned unchanged.
+    A surface without positions, whose edge lengths are those of another metric, is returned unchanged.
     """
     given, faces = surface.given_faces, surface.faces
     if given is None or faces is None or surface.V is None or faces.lengthening == 0:
         return surface
     from heat_igl.operators import unfolding_surface
 
-    added = faces.l - igl.edge_lengths(surface.V, faces.F)
-    if np.abs(added - 0.5 * faces.lengthening).max() > 0.51 * faces.lengthening:
-        return surface  # lengths of another metric
     return unfolding_surface(Mesh(surface.V, given), MARGIN)

@@ -13,7 +13,6 @@ from heat_igl.intrinsic import (
     IntrinsicTriangulation,
     Merged,
     each_face_once,
-    intrinsic_delaunay,
     intrinsic_triangulation,
     lay_out,
 )
@@ -233,8 +232,10 @@ def from_mesh(mesh: Mesh, start: int) -> Tables:
         if len(kept) < mesh.n_faces:
             return from_mesh(Mesh(mesh.V, mesh.F[kept]), start)
     if not edges.aligned.all():
-        return from_triangulation(intrinsic_delaunay(intrinsic_triangulation(mesh, MARGIN)))
-    edges.flip(mesh.F, MARGIN)
+        from heat_igl.operators import unfolding_surface
+
+        return from_triangulation(unfolding_surface(mesh, MARGIN).triangulation)
+    edges.flip(MARGIN)
     m, n = mesh.n_faces, mesh.n_vertices
     if m <= _FEW_FACES and gluing.n_near(edges.twin, _NEAR) > 3 * m // 2:
         return Tables(edges, np.arange(n, dtype=np.int32), np.arange(m, dtype=np.int32), exponent)
