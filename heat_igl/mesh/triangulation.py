@@ -125,29 +125,29 @@ def _ears(p: FloatArray) -> IntArray | None:
     room = _ROUNDING * float(np.ptp(p, axis=0).max()) ** 2
     left = list(range(len(p)))
     triangles = []
+    # Which corners are ears, and of which that is asked: clipping one changes it at its two neighbours alone.
+    ears, asked = np.zeros(len(p), bool), [*range(len(p))]
     while len(left) > 3:
         q = p[left]
         before, after = np.roll(q, 1, axis=0), np.roll(q, -1, axis=0)
         area = _area(before, q, after)
-        is_ear = area > room
-        for k in np.flatnonzero(is_ear).tolist():
+        ears[asked] = area[asked] > room
+        for k in [k for k in asked if ears[k]]:
             corners = before[k], q[k], after[k]
             inside = np.ones(len(q), bool)
-            for a, b in zip(corners, (*corners[1:], corners[0]), strict=True):
-                inside &= _area(a, b, q) >= -room
             # Other corners in the same place are those of a slit, which an ear may touch.
-            for corner in corners:
-                inside &= (q != corner).any(axis=1)
-            is_ear[k] = not inside.any()
+            for a, b in zip(corners, (*corners[1:], corners[0]), strict=True):
+                inside &= (_area(a, b, q) >= -room) & (q != a).any(axis=1)
+            ears[k] = not inside.any()
+        # Without an ear, the rest has no area: corners on a line.
+        is_ear = ears if ears.any() else np.abs(area) <= room
         if not is_ear.any():
-            # The rest has no area: corners on a line.
-            is_ear = np.abs(area) <= room
-            if not is_ear.any():
-                return None
+            return None
         lengths = ((q - before) ** 2 + (after - q) ** 2 + (before - after) ** 2).sum(axis=1)
         k = int(np.argmax(np.where(is_ear, area / np.maximum(lengths, np.finfo(float).tiny), -np.inf)))
         triangles.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
         del left[k]
+        ears, asked = np.delete(ears, k), [k - 1, k % len(left)]
     triangles.append(left)
     found = np.array(triangles)
     return found if (_area(*(p[found[:, c]] for c in range(3))) >= -room).all() else None
