@@ -104,6 +104,12 @@ def test_many_random_curves():
         assert is_along_edges(found)
 
 
+def test_a_face_with_two_corners_in_one_place():
+    mesh = Mesh([[0, 0, 0], [0, 0, 0], [9, 0, 0], [9, 9, 0]], [[0, 1, 2], [1, 3, 2]])
+    found = cut(mesh, SurfaceCurve([0, 1], [[0.5, 0, 0.5], [0.5, 0, 0.5]], [[0, 0.5, 0.5], [0, 0.5, 0.5]]))
+    assert found.mesh.measures.sum() == pytest.approx(40.5, rel=1e-14)
+
+
 def test_pieces_lie_on_either_side():
     mesh = sphere()
     height = mesh.V @ [0.3, 0.5, 0.8]

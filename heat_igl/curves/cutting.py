@@ -11,7 +11,7 @@ import numpy as np
 from heat_igl.curves.face_cutting import Point, cut_triangle
 from heat_igl.curves.places import corners
 from heat_igl.errors import MeshError, SourceError, as_array
-from heat_igl.intrinsic import lay_out
+from heat_igl.intrinsic import lay_out, lengths_to_divide_by
 from heat_igl.mesh import (
     Mesh,
     MeshLike,
@@ -242,9 +242,7 @@ class _Cut:
         first = np.searchsorted(self._faces[order], [touched, touched + 1])
         new_faces: list[tuple[int, int, int]] = []
         old_of_new: list[int] = []
-        # The side from corner 0 to corner 1 has a length unless both are in one place, and then no flip matters.
-        sides = np.maximum(mesh.edge_lengths[mesh.facets.of_face[touched]], np.finfo(float).tiny)
-        flat = lay_out(sides)
+        flat = lay_out(lengths_to_divide_by(mesh)[touched])
         for face, plane, low, high in zip(touched.tolist(), flat, *first.tolist(), strict=True):
             parts = self._cut_face(face, plane, order[low:high])
             new_faces += parts
