@@ -23,14 +23,6 @@ def two_spheres() -> Mesh:
     return Mesh(np.concatenate([sphere.V, sphere.V + 5, np.ones((1, 3))]), np.concatenate([sphere.F, sphere.F + n]))
 
 
-def test_farthest_points_of_a_square_are_its_corners_then_its_centre(square):
-    mesh, solver = square
-    points = heat_igl.farthest_points(solver, 5)
-    assert mesh.V[points[1], :2].tolist() == [1, 1]
-    assert {tuple(p) for p in mesh.V[points[:4], :2]} == {(0, 0), (1, 1), (1, 0), (0, 1)}
-    assert mesh.V[points[4], :2].tolist() == [0.5, 0.5]
-
-
 def test_every_point_is_the_farthest_from_those_before(square):
     mesh, solver = square
     points = heat_igl.farthest_points(solver, 40, start=37)

@@ -88,9 +88,9 @@ def test_a_small_component_is_as_accurate_as_alone(ratio, options):
 def test_where_heat_has_no_digits_a_face_is_named():
     grid, ball = shapes.grid(3), shapes.icosphere(2)
     point = Mesh([*grid.V, *([[2.0, 2, 2]] * 3)], [*grid.F, [16, 17, 18]])
-    with pytest.raises(FactorizationError, match=r"; F\[18\] = \[16, 17, 18\] has the least area .* or take"):
+    with pytest.raises(FactorizationError, match=r"; the thinnest face is F\[18\] = \[16, 17, 18\]: repair it, and"):
         HeatMethodSolver(point)
-    with pytest.raises(FactorizationError, match=r"nan at vertex 1; F\[\d+\] = .* or take laplacian='auto'"):
+    with pytest.raises(FactorizationError, match=r"nan at vertex 1; .* F\[\d+\] = .* laplacian at 'auto'"):
         HeatMethodSolver(Mesh(ball.V * [1e12, 1, 1], ball.F), laplacian="cotan").distance(0)
 
 

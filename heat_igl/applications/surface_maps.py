@@ -164,8 +164,8 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
 
     Raises
     ------
-    MeshError
-        If the mesh cannot be used, or holds tetrahedra; if `region` is no mask of it.
+    MeshError, FactorizationError
+        If the mesh cannot be used, holds tetrahedra, or has faces too thin; if `region` is no mask of it.
     ValueError
         If `values` are not real and finite, one for each vertex, or `fwhm` is not positive.
 
@@ -174,7 +174,7 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
     Heat flow on the intrinsic Delaunay triangulation for the time ``fwhm**2 / (16 log 2)``, in eight steps of second
     order that damp all frequencies (Alexander 1977: two stages, one matrix, which is factored once), with a
     mass matrix between the lumped and the consistent one, whose errors cancel on regular triangles. A Gaussian narrower
-    than four mean edge lengths comes out narrower still, and dips below 0 by less than 1e-4 of its height.
+    than four mean edge lengths comes out narrower still, and may dip below 0.
 
     Examples
     --------

@@ -170,7 +170,7 @@ class GeodesicSolver(BatchedSolver):
     region : (n,) or (m,) array_like of bool, optional
         What paths may enter, of a mesh: faces all of whose vertices are selected, or selected faces. Elsewhere distance
         is ``inf``, and sources are an error; all numbers stay those of the whole mesh. Angles of `directions` are those
-        of `tangent_frames` of the part alone.
+        of `tangent_frames` of the part alone. A mask of n = m entries is of vertices.
 
     Raises
     ------

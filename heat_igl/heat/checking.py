@@ -316,10 +316,7 @@ def thinnest(surface: Surface | None) -> str:
     F, longest = surface.given_faces, surface.faces.l.max(axis=1)
     share = np.divide(surface.faces.areas, longest**2, out=np.zeros(len(longest)), where=longest > 0)
     first = int(share[: len(F)].argmin())
-    return (
-        f"; F[{first}] = {F[first].tolist()} has the least area for its size: remove or repair it, or take "
-        "laplacian='auto'"
-    )
+    return f"; the thinnest face is F[{first}] = {F[first].tolist()}: repair it, and leave laplacian at 'auto'"
 
 
 def _sample(items: AnyArray, most: int) -> AnyArray:

@@ -60,14 +60,14 @@ class HeatMethodSolver(BatchedSolver):
         Linear solver, see `factorize`.
     region : (n,) or (m,) array_like of bool, optional
         What heat may enter, of a mesh: faces all of whose vertices are selected, or selected faces. Elsewhere distance
-        is ``inf``, and sources are an error. Fields per face, as those of `solve`, are those of the part alone.
+        is ``inf``, and sources are an error. Fields per face, as of `solve`, are of the part. If n is m: vertices.
 
     Raises
     ------
     MeshError
         If the mesh cannot be used; the message names the first offender.
     FactorizationError
-        If a matrix is not positive definite, or an answer is no number; it names the thinnest face.
+        If a matrix is not positive definite, or an answer is no number; it names the thinnest triangle.
     ValueError
         If an option has no meaning.
 
