@@ -18,7 +18,7 @@ from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 # The compiled module, whose signatures are those of Cython.
 kernel: Any = straightest
-# Fewer geodesics than this are traced on one thread.
+# Fewer geodesics than this, which take some 10 ms, are traced on one thread.
 _FEW = 500
 # Lines of more edges are refused: a tenth of a second each, and half a gigabyte if they are stored.
 _MOST_EDGES = 1e7

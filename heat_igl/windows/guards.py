@@ -33,8 +33,9 @@ _NO_LENGTHS = np.empty((0, 3))
 _REPORT = "please report this as a bug, with the mesh and the sources"
 # Distances shorter than the straight line by less than this fraction are left, as rounding.
 _ROUNDING = 1e-12
-# For more sources, a k-d tree is faster than a loop over all of them; it does not take offsets into account.
-_MANY = 100
+# For more sources, a k-d tree is faster than a loop over all of them; it does not take offsets into account. The loop
+# takes 0.4 to 1.0 of the time at 400 sources, and 1.9 to 3.0 at 1600 (a sphere, a scan, and points in a cube).
+_MANY = 400
 
 
 class Invariants:
