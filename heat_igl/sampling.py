@@ -95,19 +95,19 @@ class VoronoiCells:
 
 
 def voronoi_cells(solver: Solver | MeshLike, sites: ArrayLike) -> VoronoiCells:
-    """The geodesic Voronoi diagram of given vertices: of a `GeodesicSolver` in one query, of others one for each site.
+    """The geodesic Voronoi diagram of given vertices; a `GeodesicSolver` takes one query, other solvers one per site.
 
     Parameters
     ----------
     solver : GeodesicSolver, HeatMethodSolver or mesh
-        Of any domain, or whatever `as_mesh` takes, for its `GeodesicSolver`.
+        A solver on any domain, or whatever `as_mesh` takes, for a new `GeodesicSolver`.
     sites : (k,) array_like of int
         Distinct vertices.
 
     Returns
     -------
     VoronoiCells
-        With the sites in the given order. A site always belongs to the cell of the site itself.
+        With the sites in the given order. Each site belongs to its own cell, even if another one is at distance 0.
 
     Raises
     ------

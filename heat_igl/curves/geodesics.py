@@ -142,22 +142,23 @@ def as_curve(parts: Sequence[Shortened], *, is_closed: bool) -> SurfaceCurve:
 
 
 def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
-    """The locally shortest curve of the class of a curve.
+    """The locally shortest curve in the homotopy class of a curve.
 
     Parameters
     ----------
     mesh : mesh
         Triangles, also with edges of more than two faces.
     curve : SurfaceCurve
-        Any curve on the mesh: along edges, through faces, over itself. An open one keeps its ends; a closed one is
-        straightened as a loop, without a fixed point.
+        Any curve on the mesh: along edges, through faces, crossing itself. The ends of an open curve are fixed; a
+        closed one is straightened as a loop, without a fixed point.
 
     Returns
     -------
     SurfaceCurve
-        Never longer than `curve`, and of the same homotopy class: it can be moved there on the surface. It is straight
-        across edges and has angles of at least pi on both sides at each vertex that it touches, where the surface goes
-        on there, so no curve nearby is shorter. A loop that contracts to a point is a single segment of length 0.
+        Never longer than `curve`, and of the same homotopy class: one can be deformed into the other on the surface. It
+        is straight across edges, and has angles of at least pi on both sides at each vertex that it touches (on the
+        boundary, on the inner side), so no curve nearby is shorter. A contractible loop may end as one segment of
+        length 0.
 
     Raises
     ------
@@ -169,11 +170,11 @@ def straighten(mesh: MeshLike, curve: SurfaceCurve) -> SurfaceCurve:
 
     Notes
     -----
-    The curve gives a strip of faces, in which a funnel finds the shortest path (Lee and Preparata 1984). Where it bends
-    at a vertex with an angle below pi on the other side, the strip is led there (Xin and Wang 2007). A loop is
-    shortened at the vertex with the smallest angle first (Sharp and Crane 2020), then from one of its points to itself,
-    and from another one, until its length stays the same. On a surface with hills one class can have several locally
-    shortest curves. A loop that becomes less than half as long is shortened a second time in another order.
+    In the strip of faces that the curve crosses, the funnel algorithm finds the shortest path (Lee and Preparata 1984).
+    If this path bends at a vertex whose angle on the other side is below pi, the strip is rerouted there (Xin and Wang
+    2007). A loop is shortened at the vertex with the smallest angle first (Sharp and Crane 2020), then as a path from
+    one of its points to itself, with changing points, until its length stays the same. One class can have several
+    locally shortest curves. A loop that becomes less than half as long is shortened a second time in another order.
 
     Examples
     --------

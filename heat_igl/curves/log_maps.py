@@ -32,14 +32,13 @@ def log_map(
     Parameters
     ----------
     mesh : mesh, GeodesicSolver or VectorHeatSolver
-        Whatever `as_mesh` takes, with triangles that are a manifold and oriented alike, which those of a `PointCloud`
-        need not be; or a solver on such a mesh. A solver keeps the tables that a mesh needs for
-        each source.
+        Whatever `as_mesh` takes, with triangles that are a consistently oriented manifold, or a `PointCloud`; or a
+        solver on such a mesh, which keeps tables that are otherwise made for each call.
     source : int or SurfacePoints
         A vertex, or one point in a face.
     method : {"exact", "vector-heat"}
-        "exact" follows exact shortest paths, "vector-heat" is `VectorHeatSolver.log_map`, from vertices only. A solver
-        has a method of its own, and this is not read.
+        "exact" follows exact shortest paths, "vector-heat" is `VectorHeatSolver.log_map`, from vertices only. Ignored
+        for a solver, which has its own method.
 
     Returns
     -------
@@ -59,13 +58,13 @@ def log_map(
 
     Notes
     -----
-    If the shortest path to a vertex is straight, `exp_map` of the vector leads back to the vertex, to 1e-14 of the
-    largest distance. It may not if the path passes another vertex as closely as numbers are rounded, since those on its
-    two sides differ in direction by its curvature: from a point at the distance d from that vertex, in edge lengths,
-    these are paths within 1e-14 / d of a radian of it. Where a path bends, at a vertex of negative curvature or on the
-    boundary, the vector has the whole length, and the direction in which the path leaves the source: no straightest
-    geodesic from the source need lead there. At the cut locus there are several shortest paths, and the vector is that
-    of one of them.
+    If the shortest path to a vertex is straight, `exp_map` of the vector returns the vertex, to 1e-14 of the largest
+    distance. The exception are paths that pass another vertex within rounding, since directions on its two sides differ
+    by its curvature: from a source at the distance d from that vertex, in edge lengths, these are the paths within
+    1e-14 / d radians of it. If a path bends, at a vertex of negative curvature or on the boundary, the vector has the
+    length of the whole path and the direction in which it leaves the source; a straightest geodesic in this direction
+    need not lead to the vertex. At the cut locus there are several shortest paths, and the vector is that of one of
+    them.
 
     Examples
     --------

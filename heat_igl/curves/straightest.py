@@ -35,10 +35,10 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
     start : int or SurfacePoints
         A vertex, or one point in a face.
     direction : (2,) or (3,) array_like
-        The length does not matter. Two components are those of the frame: at a vertex see `tangent_frames`; in a face
-        the first axis runs from corner 0 to corner 1, and the second to the side of corner 2; a point in a vertex has
-        the frame of the vertex. Three components are a vector in space, whose part along the normal of the vertex or
-        face is left out.
+        A vector of any length. Two components are in the tangent frame: at a vertex that of `tangent_frames`; in a face
+        the first axis points from corner 0 to corner 1, the second towards corner 2; a point at a vertex has the frame
+        of the vertex. Three components are a vector in space, which is projected to the tangent plane of the vertex or
+        face.
     length : float
         In the mesh's unit, 0 or more.
 
@@ -60,13 +60,13 @@ def trace_geodesic(mesh: MeshLike, start: Sources, direction: ArrayLike, length:
 
     Notes
     -----
-    The geodesic is straight in each face, and across each edge in the plane of the two faces unfolded. At a vertex
-    inside it goes on so that the angles on both sides, as sums of angles in faces, are equal; this defines a unique
-    continuation also if the angles do not sum to 2 pi. A geodesic meets a vertex ahead that it would pass by less than
-    1e-10 of the way to it, and of the length of the side that it would cross there. It ends when it meets the boundary,
-    and has length 0 if it starts on the boundary and points off the surface. At a vertex of the boundary it goes on if
-    the faces have an angle of pi or more on exactly one side of it: then it leaves at pi on this side, as a straight
-    line in the plane does along a straight boundary or past a corner. It is not the shortest path in general.
+    The geodesic is straight in each face, and across each edge with the two faces unfolded into a plane. At an inner
+    vertex it continues so that the sums of the face angles on both sides are equal, which is unique even if the angles
+    do not sum to 2 pi. A geodesic that would pass a vertex by less than 1e-10 of its distance, and of the length of the
+    side that it would cross there, meets this vertex. It ends when it meets the boundary, and has length 0 if it starts
+    on the boundary and points off the surface. At a boundary vertex it continues if the sum of the face angles is pi or
+    more on exactly one side of it: it leaves at the angle pi on this side, as a straight line in the plane does along a
+    straight boundary or past a corner. It is not the shortest path in general.
 
     Examples
     --------

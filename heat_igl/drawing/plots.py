@@ -175,14 +175,14 @@ def plot_labels(
     view: tuple[float, float] | None = None,
     up: str = "y",
 ) -> Picture:
-    """Draw labels of vertices, such as those of Voronoi cells: a colour each, and others for neighbours.
+    """Draw labels of vertices, such as those of Voronoi cells, with different colours for neighbouring labels.
 
     Parameters
     ----------
     labels : (n,) array_like of int
         A label for each vertex; -1, for vertices without one, is drawn grey.
     distance : (n,) array_like, optional
-        Of Voronoi cells, the distance of each vertex from the site of its cell: borders are then drawn where the
+        For Voronoi cells, the distance of each vertex from the site of its cell: borders are then drawn where the
         distances from both sites are equal. Otherwise a point has the label of the nearest corner of its triangle.
     mesh, sources, curves, view, up
         As for `plot`.
@@ -201,8 +201,8 @@ def plot_labels(
 
     Notes
     -----
-    Ten colours that differ in hue are given out in the order of the labels, each label the first colour that no
-    neighbour has; where all ten are taken, the one that comes next.
+    There are ten colours of different hue. In ascending order, each label gets the first colour that no neighbouring
+    label has, or if all ten are taken, the next one in turn.
     """
     mesh = _drawn(mesh)
     given = as_array("labels", labels)

@@ -39,7 +39,7 @@ def geodesic_distance(
     targets: Sources | None = None,
     region: ArrayLike | None = None,
 ) -> FloatArray:
-    """Geodesic distance from the nearest source, in one call; to ask more than once, keep a `GeodesicSolver`.
+    """Geodesic distance from the nearest source, in one call; for several queries, keep a `GeodesicSolver`.
 
     Parameters
     ----------
@@ -53,14 +53,13 @@ def geodesic_distance(
     method : {"auto", "windows", "exact", "sweep", "heat"}
         As for `GeodesicSolver`; "heat" is the heat method as `HeatMethodSolver` has it by default.
     tolerance : float
-        Largest error over the distance. Windows are exact, which holds every tolerance.
+        Largest relative error. Windows are exact, whatever the tolerance.
     cutoff : float, optional
-        Distances beyond this are ``inf``, and a search by windows looks at no part of the mesh that is farther away.
+        Distances beyond this are ``inf``, and a search by windows ends there.
     targets : int, sequence of int, (n,) mask of bool, or SurfacePoints, optional
-        The vertices or points whose distance is asked for: only theirs is returned, and a search by windows ends once
-        they are known.
+        Vertices or points: only their distances are returned, and a search by windows ends once they are known.
     region : (n,) or (m,) array_like of bool, optional
-        What paths may enter, as for `GeodesicSolver`; elsewhere distance is ``inf``.
+        The vertices or faces that paths may enter, as for `GeodesicSolver`; elsewhere distance is ``inf``.
 
     Returns
     -------

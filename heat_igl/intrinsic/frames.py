@@ -207,14 +207,14 @@ class TangentFrames:
 def tangent_frames(mesh: MeshLike) -> TangentFrames:
     """Orthonormal frames at the vertices of a triangle mesh, and their polar angles.
 
-    Angles around a vertex are those of the faces times one factor per vertex, so that they sum to 2 pi, and to pi on
-    the boundary. They count counterclockwise from the reference edge of the vertex. For an inner vertex it is the edge
-    to the next corner in the first face (of the lowest index) that uses the vertex. For a boundary vertex it is the
-    boundary edge at which the faces begin, counterclockwise; the other boundary edge has the angle pi.
+    The polar angles around a vertex are the face angles times a factor per vertex, so that they sum to 2 pi, or to pi
+    on the boundary. They are measured counterclockwise from the reference edge of the vertex. For an inner vertex this
+    is the edge to the next corner in the face of the lowest index at the vertex; for a boundary vertex it is the first
+    boundary edge in counterclockwise order, and the other boundary edge has the angle pi.
 
-    The normal is the mean of the normals of the faces, weighted by their angles. The axis x lies in the plane across
-    the normal, in the direction that fits the polar angles of all edges best: the sum of the edges as vectors, each
-    turned back by the angle; on the boundary by the angle in the faces, with the middle of the faces at pi / 2.
+    The normal is the mean of the face normals, weighted by the face angles. The axis x is perpendicular to it, in the
+    direction that fits the polar angles of all edges best: the sum of the edge vectors, each rotated back by its polar
+    angle; on the boundary by the angle in the faces, with the middle of the faces at pi / 2.
 
     Parameters
     ----------
@@ -225,15 +225,15 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
     Returns
     -------
     TangentFrames
-        Frames, and conversions between components, vectors in space, vectors in faces, and angles. Vertices that no
-        face uses have the axes of space.
+        Frames, and conversions between components, vectors in space, vectors in faces, and angles. Unreferenced
+        vertices have the coordinate axes as frames.
 
     Raises
     ------
     MeshError
-        If the mesh is tetrahedral, more than two faces meet at an edge, neighbours are oriented differently (on a
-        Moebius strip any orientation has such neighbours), or the faces at a vertex are not one fan. The message names
-        the first offender.
+        If the mesh is tetrahedral, more than two faces meet at an edge, neighbouring faces have opposite orientations
+        (as is unavoidable on a Moebius strip), or the faces at a vertex are not one fan. The message names the first
+        offender.
 
     Examples
     --------

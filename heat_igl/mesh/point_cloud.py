@@ -42,11 +42,11 @@ class PointCloud:
     P : (n, 3) array_like of real numbers
         Positions, in any unit of length; copied to float64. At least four, not all on a line.
     normals : (n, 3) array_like of real numbers, optional
-        A normal for each point, of any length but 0, all pointing to the same side of the surface. They give the
-        tangent planes, and tell sheets apart that nearly touch: neighbours whose normals point away are left out.
-        Points and patches whose normals contradict their neighbours are turned over, but for `normals`. Without
-        normals planes are fitted to the neighbours, and so they are, with an `AccuracyWarning`, if normals contradict
-        each other in any case.
+        A normal for each point, of any length but 0, all pointing to the same side of the surface. They define the
+        tangent planes, and separate sheets that nearly touch: neighbours with opposite normals are ignored. Normals of
+        points and patches that contradict their neighbours are flipped internally (the attribute `normals` is not).
+        Planes are fitted to the neighbours if there are no normals, and, with an `AccuracyWarning`, if they cannot be
+        made consistent.
 
     Attributes
     ----------
@@ -63,9 +63,9 @@ class PointCloud:
 
     Notes
     -----
-    Copies of a point are kept: they are at distance 0 from each other. A point that is farther from all others than
-    a gap that is filled is wide, an outlier, belongs to no triangle, and the distance there is ``inf``. If the
-    points are noisy, distance is measured on a surface through the noise, see `triangles`. Arrays are read-only.
+    Copies of a point are kept: they are at distance 0 from each other. A point whose distance from all others is larger
+    than the gaps that are filled is an outlier: it belongs to no triangle, and the distance there is ``inf``. If the
+    points are noisy, distance is measured on a smooth surface through them, see `triangles`. Arrays are read-only.
 
     Examples
     --------
