@@ -15,7 +15,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intri
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
-from heat_igl.operators.metric_simplices import MetricSimplices
+from heat_igl.operators.metric_simplices import MetricSimplices, inverse_root
 from heat_igl.operators.suitability import mean_angle_defect
 from heat_igl.operators.triangles import check_measures, edge_length_operators, intrinsic_operators, longest_sides
 from heat_igl.plan import hopf_lax_is_nearer
@@ -162,7 +162,8 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     largest = _LARGEST**0.5
     outside = (s < 1 / largest) | (s > largest)
     _raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
-    domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2, 1 / float(s.max()))
+    root = np.eye(p) * s[:, None, None]
+    domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2, 1 / float(s.max()), root)
     if domain.surface is None:
         return domain
     return replace(domain, metric=MetricSides(mesh, np.eye(3) / s[:, None, None] ** 2))
@@ -260,22 +261,24 @@ def _squared_factor(name: str, given: ArrayLike, k: int) -> FloatArray:
     return np.asarray(square[:, None, None])
 
 
-def operators_in_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Laplacian = "auto") -> Operators:
+def operators_in_metric(
+    mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None = None, laplacian: Laplacian = "auto"
+) -> Operators:
     """`metric_operators` of a checked mesh and metric g (m, p, p), in the planes of triangles or in space.
 
-    No unit vector is shorter than `least` in it.
+    No unit vector is shorter than `least` in it. The inverse root (m, p, p) may be given.
     """
     if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, MetricSimplices.in_metric(mesh, g, least), g)
+        return _TetrahedronOperators(mesh, MetricSimplices.in_metric(mesh, g, least, root=root), g)
     corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
     along = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     own = np.sqrt(((along @ g) * along).sum(axis=2))
     sides = _common_lengths(mesh, own)
     if sides is None:
-        return _refracting(mesh, own, g, least, laplacian)
+        return _refracting(mesh, own, (g, least, root), laplacian)
     # Triangles without area know no metric in their plane.
     has_area = bool((mesh.measures > 0).all())
-    return _unfolded(mesh, sides, _of_faces(mesh, g, least) if has_area else None, laplacian)
+    return _unfolded(mesh, sides, _of_faces(mesh, g, least, root) if has_area else None, laplacian)
 
 
 def _unfolded(mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian) -> Operators:
@@ -288,25 +291,25 @@ def _unfolded(mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, 
     return replace(domain, simplices=simplices)
 
 
-def _of_faces(mesh: Mesh, g: FloatArray, least: float) -> MetricSimplices:
+def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None) -> MetricSimplices:
     """Triangles with a metric g (m, 2, 2) in the plane of each."""
     axes = plane_axes(mesh)
-    return MetricSimplices.in_metric(mesh, np.swapaxes(axes, 1, 2) @ g @ axes, least)
+    return MetricSimplices.in_metric(mesh, np.swapaxes(axes, 1, 2) @ g @ axes, least, root=root)
 
 
-def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:
+def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, root: FloatArray, laplacian: Laplacian) -> Operators:
     """The operators of simplices with a metric (n, 3, 3) at each vertex, as `operators_in_metric`."""
-    simplices = MetricSimplices.in_metric(mesh, g, least, at_vertices=True)
+    simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
     mean = g[mesh.F].mean(axis=1)
     if mesh.is_tetrahedral:
         return _TetrahedronOperators(mesh, simplices, mean)
     axes = plane_axes(mesh)
     inside = axes @ mean @ np.swapaxes(axes, 1, 2)
-    sides = simplices.measured[2][:, ::-1]  # opposite each corner
-    if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1])):
+    sides = simplices.measured[1][:, ::-1]  # opposite each corner
+    if _keeps_shape(sides, np.sqrt(simplices.measured[0][:, ::-1])):
         return _unfolded(mesh, sides, simplices, laplacian)
     # For heat: what each face says alone.
-    domain = operators_in_metric(mesh, inside, least, laplacian)
+    domain = operators_in_metric(mesh, inside, least, None, laplacian)
     return replace(domain, surface=None, simplices=simplices)
 
 
@@ -328,7 +331,9 @@ def _keeps_shape(sides: FloatArray, was: FloatArray) -> bool:
     return bool((slack >= _SLACK * was_slack).all())
 
 
-def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:
+def _refracting(
+    mesh: Mesh, sides: FloatArray, metric: tuple[FloatArray, float, FloatArray | None], laplacian: Laplacian
+) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
     glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F))
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
@@ -340,9 +345,9 @@ def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, lapl
     is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
     fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
     if fits or not (mesh.measures > 0).all():
-        simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, least)
+        simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, metric[1])
     else:
-        simplices = _of_faces(mesh, g, least)
+        simplices = _of_faces(mesh, *metric)
     return replace(domain, simplices=simplices)
 
 
@@ -431,8 +436,8 @@ def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths
     )
 
 
-def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float]:
-    """The metric (m, p, p) in the planes of triangles or in space, from one per face, and its least length."""
+def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray]:
+    """The metric (m, p, p) in the planes of triangles or in space, its least length, and its inverse root."""
     m, p = mesh.n_faces, mesh.F.shape[1] - 1
     shapes = [(m, 3, 3), (mesh.n_vertices, 3, 3)] + [(m, 2, 2)] * (p == 2)
     if g.shape not in (shapes[0], *shapes[2:]):
@@ -444,27 +449,31 @@ def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float]:
     if p < g.shape[1]:
         axes = plane_axes(mesh)
         symmetric = np.asarray(axes @ symmetric @ np.swapaxes(axes, 1, 2), np.float64)
-    return symmetric, _least_length(np.asarray(np.linalg.eigvalsh(symmetric)[:, 0]), g)
+    root, smallest = inverse_root(symmetric)
+    return symmetric, _least_length(smallest, g), root
 
 
-def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float]:
-    """The metric (n, 3, 3) from one per vertex, and its least length on faces."""
+def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray]:
+    """The metric (n, 3, 3) from one per vertex, and on faces its least length and inverse root."""
     symmetric = _symmetric(g)
     if mesh.is_tetrahedral:
-        smallest = np.where(mesh.referenced, np.linalg.eigvalsh(symmetric)[:, 0], np.inf)
+        root, sizes = inverse_root(symmetric)
+        smallest = np.where(mesh.referenced, sizes, np.inf)
     else:
         axes, smallest = plane_axes(mesh)[:, None], np.full(mesh.n_vertices, np.inf)
-        np.minimum.at(smallest, mesh.F, np.linalg.eigvalsh(axes @ symmetric[mesh.F] @ np.swapaxes(axes, 2, 3))[..., 0])
-    return symmetric, _least_length(smallest, g)
+        root, sizes = inverse_root(axes @ symmetric[mesh.F] @ np.swapaxes(axes, 2, 3))
+        np.minimum.at(smallest, mesh.F, sizes)
+    return symmetric, _least_length(smallest, g), root
 
 
 def _symmetric(g: FloatArray) -> FloatArray:
     """Tensors (k, p, p), after a check that they are finite and symmetric but for rounding."""
-    transposed = np.swapaxes(g, 1, 2)
+    above = np.triu_indices(g.shape[1], 1)
     size = np.abs(g).max(axis=(1, 2))
     _raise_at_first(~np.isfinite(size), "metric", g, "must be finite")
-    _raise_at_first(np.abs(g - transposed).max(axis=(1, 2)) > _ROUNDING * size, "metric", g, "must be symmetric")
-    return np.asarray((g + transposed) / 2)
+    apart = np.abs(g[:, *above] - g[:, *above[::-1]]).max(axis=1)
+    _raise_at_first(apart > _ROUNDING * size, "metric", g, "must be symmetric")
+    return np.asarray((g + np.swapaxes(g, 1, 2)) / 2)
 
 
 def _least_length(smallest: FloatArray, g: FloatArray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,7 +12,7 @@ import scipy.sparse as sp
 from heat_igl.kernels.sweep import hopf_lax
 from heat_igl.mesh import Mesh
 from heat_igl.operators.metric_derivatives import plane_axes
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Differences between tensors that are taken for rounding.
 _ROUNDING = 1e-9
@@ -40,9 +41,11 @@ class MetricSimplices:
         Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
     tensors : (m, 1, 3, 3) float64 or None
         A metric of each simplex, unless there are velocities.
-    velocity : (m, p + 1, 6) float64 or None
-        The inverse root of a metric at each corner, linear in between; across a triangle it is the mean in its plane.
-        Of the symmetric matrix the entries on and above the diagonal, row by row.
+    velocity : (k, 6) float64 or None
+        Inverse roots of metrics; across a triangle it is the mean in its plane. Of the symmetric matrix the entries on
+        and above the diagonal, row by row.
+    rows : (m, p + 1) int32 or None
+        The row of `velocity` at each corner; it is linear in between.
     is_given : bool
         Whether tensors, or positions without tensors, are those that the user gave in space: then distance has
         derivatives by them.
@@ -56,6 +59,7 @@ class MetricSimplices:
     least: float = 1.0
     tensors: FloatArray | None = None
     velocity: FloatArray | None = None
+    rows: AnyArray | None = None
     is_given: bool = False
 
     @classmethod
@@ -64,10 +68,13 @@ class MetricSimplices:
         return cls(mesh.F, np.empty(0), mesh.n_vertices, mesh.V, mesh.V, is_given=True)
 
     @classmethod
-    def in_metric(cls, mesh: Mesh, g: FloatArray, least: float, at_vertices: bool = False) -> MetricSimplices:
+    def in_metric(
+        cls, mesh: Mesh, g: FloatArray, least: float, at_vertices: bool = False, root: FloatArray | None = None
+    ) -> MetricSimplices:
         """The faces of a mesh with a metric (m, 3, 3) on each, or (n, 3, 3) at each vertex, and its `least` length.
 
-        Where it is the same everywhere, distance is that in space after a linear map.
+        Where it is the same everywhere, distance is that in space after a linear map. The inverse root may be given,
+        for triangles in the plane of each, (m, 2, 2) or (m, 3, 2, 2).
         """
         p = mesh.F.shape[1] - 1
         if p == 3 and np.abs(g - g[0]).max() <= _ROUNDING * np.abs(g[0]).max():
@@ -77,26 +84,29 @@ class MetricSimplices:
         across = None
         if p == 2:
             axes = plane_axes(mesh)[:, None]
-            inside = inverse_root(axes @ (g[mesh.F] if at_vertices else g[:, None]) @ np.swapaxes(axes, 2, 3))
+            if root is None:
+                root = inverse_root(axes @ (g[mesh.F] if at_vertices else g[:, None]) @ np.swapaxes(axes, 2, 3))[0]
+            inside = root.reshape(len(root), -1, 2, 2)
             normal = np.cross(axes[..., 0, :], axes[..., 1, :])
             across = normal[..., None] * normal[..., None, :]
             W = _with_normal(np.swapaxes(axes, 2, 3) @ inside @ axes, across)
         else:
-            W = inverse_root(g)[:, None]
-        velocity: FloatArray | None
-        if at_vertices:
-            velocity = W[:, 0][:, *_ABOVE][mesh.F] if across is None else W[..., *_ABOVE]
-        else:
+            W = (inverse_root(g)[0] if root is None else root)[:, None]
+        velocity: FloatArray | None = W[..., *_ABOVE]
+        rows: AnyArray = mesh.F.astype(np.int32)
+        if not at_vertices:
             planes = None if across is None else across[:, 0][:, *_ABOVE]
-            velocity, fitted = _at_corners(mesh, W[:, 0][:, *_ABOVE], planes)
+            velocity, rows, fitted = _at_corners(mesh, W[:, 0][:, *_ABOVE], planes)
             least = min(least, fitted)
-            if velocity is not None and across is not None:
-                inside = (np.eye(3) - across) @ _symmetric(velocity) @ (np.eye(3) - across)
+        if velocity is None:
+            return cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, g[:, None], is_given=p == 3)
+        if across is not None:
+            if not at_vertices:
+                inside = (np.eye(3) - across) @ _symmetric(velocity[rows]) @ (np.eye(3) - across)
                 velocity = _with_normal(inside, across)[..., *_ABOVE]
-        velocity = None if velocity is None else np.ascontiguousarray(velocity)
-        tensors = g[:, None] if velocity is None else None
-        is_given = at_vertices or (p == 3 and velocity is None)
-        return cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, tensors, velocity, is_given)
+            rows = np.arange(mesh.F.size, dtype=np.int32).reshape(mesh.F.shape)
+        velocity = np.ascontiguousarray(velocity).reshape(-1, 6)
+        return cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, None, velocity, rows, at_vertices)
 
     @classmethod
     def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
@@ -109,12 +119,11 @@ class MetricSimplices:
         return cls(F, sides[:, ::-1], len(V), None, V, least, tensors[:, None])
 
     @cached_property
-    def measured(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """What `lengths_in_velocity` returns; in one metric for each simplex all squares agree, and the slack is 1."""
+    def measured(self) -> tuple[Any, ...]:
+        """What `lengths_in_velocity` returns, or the same of one metric for each simplex."""
         if self.velocity is not None:
             corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
-            found: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-            found = hopf_lax.lengths_in_velocity(corners, V, self.velocity)
+            found: tuple[Any, ...] = hopf_lax.lengths_in_velocity(corners, V, self.velocity, self.rows)
             return found
         lengths = self.lengths
         if not len(lengths):
@@ -123,22 +132,21 @@ class MetricSimplices:
             one, other = np.tril_indices(self.corners.shape[1], -1)
             e = self.place[self.corners[:, one]] - self.place[self.corners[:, other]]
             lengths = np.sqrt(((e @ self.tensors[:, 0]) * e).sum(axis=2))
-        mean = np.ascontiguousarray(lengths**2)
-        return mean[:, None], mean, lengths, np.ones(len(mean))
+        mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths))
+        return mean, lengths, mean.max(axis=1), one_each, 0 * one_each, None, 0.0
 
     @property
     def variation(self) -> float:
         """How far lengths of edges differ between the metrics of the corners of a simplex: mean square of the share."""
-        squares, mean, _, _ = self.measured
-        return float((np.ptp(np.sqrt(squares), axis=1) ** 2 / mean).mean())
+        return float(self.measured[6])
 
     def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:
         """The tensors (..., 3, 3) of chosen simplices (...) at corners (...)."""
         if self.tensors is not None:
             return np.asarray(self.tensors[chosen, 0])
-        if self.velocity is None:
+        if self.velocity is None or self.rows is None:
             raise ValueError("these simplices have lengths, and no tensors")
-        W = _symmetric(self.velocity[chosen, corner])
+        W = _symmetric(self.velocity[self.rows[chosen, corner]])
         return np.asarray(np.linalg.inv(W @ W))
 
     @cached_property
@@ -152,7 +160,7 @@ class MetricSimplices:
         ends = self.corners[:, np.stack(np.tril_indices(self.corners.shape[1], -1), axis=1)].reshape(-1, 2)
         if self.V is not None:
             return ends, np.linalg.norm(self.V[ends[:, 0]] - self.V[ends[:, 1]], axis=1)
-        return ends, self.measured[2].ravel()
+        return ends, self.measured[1].ravel()
 
     def halved(self) -> MetricSimplices:
         """Tetrahedra in space, each cut into eight at the middles of the edges; the vertices keep their numbers.
@@ -186,10 +194,14 @@ class MetricSimplices:
         return np.unique(np.sort(self.edges[0], axis=1), axis=0, return_inverse=True)
 
 
-def inverse_root(g: FloatArray) -> FloatArray:
-    """The symmetric matrices g^(-1/2), for g (..., p, p)."""
+def inverse_root(g: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The symmetric matrices g^(-1/2), for g (..., p, p), and the smallest eigenvalue (...) of each g.
+
+    The roots are those of |g| where g is not positive definite.
+    """
     sizes, axes = np.linalg.eigh(g)
-    return np.asarray((axes / np.sqrt(sizes)[..., None, :]) @ np.swapaxes(axes, -1, -2))
+    root = (axes / np.sqrt(np.maximum(np.abs(sizes), np.finfo(float).tiny))[..., None, :]) @ np.swapaxes(axes, -1, -2)
+    return np.asarray(root), np.asarray(sizes[..., 0])
 
 
 def _with_normal(W: FloatArray, across: FloatArray) -> FloatArray:
@@ -204,50 +216,51 @@ def _symmetric(above: FloatArray) -> FloatArray:
     return full
 
 
-def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[FloatArray | None, float]:
-    """The velocities W (m, 6) of simplices as samples of a smooth field: (m, p + 1, 6) at their corners.
+def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[FloatArray | None, AnyArray, float]:
+    """The velocities W (m, 6) of simplices as samples of a smooth field, with the row at each corner (m, p + 1).
 
     Around each vertex, a linear function is fitted. The velocity at the vertex is taken from it if it explains all of
     the variance and is positive definite there, and is that of each simplex if it leaves a quarter or more, as it
     leaves of a step: jumps stay where they are. What varies since triangles, with the projections `across` (m, 6) on
-    their normals, have other planes, counts as left. None if the field is smooth nowhere. The second result is the
+    their normals, have other planes, counts as left. None if the field is smooth nowhere. The third result is the
     least length of a unit vector at vertices.
     """
-    (m, size), n = mesh.F.shape, mesh.n_vertices
+    F, n, size = mesh.F, mesh.n_vertices, mesh.F.shape[1]
     off = np.where(_ABOVE[0] == _ABOVE[1], 1, np.sqrt(2))  # for the norm of symmetric matrices
     level = (W * off).mean(axis=0)
-    values = W * off - level
+    values = np.ascontiguousarray(W * off - level)
     X = mesh.V - mesh.V.mean(axis=0)
-    centre = X[mesh.F].mean(axis=1)
-    products = [(centre[:, :, None] * part[:, None]).reshape(m, -1) for part in (centre, values)]
-    planes = np.zeros((m, 0)) if across is None else across * off
-    parts = [np.ones((m, 1)), centre, values, *products, (values**2).sum(axis=1, keepdims=True), planes]
-    moments = np.concatenate(parts, axis=1)
-    of_corners = sp.csr_array((np.ones(size * m), mesh.F.ravel(), np.arange(0, size * m + 1, size)), shape=(m, n))
+    of_corners = sp.csr_array((np.ones(F.size), F.ravel(), np.arange(0, F.size + 1, size)), shape=(len(F), n))
     at = of_corners.T.tocsr()
+    by = np.concatenate([np.ones((len(F), 1)), of_corners @ X / size], axis=1)
+    planes = np.empty((len(F), 0)) if across is None else across * off
+    row = np.concatenate([by, values, np.einsum("mk,mk->m", values, values)[:, None], planes], axis=1)
     # Around a vertex: the simplices at it and at the other corners of these.
-    sums = at @ (of_corners @ (at @ moments))
-    sums /= np.maximum(sums[:, :1], 1)
-    middle, mean = sums[:, 1:4], sums[:, 4:10]
-    spread = sums[:, 10:19].reshape(n, 3, 3) - middle[:, :, None] * middle[:, None]
-    slope = sums[:, 19:37].reshape(n, 3, 6) - middle[:, :, None] * mean[:, None]
-    variance = sums[:, 37] - (mean**2).sum(axis=1)
-    fitted = np.linalg.pinv(spread, hermitian=True) @ slope
+    means = np.stack([at @ (of_corners @ (at @ (x[:, None] * row))) for x in by.T], axis=1)
+    means /= np.maximum(means[:, :1, :1], 1)
+    middle, mean, square = means[:, 0, 1:4], means[:, 0, 4:10], means[:, 0, 10]
+    about = means[:, 1:, 1:10] - middle[:, :, None] * means[:, :1, 1:10]
+    slope = about[..., 3:]
+    variance = square - (mean**2).sum(axis=1)
+    fitted = np.linalg.pinv(about[..., :3], hermitian=True) @ slope
     explained = (fitted * slope).sum(axis=(1, 2))
-    is_constant = variance <= _ROUNDING * ((level**2).sum() + sums[:, 37])
+    is_constant = variance <= _ROUNDING * ((level**2).sum() + square)
     if across is not None:
-        explained -= (1 - (sums[:, 38:] ** 2).sum(axis=1)) * ((mean + level) ** 2).sum(axis=1)
+        explained -= (1 - (means[:, 0, 11:] ** 2).sum(axis=1)) * ((mean + level) ** 2).sum(axis=1)
     share = np.clip(1 - 4 * (1 - explained / np.where(is_constant, 1, variance)), 0, 1) * ~is_constant
     if not (share > _ROUNDING).any():
-        return None, np.inf
+        return None, F, np.inf
     found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
     count = np.maximum(at.sum(axis=1), 1)[:, None]
-    least = share[mesh.F].min(axis=1)[:, None]
+    least = share[F].min(axis=1)[:, None]
     for _ in range(3):
         # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
         found += at @ ((values - of_corners @ found / size) * least) / count
     at_vertex = (found + level) / off
     sizes = np.linalg.eigvalsh(_symmetric(at_vertex))
     share[sizes[:, 0] <= 0] = 0
-    part = share[mesh.F][..., None]
-    return np.asarray((1 - part) * W[:, None] + part * at_vertex[mesh.F]), float(1 / sizes.max())
+    rows = F.astype(np.int32)
+    own, corner = np.nonzero(share[F] < 1 - _ROUNDING)
+    v, rows[own, corner] = F[own, corner], n + np.arange(len(own))
+    mixed = W[own] + share[v, None] * (at_vertex[v] - W[own])
+    return np.concatenate([at_vertex, mixed]), rows, float(1 / sizes.max())

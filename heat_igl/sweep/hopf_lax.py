@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
-from heat_igl.kernels.sweep.hopf_lax import HopfLax, measured
+from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.operators.metric_derivatives import plane_axes
@@ -37,9 +37,9 @@ class HopfLaxEngine(SimplexEngine):
 
     def __init__(self, simplices: MetricSimplices) -> None:
         super().__init__(simplices)
-        place, (squares, mean, _, slack) = np.ascontiguousarray(simplices.place), simplices.measured
-        widest, growth, gradient = measured(self._corners, place, squares, mean, simplices.velocity)
-        self._in_metric = (squares, simplices.velocity, mean, widest, slack, growth, gradient, place)
+        mean, _, widest, slack, growth, inverse, _ = simplices.measured
+        place = np.ascontiguousarray(simplices.place)
+        self._in_metric = (simplices.velocity, inverse, simplices.rows, mean, widest, slack, growth, place)
         if self.turning > MOST_TURNING:
             warn_caller(
                 "the metric turns farther than the mesh resolves: over an edge, the ratio of its lengths in two "

@@ -17,10 +17,10 @@ cdef class HopfLax(Facet):
     cdef const int[:, ::1] corners
     cdef const int[::1] first
     cdef const int[::1] incident
-    cdef const double[:, :, ::1] squares
-    cdef const double[:, :, ::1] velocity
+    cdef const double[:, ::1] velocity
+    cdef const double[:, ::1] inverses
+    cdef const int[:, ::1] rows
     cdef const double[:, ::1] mean
-    cdef const double[:, :, ::1] gradient
     cdef const double[:, ::1] V
     cdef double[::1] pending
     cdef int[::1] n_visits

@@ -34,33 +34,45 @@ def _pair(i: cython.int, j: cython.int) -> cython.int:
 def lengths_in_velocity(
     corners: cython.const[cython.int][:, ::1],
     V: cython.const[cython.double][:, ::1],
-    velocity: cython.const[cython.double][:, :, ::1],
+    velocity: cython.const[cython.double][:, ::1],
+    rows: cython.const[cython.int][:, ::1],
 ):
-    """Of simplices with a velocity (m, p + 1, 6) at each corner, linear in between.
+    """Of simplices with a velocity at each corner, a row (m, p + 1) of `velocity` (k, 6), linear in between.
 
     Returns
     -------
-    squares : (m, p + 1, pairs) float64
-        Squared distances between the corners, in the metric of each corner.
     mean, lengths : (m, pairs) float64
-        The same in that of the centre, and lengths of the edges by Simpson's rule, with the geometric mean of both ends
-        in the middle.
-    slack : (m,) float64
-        By which factor lengths may be shorter in the middle of an edge than in the metric of the centre.
+        Squared distances between the corners, in the metric of the centre, and lengths of the edges by Simpson's rule,
+        with the geometric mean of both ends in the middle.
+    widest, slack, growth, inverse
+        As `HopfLax` takes them.
+    variation : float
+        Of triangles: how far the lengths of edges differ between the metrics of the corners, mean square of the share.
     """
     size: cython.int = corners.shape[1]
-    shape = corners.shape[0], size * (size - 1) // 2
-    found = np.zeros((shape[0], size, shape[1])), np.zeros(shape), np.zeros(shape), np.ones(shape[0])
-    squares: cython.double[:, :, ::1] = found[0]
-    mean: cython.double[:, ::1] = found[1]
-    lengths: cython.double[:, ::1] = found[2]
+    n_pairs: cython.int = size * (size - 1) // 2
+    m = corners.shape[0]
+    found = np.zeros((m, n_pairs)), np.zeros((m, n_pairs)), np.zeros(m), np.ones(m), np.zeros(m)
+    inverses = np.zeros(np.shape(velocity))
+    mean: cython.double[:, ::1] = found[0]
+    lengths: cython.double[:, ::1] = found[1]
+    widest: cython.double[::1] = found[2]
     slack: cython.double[::1] = found[3]
-    n_pairs: cython.int = shape[1]
+    growth: cython.double[::1] = found[4]
+    inverse: cython.double[:, ::1] = inverses
+    variation: cython.double = 0.0
+    squares: cython.double[24]
     here: cython.double[6]
     e: cython.double[18]
     W: cython.double[6]
+    I: cython.double[6]
+    E: cython.double[9]
+    rise: cython.double[3]
+    steep: cython.double[3]
     with cython.nogil:
-        for s in range(corners.shape[0]):
+        for i in range(velocity.shape[0]):
+            invert(cython.address(velocity[i, 0]), cython.address(inverse[i, 0]))
+        for s in range(m):
             for k in range(6):
                 W[k] = 0.0
             for i in range(size):
@@ -68,108 +80,75 @@ def lengths_in_velocity(
                     for x in range(3):
                         e[3 * _pair(i, j) + x] = V[corners[s, j], x] - V[corners[s, i], x]
                 for k in range(6):
-                    W[k] += velocity[s, i, k] / size
-            _squares(W, e, n_pairs, cython.address(mean[s, 0]))
+                    W[k] += velocity[rows[s, i], k] / size
+            invert(W, I)
+            _squares(I, e, n_pairs, cython.address(mean[s, 0]))
+            for i in range(1, size):
+                rise[i - 1] = mean_velocity(cython.address(velocity[rows[s, 0], 0]))
+                rise[i - 1] -= mean_velocity(cython.address(velocity[rows[s, i], 0]))
+                for x in range(3):
+                    E[3 * i - 3 + x] = e[3 * _pair(i, 0) + x]
+            _gradient(E, rise, size - 1, here)
+            multiply(W, here, steep)
+            growth[s] = sqrt(steep[0] * steep[0] + steep[1] * steep[1] + steep[2] * steep[2]) / mean_velocity(W)
             for i in range(size):
-                _squares(cython.address(velocity[s, i, 0]), e, n_pairs, cython.address(squares[s, i, 0]))
+                _squares(cython.address(inverse[rows[s, i], 0]), e, n_pairs, squares + 6 * i)
+                for k in range(n_pairs):
+                    widest[s] = max(widest[s], squares[6 * i + k])
                 for j in range(i):
                     for k in range(6):
-                        W[k] = 0.5 * (velocity[s, i, k] + velocity[s, j, k])
-                    _squares(W, e, n_pairs, here)
+                        W[k] = 0.5 * (velocity[rows[s, i], k] + velocity[rows[s, j], k])
+                    invert(W, I)
+                    _squares(I, e, n_pairs, here)
                     at: cython.int = _pair(i, j)
-                    one: cython.double = sqrt(squares[s, i, at])
-                    two: cython.double = sqrt(squares[s, j, at])
+                    one: cython.double = sqrt(squares[6 * i + at])
+                    two: cython.double = sqrt(squares[6 * j + at])
                     lengths[s, at] = (one + 4.0 * sqrt(one * two) + two) / 6.0
                     for k in range(n_pairs):
                         if here[k] < slack[s] * mean[s, k]:
                             slack[s] = here[k] / mean[s, k]
             slack[s] = sqrt(slack[s])
-    return found
+            for k in range(3 if size == 3 else 0):
+                one = sqrt(min(squares[k], squares[6 + k], squares[12 + k]))
+                two = sqrt(max(squares[k], squares[6 + k], squares[12 + k]))
+                variation += (two - one) * (two - one) / (3.0 * m * mean[s, k])
+    return *found, inverses, variation
 
 
 @cython.cfunc
 @cython.nogil
 def _squares(
-    W: cython.pointer[cython.const[cython.double]],
+    I: cython.pointer[cython.const[cython.double]],
     e: cython.pointer[cython.const[cython.double]],
     n: cython.int,
     into: cython.pointer[cython.double],
 ) -> cython.void:
-    """The squares of |W^-1 e| for n vectors e."""
-    inverse: cython.double[6]
+    """The squares of |I e| for n vectors e."""
     w: cython.double[3]
-    invert(W, inverse)
     for k in range(n):
-        multiply(inverse, e + 3 * k, w)
+        multiply(I, e + 3 * k, w)
         into[k] = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
 
 
-def measured(
-    corners: cython.const[cython.int][:, ::1],
-    V: cython.const[cython.double][:, ::1],
-    squares: cython.const[cython.double][:, :, ::1],
-    mean: cython.const[cython.double][:, ::1],
-    velocity,
-):
-    """What `HopfLax` takes of simplices beside their lengths; velocity may be None.
-
-    Returns
-    -------
-    widest, growth, gradient
-        As there.
-    """
-    size: cython.int = corners.shape[1]
-    m = corners.shape[0]
-    widths, growths, gradients = np.zeros(m), np.zeros(m), np.zeros((m, size, 3))
-    widest: cython.double[::1] = widths
-    growth: cython.double[::1] = growths
-    gradient: cython.double[:, :, ::1] = gradients
-    e: cython.double[3][3]
-    P: cython.double[3][3]
-    W: cython.double[6]
-    at_corners: cython.const[cython.double][:, :, ::1] = velocity
-    is_linear: cython.bint = velocity is not None
-    with cython.nogil:
-        for s in range(corners.shape[0]):
-            for k in range(squares.shape[1]):
-                for i in range(squares.shape[2]):
-                    widest[s] = max(widest[s], squares[s, k, i])
-            for i in range(size - 1):
-                for x in range(3):
-                    e[i][x] = V[corners[s, i + 1], x] - V[corners[s, 0], x]
-                P[i][i] = mean[s, _pair(i + 1, 0)]
-                for j in range(i):
-                    between: cython.double = P[i][i] + P[j][j] - mean[s, _pair(i + 1, j + 1)]
-                    P[i][j] = P[j][i] = 0.5 * between
-            if size == 3:
-                # The third vector is the normal of a triangle, as long as twice its area.
-                _cross(e[0], e[1], e[2])
-                for i in range(3):
-                    P[i][2] = P[2][i] = 1.0 if i == 2 else 0.0
-            for i in range(size - 1):
-                _cross(e[(i + 1) % 3], e[(i + 2) % 3], cython.address(gradient[s, i + 1, 0]))
-            volume: cython.double = 0.0
-            for x in range(3):
-                volume += e[0][x] * gradient[s, 1, x]
-            for i in range(1, size):
-                for x in range(3):
-                    # A triangle without area has no gradient.
-                    gradient[s, i, x] = gradient[s, i, x] / volume if volume != 0.0 else 0.0
-                    gradient[s, 0, x] -= gradient[s, i, x]
-            if is_linear:
-                for k in range(6):
-                    W[k] = 0.0
-                for x in range(3):
-                    e[0][x] = 0.0
-                for i in range(size):
-                    for k in range(6):
-                        W[k] += at_corners[s, i, k] / size
-                    for x in range(3):
-                        e[0][x] += gradient[s, i, x] * mean_velocity(cython.address(at_corners[s, i, 0]))
-                multiply(W, e[0], e[1])
-                growth[s] = sqrt(e[1][0] * e[1][0] + e[1][1] * e[1][1] + e[1][2] * e[1][2])
-                growth[s] /= mean_velocity(W)
-    return widths, growths, gradients
+@cython.cfunc
+@cython.nogil
+def _gradient(
+    E: cython.pointer[cython.double],
+    rise: cython.pointer[cython.double],
+    p: cython.int,
+    into: cython.pointer[cython.double],
+) -> cython.void:
+    """The vector with the products `rise` (p,) with p vectors E (3, 3), in the plane of two; 0 if they span nothing."""
+    across: cython.double[9]
+    if p == 2:
+        _cross(E, E + 3, E + 6)
+        rise[2] = 0.0
+    for i in range(3):
+        _cross(E + 3 * ((i + 1) % 3), E + 3 * ((i + 2) % 3), across + 3 * i)
+    volume: cython.double = E[0] * across[0] + E[1] * across[1] + E[2] * across[2]
+    for x in range(3):
+        into[x] = rise[0] * across[x] + rise[1] * across[3 + x] + rise[2] * across[6 + x]
+        into[x] = into[x] / volume if volume != 0.0 else 0.0
 
 
 @cython.cfunc
@@ -193,29 +172,28 @@ class HopfLax(Facet):
         Vertices of each simplex.
     first, incident : (n + 1,) int32, (m (p + 1),) int32
         Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
-    squares : (m, q, pairs) float64
-        Squared distances between the corners of each simplex, in its metric (q = 1), or in that of each of its corners
-        (q = p + 1); pairs of corners in the order of `np.tril_indices`.
-    velocity : (m, p + 1, 6) float64
-        If q > 1, the velocity at the corners, whose entries on and above the diagonal come row by row: the inverse root
-        of the metric. It is linear in between.
+    velocity, inverse : (k, 6) float64 or None
+        The inverse root of metrics, whose entries on and above the diagonal come row by row, and its inverse. None if
+        each simplex has one metric (q = 1).
+    rows : (m, p + 1) int32 or None
+        If not (q = p + 1), the row of these at each corner; velocity is linear in between.
     mean : (m, pairs) float64
-        Squared distances in one metric for each simplex, in which T is found that is linear.
+        Squared distances in one metric for each simplex, in which T is found that is linear; pairs of corners in the
+        order of `np.tril_indices`.
     widest, slack : (m,) float64
         The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
     growth : (m,) float64
         If q > 1, the length of the gradient of the mean velocity, in the metric of the centre.
-    gradient : (m, p + 1, 3) float64
-        Of the barycentric coordinates of each simplex.
     V : (n, 3) float64
         Positions.
     """
 
-    def __init__(self, corners, first, incident, squares, velocity, mean, widest, slack, growth, gradient, V):
-        self.corners, self.first, self.incident, self.squares = corners, first, incident, squares
-        self.velocity, self.mean, self.widest, self.slack = velocity, mean, widest, slack
-        self.growths, self.gradient, self.V = growth, gradient, V
-        self.p, self.q = corners.shape[1] - 1, squares.shape[1]
+    def __init__(self, corners, first, incident, velocity, inverse, rows, mean, widest, slack, growth, V):
+        self.corners, self.first, self.incident, self.V = corners, first, incident, V
+        self.velocity, self.inverses, self.rows = velocity, inverse, rows
+        self.mean, self.widest, self.slack, self.growths = mean, widest, slack, growth
+        self.p = corners.shape[1] - 1
+        self.q = 1 if rows is None else self.p + 1
 
     def settle(self, d, label, offset):
         """Change distances along edges to those of second order, in place.
@@ -538,7 +516,7 @@ class HopfLax(Facet):
         self.growth = self.growths[s]
         for i in range(4):  # the fourth of a triangle has the share 0
             at: cython.int = c if i == 0 or i > self.p else self.side[i - 1]
-            self.W[i] = cython.address(self.velocity[s, at, 0])
+            self.W[i] = cython.address(self.velocity[self.rows[s, at], 0])
             self.s[i] = mean_velocity(self.W[i])
         for i in range(self.p):
             for k in range(3):
@@ -607,10 +585,11 @@ class HopfLax(Facet):
         Dj: cython.double = self.D[j]
         at_i: cython.double = 0.0
         at_j: cython.double = 0.0
+        e: cython.double[3]
         for k in range(3):
-            e: cython.double = self.V[u, k] - self.V[v, k]
-            at_i += self.slope[v, k] * e
-            at_j += self.slope[u, k] * e
+            e[k] = self.V[u, k] - self.V[v, k]
+            at_i += self.slope[v, k] * e[k]
+            at_j += self.slope[u, k] * e[k]
         at_i *= 2.0 * Di
         at_j *= 2.0 * Dj
         rise: cython.double = Dj * Dj - Di * Di
@@ -628,9 +607,13 @@ class HopfLax(Facet):
         # T above that of first order makes distances longer: if both slopes say so.
         if sag < 0.0:
             sag *= trusted
-        edge: cython.int = _pair(self.side[i], self.side[j])
-        from_i: cython.double = 2.0 * Di * sqrt(self.squares[s, self.side[i] if self.q > 1 else 0, edge])
-        from_j: cython.double = 2.0 * Dj * sqrt(self.squares[s, self.side[j] if self.q > 1 else 0, edge])
+        square_i: cython.double = self.mean[s, _pair(self.side[i], self.side[j])]
+        square_j: cython.double = square_i
+        if self.q > 1:
+            _squares(cython.address(self.inverses[self.rows[s, self.side[i]], 0]), e, 1, cython.address(square_i))
+            _squares(cython.address(self.inverses[self.rows[s, self.side[j]], 0]), e, 1, cython.address(square_j))
+        from_i: cython.double = 2.0 * Di * sqrt(square_i)
+        from_j: cython.double = 2.0 * Dj * sqrt(square_j)
         most: cython.double = min(rise + from_i, from_j - rise) - level
         least: cython.double = max(rise - from_i, -from_j - rise) - level
         return max(min(sag, most), least)
@@ -658,8 +641,11 @@ class HopfLax(Facet):
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
         """The derivative of the length of v - x by the position of v, at the best place x."""
         v: cython.int = self.corners[s, c]
+        E: cython.double[9]
+        lean: cython.double[3]
         self.is_sloped[v] = self.length(self.share) > 0.0
-        for k in range(3):
-            self.slope[v, k] = 0.0
-            for i in range(self.p):
-                self.slope[v, k] += self.lean(i) * self.gradient[s, self.side[i], k]
+        for i in range(self.p):
+            lean[i] = self.lean(i)
+            for k in range(3):
+                E[3 * i + k] = self.V[self.corners[s, self.side[i]], k] - self.V[v, k]
+        _gradient(E, lean, self.p, cython.address(self.slope[v, 0]))
