@@ -56,9 +56,9 @@ from heat_igl import (
     shapes,
     speed_operators,
 )
+from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.mesh import PolygonFans
 from heat_igl.operators import MetricSimplices, Operators
-from heat_igl.operators.metric import in_space
 from heat_igl.operators.suitability import mean_angle_defect
 from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine, LineEngine
@@ -620,7 +620,7 @@ def on_choice(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
             other = HopfLaxEngine(simplices).distance(source_set(source, mesh.n_vertices, None))
             off = [np.abs(excess(d, exact)).mean() for d in (one, other)]
             row: Row = {"field": f"{name}, per {where}", "n": mesh.n_vertices, "windows": off[0], "hopf": off[1]}
-            row |= {"variation": simplices.variation, "curvature": mean_angle_defect(in_space(mesh))}
+            row |= {"variation": simplices.variation, "curvature": mean_angle_defect(intrinsic_triangulation(mesh))}
             yield row | {"chosen": "windows" if domain.simplices is None else "Hopf-Lax"}
 
 

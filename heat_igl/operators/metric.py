@@ -275,7 +275,7 @@ def operators_in_metric(
     own = np.sqrt(((along @ g) * along).sum(axis=2))
     sides = _common_lengths(mesh, own)
     if sides is None:
-        return _refracting(mesh, own, (g, least, root), laplacian)
+        return _refracting(mesh, own, g, least, laplacian)
     # Triangles without area know no metric in their plane.
     has_area = bool((mesh.measures > 0).all())
     return _unfolded(mesh, sides, _of_faces(mesh, g, least, root) if has_area else None, laplacian)
@@ -291,7 +291,7 @@ def _unfolded(mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, 
     return replace(domain, simplices=simplices)
 
 
-def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None) -> MetricSimplices:
+def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None = None) -> MetricSimplices:
     """Triangles with a metric g (m, 2, 2) in the plane of each."""
     axes = plane_axes(mesh)
     return MetricSimplices.in_metric(mesh, np.swapaxes(axes, 1, 2) @ g @ axes, least, root=root)
@@ -331,9 +331,7 @@ def _keeps_shape(sides: FloatArray, was: FloatArray) -> bool:
     return bool((slack >= _SLACK * was_slack).all())
 
 
-def _refracting(
-    mesh: Mesh, sides: FloatArray, metric: tuple[FloatArray, float, FloatArray | None], laplacian: Laplacian
-) -> Operators:
+def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
     glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F))
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
@@ -345,9 +343,9 @@ def _refracting(
     is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
     fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
     if fits or not (mesh.measures > 0).all():
-        simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, metric[1])
+        simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, least)
     else:
-        simplices = _of_faces(mesh, *metric)
+        simplices = _of_faces(mesh, g, least)
     return replace(domain, simplices=simplices)
 
 

@@ -56,13 +56,9 @@ class SimplexEngine(Engine):
         return distance, label
 
     @cached_property
-    def _edges(self) -> tuple[AnyArray, FloatArray]:
-        pairs, lengths = self._simplices.edges
-        return pairs.astype(np.int32), np.ascontiguousarray(lengths)
-
-    @cached_property
     def _paths(self) -> checking.EdgePaths:
-        return checking.EdgePaths(*self._edges, self._simplices.n)
+        pairs, lengths = self._simplices.edges
+        return checking.EdgePaths(pairs.astype(np.int32), np.ascontiguousarray(lengths), self._simplices.n)
 
     def _keep_bounds(self, sources: SourceSet, distance: FloatArray, label: AnyArray) -> None:
         """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""

@@ -66,8 +66,8 @@ def lengths_in_velocity(
     e: cython.double[18]
     W: cython.double[6]
     I: cython.double[6]
-    E: cython.double[9]
-    rise: cython.double[3]
+    E: cython.double[12]
+    rise: cython.double[4]
     steep: cython.double[3]
     with cython.nogil:
         for i in range(velocity.shape[0]):
@@ -76,19 +76,17 @@ def lengths_in_velocity(
             for k in range(6):
                 W[k] = 0.0
             for i in range(size):
-                for j in range(i):
-                    for x in range(3):
+                for x in range(3):
+                    for j in range(i):
                         e[3 * _pair(i, j) + x] = V[corners[s, j], x] - V[corners[s, i], x]
+                    E[3 * i + x] = V[corners[s, 0], x] - V[corners[s, i], x]
                 for k in range(6):
                     W[k] += velocity[rows[s, i], k] / size
+                rise[i] = mean_velocity(cython.address(velocity[rows[s, 0], 0]))
+                rise[i] -= mean_velocity(cython.address(velocity[rows[s, i], 0]))
             invert(W, I)
             _squares(I, e, n_pairs, cython.address(mean[s, 0]))
-            for i in range(1, size):
-                rise[i - 1] = mean_velocity(cython.address(velocity[rows[s, 0], 0]))
-                rise[i - 1] -= mean_velocity(cython.address(velocity[rows[s, i], 0]))
-                for x in range(3):
-                    E[3 * i - 3 + x] = e[3 * _pair(i, 0) + x]
-            _gradient(E, rise, size - 1, here)
+            _gradient(E + 3, rise + 1, size - 1, here)
             multiply(W, here, steep)
             growth[s] = sqrt(steep[0] * steep[0] + steep[1] * steep[1] + steep[2] * steep[2]) / mean_velocity(W)
             for i in range(size):
