@@ -15,6 +15,8 @@ from heat_igl.typing import AnyArray, BoolArray, FloatArray
 if TYPE_CHECKING:
     from heat_igl.mesh.neighbourhoods import PointTree
 
+# Neighbours that are compared. With a tenth of the normals turned over, on the vertices of 17 meshes, 1.4, 1.0, 1.0 and
+# 0.4 % end wrong with 5, 7, 10 and 15, and 4, 6, 7 and 12 clouds lose all; with four tenths 1.9, 0.4, 0 and 0 %.
 _K = 10
 # Largest share of contradicting neighbours of oriented normals. On the vertices of scans and models it is below 0.01,
 # where parts cross up to 0.07; with normals at random 0.5.
