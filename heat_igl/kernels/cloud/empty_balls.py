@@ -140,7 +140,7 @@ def _average(
         for a in range(share.shape[1]):
             weight: cython.double = directions[0, a] * normal[0] + directions[1, a] * normal[1]
             weight += directions[2, a] * normal[2]
-            weight *= share[0, a] if weight > 0.0 else share[1, a]
+            weight *= share[weight <= 0.0, a]
             mx, my, mz = mx + weight * directions[0, a], my + weight * directions[1, a], mz + weight * directions[2, a]
         size: cython.double = sqrt(mx * mx + my * my + mz * mz)
         normal[0], normal[1], normal[2] = mx / size, my / size, mz / size

@@ -100,16 +100,16 @@ def _search(
     while waiting > 0:
         waiting -= 1
         b: cython.Py_ssize_t = box[waiting]
-        if away[waiting] > bound:
-            continue
-        if b < m:
+        nearest: cython.double = away[waiting]
+        while b < m and nearest <= bound:
             first: cython.double = _away(boxes, 2 * b, places, i)
             second: cython.double = _away(boxes, 2 * b + 1, places, i)
             # The nearer of both is searched first.
             nearer: cython.Py_ssize_t = 2 * b if first <= second else 2 * b + 1
             box[waiting], away[waiting] = 4 * b + 1 - nearer, max(first, second)
-            box[waiting + 1], away[waiting + 1] = nearer, min(first, second)
-            waiting += 2
+            waiting += away[waiting] <= bound
+            b, nearest = nearer, min(first, second)
+        if nearest > bound:
             continue
         for j in range(IN_A_BOX * (b - m), min(IN_A_BOX * (b - m + 1), P.shape[0])):
             distance: cython.double = _squared_distance(P, j, places, i)
