@@ -212,7 +212,8 @@ class Comparisons:
         By a share of the mean distance: beside a vertex, where others may be known, a small error is a large share.
         """
         off = sorted(abs(distance[v] - other[vertex]) for v, other in self._known.items() if 0 < other[vertex] < np.inf)
-        return len(off) > 0 and bool(off[len(off) // 2] > _DIFFERENT * distance[np.isfinite(distance)].mean())
+        reached = distance if self._domain.n_components == 1 else distance[np.isfinite(distance)]
+        return len(off) > 0 and bool(off[len(off) // 2] > _DIFFERENT * reached.mean())
 
     def _made(self) -> Engine:
         domain, surface = self._domain, self._domain.surface
@@ -279,7 +280,7 @@ class Checker:
         shapes on which heat is poor. Of many sources, straight lines are only taken where the answer is far below them:
         it takes a while to find the nearest source of every vertex.
         """
-        if np.isnan(distance).any():
+        if np.isnan(distance.max(initial=0.0)):
             raise FactorizationError(f"heat gives nan at vertex {np.isnan(distance).argmax()}{thinnest(self._surface)}")
         steepness, steepest = self._edges.steepness(distance)
         shortfall, largest, shortest = np.nan, np.nan, -1

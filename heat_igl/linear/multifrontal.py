@@ -225,7 +225,9 @@ class MultifrontalAnalysis:
         with Pool(n_threads()) as workers:
             tree = dissect(self._ends, self._neighbours, workers)
         self.fronts = fronts(self._ends, self._neighbours, tree)
-        self.order: IntArray | None = self.fronts.order
+        # As numpy takes indices: it converts others at each use, which takes three times as long as what they are for.
+        self.order: IntArray | None = self.fronts.order.astype(np.intp)
+        self.place = self.fronts.place.astype(np.intp)
         self.nonzeros = int(self.fronts.end_entry[-1])
 
     @property
@@ -297,15 +299,15 @@ class MultifrontalFactorization:
 
     def _solve(self, b: FloatArray, x: FloatArray) -> None:
         """Write the solution for b, (n,) or at most as many columns as a block has, to x."""
-        order, k = self._fronts.order, b.shape[1:]
+        order, place, k = self._arguments[0].order, self._arguments[0].place, b.shape[1:]
         if k:
-            ordered = np.zeros((len(order), _solves.width))
+            ordered = np.zeros((len(place), _solves.width))
             ordered[:, : k[0]] = b[order]
         else:
             ordered = b[order].astype(np.float64, copy=False)
         ordered[self._held] = 0.0
         self._substitute(ordered)
-        x[order] = ordered[:, : k[0]] if k else ordered
+        np.take(ordered[:, : k[0]] if k else ordered, place, axis=0, out=x, mode="clip")
 
     def _substitute(self, x: FloatArray) -> None:
         """Solve in place for x, (n,) or a block, in the order of elimination, on this thread's processors."""

@@ -10,17 +10,19 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 class EdgePaths:
     """Paths along edges, whose ends (e, 2) int32 are among n vertices, and lengths (e,) float64.
 
-    The edges of vertex v are ``incident[first[v] : first[v + 1]]``.
+    Edges from vertex v lead to ``other[first[v] : first[v + 1]]``, over the lengths `along` in the same places.
     """
 
     ends: cython.const[cython.int][:, ::1]
     length: cython.const[cython.double][::1]
     first: cython.longlong[::1]
-    incident: cython.int[::1]
+    other: cython.int[::1]
+    along: cython.double[::1]
 
     def __init__(self, ends, length, n: cython.Py_ssize_t):
         self.ends, self.length = ends, length
-        self.first, self.incident = np.zeros(n + 1, np.int64), np.empty(2 * len(ends), np.int32)
+        self.first = np.zeros(n + 1, np.int64)
+        self.other, self.along = np.empty(2 * len(ends), np.int32), np.empty(2 * len(ends))
         with cython.nogil:
             for e in range(self.ends.shape[0]):
                 for c in range(2):
@@ -31,7 +33,8 @@ class EdgePaths:
             for e in range(self.ends.shape[0] - 1, -1, -1):
                 for c in range(2):
                     self.first[self.ends[e, c]] -= 1
-                    self.incident[self.first[self.ends[e, c]]] = e
+                    k: cython.longlong = self.first[self.ends[e, c]]
+                    self.other[k], self.along[k] = self.ends[e, 1 - c], self.length[e]
 
     def __reduce__(self):
         """What it was made of."""
@@ -58,8 +61,7 @@ class EdgePaths:
                 tail: cython.int = F[h // 3, (h + 1) % 3]
                 head: cython.int = F[h // 3, (h + 2) % 3]
                 for k in range(self.first[tail], self.first[tail + 1]):
-                    e: cython.int = self.incident[k]
-                    if self.ends[e, 0] + self.ends[e, 1] - tail == head and self.length[e] == length[h]:
+                    if self.other[k] == head and self.along[k] == length[h]:
                         break
                 else:
                     ends[n_new, 0], ends[n_new, 1], length_of[n_new] = tail, head, length[h]
@@ -79,9 +81,7 @@ class EdgePaths:
         k = 0
         for i in range(vertices.shape[0]):
             for j in range(self.first[vertices[i]], self.first[vertices[i] + 1]):
-                e: cython.Py_ssize_t = self.incident[j]
-                which[k], length[k] = i, self.length[e]
-                other[k] = self.ends[e, 0] + self.ends[e, 1] - vertices[i]
+                which[k], other[k], length[k] = i, self.other[j], self.along[j]
                 k += 1
         return position, end, long
 
@@ -126,7 +126,7 @@ class EdgePaths:
             return
         # From near to far, vertices are lowered half as often.
         steep = found[reach[:n_steep].argsort(kind="stable")]
-        label: cython.pointer[cython.longlong] = cython.NULL
+        label: cython.p_longlong = cython.NULL
         if labels is not None:
             label_of: cython.longlong[::1] = labels
             label = cython.address(label_of[0])
@@ -137,7 +137,8 @@ class EdgePaths:
         count: cython.Py_ssize_t = 0
         with cython.nogil:
             for e in range(n_steep):
-                lowered = self.lower(cython.address(d[0]), label, steep[e])
+                k: cython.Py_ssize_t = steep[e]
+                lowered = lower(cython.address(d[0]), label, self.ends[k, 0], self.ends[k, 1], self.length[k])
                 if lowered >= 0 and not is_waiting[lowered]:
                     is_waiting[lowered] = True
                     waiting[count] = lowered
@@ -148,34 +149,30 @@ class EdgePaths:
                 begin = begin + 1 if begin + 1 < n else 0
                 count -= 1
                 for k in range(self.first[v], self.first[v + 1]):
-                    e = self.incident[k]
                     # Mostly not, and no processor foresees which end is nearer; infinite at both ends gives nan.
-                    if not fabs(d[self.ends[e, 0]] - d[self.ends[e, 1]]) > self.length[e]:
+                    if not fabs(d[v] - d[self.other[k]]) > self.along[k]:
                         continue
-                    lowered = self.lower(cython.address(d[0]), label, e)
+                    lowered = lower(cython.address(d[0]), label, v, self.other[k], self.along[k])
                     if lowered >= 0 and not is_waiting[lowered]:
                         is_waiting[lowered] = True
                         end: cython.Py_ssize_t = begin + count
                         waiting[end if end < n else end - n] = lowered
                         count += 1
 
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def lower(
-        self, d: cython.pointer[cython.double], label: cython.pointer[cython.longlong], e: cython.Py_ssize_t
-    ) -> cython.int:
-        """The end of edge e whose distance was lowered to the path along it; -1 if that is not shorter."""
-        one: cython.double = d[self.ends[e, 0]]
-        other: cython.double = d[self.ends[e, 1]]
-        near: cython.int = self.ends[e, 0] if one < other else self.ends[e, 1]
-        far: cython.int = self.ends[e, 1] if one < other else self.ends[e, 0]
-        if not is_longer(d[near], d[far], self.length[e]):
-            return -1
-        d[far] = d[near] + self.length[e]
-        if label:
-            label[far] = label[near]
-        return far
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def lower(d: cython.p_double, label: cython.p_longlong, v: cython.int, w: cython.int, way: cython.double) -> cython.int:
+    """The end of an edge of the length `way` that was lowered to the path along it; -1 if that is not shorter."""
+    near: cython.int = v if d[v] < d[w] else w
+    far: cython.int = w if near == v else v
+    if not is_longer(d[near], d[far], way):
+        return -1
+    d[far] = d[near] + way
+    if label:
+        label[far] = label[near]
+    return far
 
 
 @cython.cfunc
