@@ -182,14 +182,13 @@ cdef extern from *:
     #define SAME 2e-14
     // The directions of two halves of a window differ by less than this angle, the sum over a hundred flat vertices.
     #define TURNED 1e-10
-    // Windows that overlap by less than this fraction of both are not trimmed against each other.
-    #define OVERLAP 0.2
+    // Windows that overlap by less than this fraction of both are not trimmed against each other. With 0.2 queries take
+    // 1.01 to 1.07 of the time on scans and spheres, with 0 up to 1.8; the number of windows is the same to 1 %.
+    #define OVERLAP 0.5
     // A search continues beyond its cutoff by this fraction, more than the rounding of a key.
     #define MARGIN 1e-12
     // A vertex is flat if its angles sum to 2 pi up to this, ten times the error up to which halves can be merged.
     #define FLATNESS 1e-12
-    // Overlaps below this fraction of a half-edge are not trimmed either: about the widening of rays from bends.
-    #define SLIVER 1e-5
     // The work per list in addition to its windows, as a number of windows.
     #define PER_LIST 4
     """
@@ -199,7 +198,6 @@ cdef extern from *:
     double SAME
     double TURNED
     double OVERLAP
-    double SLIVER
     double MARGIN
     double FLATNESS
     int PER_LIST

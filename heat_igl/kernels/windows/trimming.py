@@ -12,7 +12,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     OVERLAP,
     ROUNDING,
     SAME,
-    SLIVER,
     TURNED,
     U_NEARER,
     U_THEN_W,
@@ -230,26 +229,26 @@ def _gives_way(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.bint:
-    """Whether two windows overlap by too little to be worth a comparison: of the half-edge, or of both windows.
+def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+    """Whether two windows overlap by too little of both to be worth a comparison, or not at all.
 
     Evaluated without branches, since the cases alternate unpredictably.
     """
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
     overlap: cython.double = high - low
-    return (overlap < sliver) | ((overlap < OVERLAP * (u.stop - u.start)) & (overlap < OVERLAP * (w.stop - w.start)))
+    return (overlap < OVERLAP * (u.stop - u.start)) & (overlap < OVERLAP * (w.stop - w.start))
 
 
 @cython.cfunc
 @cython.nogil
-def _settle(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.int:
+def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
     """Trim two windows where the other is nearer. 1: nothing is left of u, 2: nothing of w, 4: w precedes u."""
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
     until: cython.double[2]
     first: cython.int = 4 * ((w.start < u.start) & (w.stop < u.stop))
-    if _overlap_little(u, w, sliver):
+    if _overlap_little(u, w):
         return first
     order = _compare(u, w, low, high, until)
     if order == U_NEARER:
@@ -347,11 +346,11 @@ def _goes_on(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _is_next(u: cython.pointer(Window), w: cython.pointer(Window), sliver: cython.double) -> cython.bint:
+def _is_next(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
     """Whether w has another root, follows u and hardly overlaps it: then `_insert` would append it unchanged."""
     is_before: cython.bint = (w.start < u.start) & (w.stop < u.stop)
     is_other: cython.bint = fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth)
-    return is_other & (not is_before) & _overlap_little(u, w, sliver)
+    return is_other & (not is_before) & _overlap_little(u, w)
 
 
 @cython.cfunc
@@ -372,13 +371,12 @@ def _insert(
     moved: Window
     u: cython.pointer(Window)
     narrow: cython.double = NARROW * length
-    sliver: cython.double = 0.0 if is_many else SLIVER * length
     while j > 0:
         u = windows + (j - 1)
         if (is_many or (j == k and u.start <= w.start)) and _goes_on(u, w, length, is_many):
             u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
             return k
-        outcome = _settle(u, w, sliver)
+        outcome = _settle(u, w)
         if outcome == 1 or u.stop - u.start <= narrow:
             if j < k:
                 memmove(u, u + 1, (k - j) * cython.sizeof(Window))
@@ -435,7 +433,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
         if w.stop - w.start <= NARROW * length:
             continue
         # The usual case: the window follows the last one, and is not a half of it.
-        if k == 0 or (not is_many and _is_next(windows + (k - 1), w, SLIVER * length)):
+        if k == 0 or (not is_many and _is_next(windows + (k - 1), w)):
             if k < i:
                 windows[k] = w[0]
             k += 1
