@@ -637,11 +637,11 @@ def test_loops_of_outer_edges_are_filled_in_space(angle, width, n_loops):
 
 
 def test_a_bite_out_of_the_border_stays():
-    """Half a circle of radius 3.2, which a closed hole may not have: nothing says that it belongs to the surface."""
+    """Half a circle of radius 3.2; a hole as wide is closed, but at the border no far points are joined."""
     P = np.stack(np.meshgrid(np.arange(-15.0, 16.0), np.arange(16.0), 0.0), axis=-1).reshape(-1, 3)
     rim = 3.2 * np.exp(1j * np.linspace(0, np.pi, 11))
     P = np.concatenate([np.stack([rim.real, rim.imag, 0 * rim.real], axis=1), P[np.linalg.norm(P, axis=1) > 3.7]])
-    assert GeodesicSolver(PointCloud(P)).distance(0)[10] == pytest.approx(3.2 * np.pi, rel=0.01)
+    assert GeodesicSolver(PointCloud(P)).distance(0)[10] == pytest.approx(3.2 * np.pi, rel=0.04)
 
 
 def test_the_border_of_a_small_piece_is_no_gap():
@@ -855,8 +855,8 @@ def test_edges_of_triangles_that_are_given_up_are_free_again():
     F = np.concatenate([F, [[9, 1, 4], [9, 1, 4], [9, 5, 8], [9, 5, 8]]]).astype(np.int32)
     twin, of_next = np.full(F.size, -1, np.int32), 3 * np.roll(np.arange(10), -1) + 1
     twin[2:30:3], twin[of_next], twin[30:] = of_next, range(2, 30, 3), [33, 34, 35, 30, 31, 32, 39, 40, 41, 36, 37, 38]
-    reach = np.where(np.isin(np.arange(13), [3, 4, 7, 8]), 0.0, 10.0)
-    filled, is_whole = filling_triangles(P, F, twin, np.arange(13) < 9, reach, np.array([[1, -0.1], [1, 0.99]]))
+    largest = np.where(np.isin(np.arange(13), [3, 4, 7, 8]), 0.0, 10.0)
+    filled, is_whole = filling_triangles(P, F, twin, np.arange(13) < 9, largest, -0.1, 0.99)
     assert (filled.tolist(), is_whole.tolist()) == ([[0, 5, 6]], [False])
 
 

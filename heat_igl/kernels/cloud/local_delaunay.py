@@ -101,22 +101,13 @@ def _neighbours_around(
             angle = 2.0 - angle
         b: cython.Py_ssize_t = size
         while b > 0 and star[b - 1, ANGLE] > angle:
-            _copy(star, members, b - 1, b)
+            star[b, ANGLE], star[b, X], star[b, Y] = star[b - 1, ANGLE], star[b - 1, X], star[b - 1, Y]
+            members[b] = members[b - 1]
             b -= 1
         star[b, ANGLE], star[b, X], star[b, Y] = angle, scale * x, scale * y
         members[b] = cython.cast(cython.int, j)
         size += 1
     return size
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _copy(
-    star: cython.double[:, ::1], members: cython.int[::1], source: cython.Py_ssize_t, target: cython.Py_ssize_t
-) -> cython.void:
-    star[target, ANGLE], star[target, X], star[target, Y] = star[source, ANGLE], star[source, X], star[source, Y]
-    members[target] = members[source]
 
 
 @cython.cfunc

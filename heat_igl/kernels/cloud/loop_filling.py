@@ -58,15 +58,16 @@ def filling_triangles(
     F: cython.const[cython.int][:, ::1],
     twin: cython.const[cython.int][::1],
     is_gap: cython.const[cython.uchar][::1],
-    reach: cython.const[cython.double][::1],
-    limits: cython.const[cython.double][:, ::1],
+    largest: cython.const[cython.double][::1],
+    most_bent: cython.double,
+    most_folded: cython.double,
 ):
     """Triangles between the fans of a point, and in the loops of boundary edges.
 
     The ear with the smallest circumcircle is clipped from a loop repeatedly, as long as an ear is admissible: this
     fills small gaps, and notches of holes and of the boundary. Ears that join two fans of a point come first, whatever
-    their size, in ascending order of the third side. Ears that fold back come last, and are kept only if they close
-    the loop, as in creases.
+    their size, in ascending order of the third side. Ears that fold back, as in creases, or whose third side is longer
+    than the largest admissible circumradius, come last, and are kept only if they close the loop.
 
     Parameters
     ----------
@@ -122,11 +123,12 @@ def filling_triangles(
                         cost,
                         size,
                         joints,
-                        reach,
+                        largest,
                         head,
                         link,
                         n_sides + count,
-                        limits,
+                        most_bent,
+                        most_folded,
                         triangles[count:],
                         is_whole[count:],
                     )
@@ -259,20 +261,21 @@ def _fill(
     cost: cython.double[::1],
     size: cython.Py_ssize_t,
     joints: cython.int[::1],
-    reach: cython.const[cython.double][::1],
+    largest: cython.const[cython.double][::1],
     head: cython.int[::1],
     link: cython.int[:, ::1],
     n_edges: cython.Py_ssize_t,
-    limits: cython.const[cython.double][:, ::1],
+    most_bent: cython.double,
+    most_folded: cython.double,
     triangles: cython.int[:, ::1],
     is_whole: cython.uchar[::1],
 ) -> cython.Py_ssize_t:
     """Clip admissible ears from a ring of points; returns their number. The third side of each is added as an edge."""
     count: cython.Py_ssize_t = 0
     flat: cython.Py_ssize_t = -1
-    limit: cython.const[cython.double][::1] = limits[0]
+    limit: cython.double = most_bent
     for i in range(size):
-        cost[i] = _ear(P, ring, size, i, joints, reach, head, link, limit)
+        cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit, flat)
     while size > 2:
         best: cython.Py_ssize_t = 0
         for i in range(1, size):
@@ -284,16 +287,16 @@ def _fill(
                 for i in range(count - 1, flat - 1, -1):
                     head[min(triangles[i, 0], triangles[i, 2])] = link[n_edges + i, 1]
                 return flat
-            flat, limit = count, limits[1]
+            flat, limit = count, most_folded
             for i in range(size):
-                cost[i] = _ear(P, ring, size, i, joints, reach, head, link, limit)
+                cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit, flat)
             continue
         before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
         after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
         # Since its cost was computed, its third side may have become an edge, or all fans there may have been joined.
         is_edge: cython.bint = size > 3 and _is_edge(head, link, ring[POINT, before], ring[POINT, after])
         if is_edge or (cost[best] < 0.0 and joints[ring[POINT, best]] == 0):
-            cost[best] = INFINITY if is_edge else _ear(P, ring, size, best, joints, reach, head, link, limit)
+            cost[best] = _ear(P, ring, size, best, joints, largest, head, link, limit, flat)
             continue
         is_whole[count] = cost[best] >= 0.0
         joints[ring[POINT, best]] -= joints[ring[POINT, best]] > 0
@@ -308,9 +311,9 @@ def _fill(
         # The ears of the two neighbours have changed.
         for i in range(best - 1, best + 1):
             j: cython.Py_ssize_t = (i + size) % size
-            cost[j] = _ear(P, ring, size, j, joints, reach, head, link, limit)
+            cost[j] = _ear(P, ring, size, j, joints, largest, head, link, limit, flat)
         if size == 3:  # one triangle is left
-            cost[0] = cost[1] = cost[2] = _ear(P, ring, size, 0, joints, reach, head, link, limit)
+            cost[0] = cost[1] = cost[2] = _ear(P, ring, size, 0, joints, largest, head, link, limit, flat)
     return count
 
 
@@ -322,14 +325,16 @@ def _ear(
     size: cython.Py_ssize_t,
     i: cython.Py_ssize_t,
     joints: cython.int[::1],
-    reach: cython.const[cython.double][::1],
+    largest: cython.const[cython.double][::1],
     head: cython.int[::1],
     link: cython.int[:, ::1],
-    limits: cython.const[cython.double][::1],
+    most_folded: cython.double,
+    flat: cython.Py_ssize_t,
 ) -> cython.double:
     """Circumradius of the ear at point i of a ring; infinite if the ear is not admissible.
 
-    Negative if the ear joins two fans: minus the inverse square of the third side, so shorter sides come first.
+    Negative if the ear joins two fans: minus the inverse square of the third side, so shorter sides come first. As long
+    as `flat` is negative, the loop may stay open.
     """
     before: cython.Py_ssize_t = size - 1 if i == 0 else i - 1
     after: cython.Py_ssize_t = 0 if i == size - 1 else i + 1
@@ -338,19 +343,20 @@ def _ear(
     c: cython.int = ring[POINT, after]
     if a in (b, c) or b == c or (size > 3 and _is_edge(head, link, a, c)):
         return INFINITY
+    square: cython.double = 0.0
+    for x in range(3):
+        square += (P[c, x] - P[a, x]) * (P[c, x] - P[a, x])
     if joints[b] > 0:
-        square: cython.double = 0.0
-        for x in range(3):
-            square += (P[c, x] - P[a, x]) * (P[c, x] - P[a, x])
         return -1.0 / square if square > 0.0 else -INFINITY
     radius: cython.double = circumradius(P, a, b, c)
+    most: cython.double = min(largest[a], min(largest[b], largest[c]))
     # The last triangle adds no edge, and closes the gap even if its corners are collinear.
-    if size > 3 and radius >= limits[0] * min(reach[a], min(reach[b], reach[c])):
+    if size > 3 and (radius >= most or (flat < 0 and square > most * most)):
         return INFINITY
     folded: cython.double = max(_fold(P, a, b, c, ring[BEYOND, before]), _fold(P, b, c, a, ring[BEYOND, i]))
     if size == 3:
         folded = max(folded, _fold(P, c, a, b, ring[BEYOND, after]))
-    return INFINITY if folded > limits[1] else radius
+    return INFINITY if folded > most_folded else radius
 
 
 @cython.cfunc
