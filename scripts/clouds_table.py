@@ -1,21 +1,18 @@
 """Distance on point clouds: error and time, beside potpourri3d's solver on the same points.
 
-    python scripts/clouds_table.py distances [--sizes 5000 50000] [--noise 0 0.01] [--shapes torus] [--sources 6]
-    python scripts/clouds_table.py distances bunny.obj ...     # the vertices of meshes instead
+    python scripts/clouds_table.py distances [MESH ...] [--sizes 5000 50000] [--noise 0 0.01] [--shapes torus]
     python scripts/clouds_table.py turns [MESH ...] [--repeats 15]   # errors, and times as ratios
-    python scripts/clouds_table.py log-maps bunny.obj ...
+    python scripts/clouds_table.py log-maps MESH ...
     python scripts/clouds_table.py scans [--sizes 1000 5000 20000] [--sources 3]   # noise, outliers, uneven density
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4, a cylinder of radius 1 and height 3, and a square
-with sides of length 1; noise is Gaussian in all coordinates, of the given standard deviation. distances: the mean of
-|d - exact| / exact in percent, and seconds of all processors together to make the solver and for a query. turns: both
-solvers take turns; medians of ratios of processor time, of the solver, of the solver with the first query, for which
-potpourri3d factors, and of a later query; with the mean errors, and the share of the points that are doubtful, not
-counting folds, with a star where the cloud warned. log-maps: on the vertices of meshes, against the exact one of the
-mesh: the median angle between them in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in
-percent at the points of the surface, of default / potpourri3d / the shortest path in the graph of 8 neighbours, which
-is what there is without a solver; a star follows where the cloud warned. Needs the extra ``bench``. The tables are in
-docs/clouds_theory.md.
+with sides of length 1, or the vertices of meshes; noise is Gaussian in all coordinates. distances: the mean of
+|d - exact| / exact in percent, and seconds of all processors together to make the solver and for a query. turns: median
+ratios of processor time in turns, of the solver, of the solver with the first query, for which potpourri3d factors, and
+of a later query; mean errors, of meshes also that on the restricted Delaunay triangulation, which knows the surface;
+the share of doubtful points, not counting folds, with a star where the cloud warned. log-maps: the median angle to the
+exact one of the mesh in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in percent of
+default / potpourri3d / the shortest path in the graph of 8 neighbours. Needs ``bench``; see docs/clouds_theory.md.
 """
 
 from __future__ import annotations
@@ -28,6 +25,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
+from potpourri3d import PointCloudHeatSolver
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
@@ -35,16 +33,16 @@ from scipy.spatial import KDTree
 from heat_igl import (
     GeodesicSolver,
     HeatMethodSolver,
+    Mesh,
     PointCloud,
     VectorHeatSolver,
     log_map,
-    read_mesh,
     shapes,
     tangent_frames,
 )
 from heat_igl.typing import FloatArray, IntArray
 
-from harness import Query, Row, Table, collected, drawn, mean_error, on_sphere, parsed, publish, seconds
+from harness import Query, Row, Table, collected, drawn, mean_error, named, on_sphere, parsed, publish, seconds
 
 Points = tuple[FloatArray, Query]
 Scan = Callable[[FloatArray, np.random.Generator], tuple[FloatArray, IntArray]]
@@ -57,12 +55,8 @@ def sphere(n: int, rng: np.random.Generator) -> Points:
 
 def cylinder(n: int, rng: np.random.Generator) -> Points:
     angle, height = rng.random((2, n)) * [[2 * np.pi], [3]]
-
-    def truth(i: int) -> FloatArray:
-        turn = np.abs(angle - angle[i])
-        return np.hypot(np.minimum(turn, 2 * np.pi - turn), height - height[i])
-
-    return np.stack([np.cos(angle), np.sin(angle), height], axis=1), truth
+    P = np.stack([np.cos(angle), np.sin(angle), height], axis=1)
+    return P, lambda i: np.hypot(np.angle(np.exp(1j * (angle - angle[i]))), height - height[i])
 
 
 def square(n: int, rng: np.random.Generator) -> Points:
@@ -82,12 +76,6 @@ def torus(n: int, rng: np.random.Generator) -> Points:
 SHAPES = {"sphere": sphere, "torus": torus, "cylinder": cylinder, "square": square}
 
 
-def _peer(P: FloatArray) -> Query:
-    import potpourri3d
-
-    return potpourri3d.PointCloudHeatSolver(P).compute_distance
-
-
 def _graph(P: FloatArray) -> Query:
     """The shortest way along edges to the 8 nearest points."""
     length, index = KDTree(P).query(P, 9)
@@ -105,11 +93,27 @@ def _surface(P: FloatArray) -> tuple[IntArray, str]:
     return doubtful, "*" * bool(caught)
 
 
+def _restricted(mesh: Mesh, truth: Query) -> Query:
+    """Distance on triangles dual to Voronoi cells of the vertices on the mesh, and exact where these reach no point."""
+    fine, originals = mesh, PointCloud(mesh.V).originals
+    while fine.n_faces < 1_500_000:
+        fine = Mesh(*shapes.quartered(fine.V, fine.F))
+    corners = np.sort(originals[KDTree(mesh.V).query(fine.V)[1]][fine.F], axis=1)
+    distinct = (corners[:, :-1] < corners[:, 1:]).all(axis=1)
+    solver = GeodesicSolver(Mesh(mesh.V, np.unique(corners[distinct], axis=0)))
+
+    def distance(i: int) -> FloatArray:
+        found = solver.distance(int(originals[i]))[originals]
+        return np.where(np.isfinite(found), found, truth(i))
+
+    return distance
+
+
 METHODS: dict[str, Callable[[FloatArray], Query]] = {
     "heat": lambda P: HeatMethodSolver(PointCloud(P)).distance,
     "default": lambda P: GeodesicSolver(PointCloud(P)).distance,
     "windows": lambda P: GeodesicSolver(PointCloud(P), method="windows").distance,
-    "potpourri3d": _peer,
+    "potpourri3d": lambda P: PointCloudHeatSolver(P).compute_distance,
 }
 
 
@@ -181,11 +185,16 @@ def scans(options: argparse.Namespace) -> Iterator[Row]:
         yield row
 
 
+def _made(method: str, P: FloatArray) -> tuple[Query, float]:
+    """The query of a method, and the time to make its solver."""
+    start = time.process_time()
+    return METHODS[method](P), time.process_time() - start
+
+
 def clouds(options: argparse.Namespace) -> Iterator[tuple[Row, FloatArray, Query]]:
     """What it is, the points, and the distance between them."""
-    for path in options.meshes:
-        mesh = read_mesh(path)
-        yield {"points on": path.stem, "number": mesh.n_vertices}, mesh.V, GeodesicSolver(mesh).distance
+    for name, mesh in named(options.meshes).items():
+        yield {"points on": name, "number": mesh.n_vertices, "mesh": mesh}, mesh.V, GeodesicSolver(mesh).distance
     for name, n, noise in product(options.shapes, options.sizes, options.noise) if not options.meshes else ():
         rng = np.random.default_rng(options.seed)
         P, truth = SHAPES[name](n, rng)
@@ -196,9 +205,7 @@ def distances(options: argparse.Namespace) -> Iterator[Row]:
     for row, P, truth in clouds(options):
         sources = np.random.default_rng(options.seed).choice(len(P), options.sources, replace=False).tolist()
         for method in options.methods:
-            start = time.process_time()
-            query = METHODS[method](P)
-            made = time.process_time() - start
+            query, made = _made(method, P)
             query(sources[0])
             asked = np.mean([seconds(lambda i=i, q=query: q(i)) for i in sources])
             row[method] = {"error": mean_error(query, sources, truth), "made": made, "asked": asked}
@@ -209,30 +216,24 @@ def turns(options: argparse.Namespace) -> Iterator[Row]:
     """Errors, and median ratios of processor times to potpourri3d's."""
 
     def stages(method: str, P: FloatArray) -> tuple[float, float, float]:
-        start = time.process_time()
-        query = METHODS[method](P)
-        made = time.process_time() - start
-        query(0)
-        first = time.process_time() - start
-        return made, first, seconds(lambda: query(len(P) // 2))
+        query, made = _made(method, P)
+        return made, made + seconds(lambda: query(0)), seconds(lambda: query(len(P) // 2))
 
     for row, P, truth in clouds(options):
         doubtful, warned = _surface(P)
         row["doubtful"] = f"{100 * len(doubtful) / len(P):.2g}{warned}"
         sources = np.random.default_rng(options.seed).choice(len(P), options.sources, replace=False).tolist()
-        for method in ("default", "potpourri3d"):
-            row[method] = mean_error(METHODS[method](P), sources, truth)
+        row |= {method: mean_error(METHODS[method](P), sources, truth) for method in ("default", "potpourri3d")}
+        if "mesh" in row:
+            row["restricted"] = mean_error(_restricted(row.pop("mesh"), truth), sources, truth)
         ratios = [np.divide(stages("default", P), stages("potpourri3d", P)) for _ in range(options.repeats)]
         yield row | dict(zip(("solver", "both", "later"), np.median(ratios, axis=0), strict=True))
 
 
 def log_maps(options: argparse.Namespace) -> Iterator[Row]:
     """Median angle and mean error of the vectors of each method, in the planes of the mesh."""
-    import potpourri3d
-
-    for path in options.meshes:
-        mesh = read_mesh(path)
-        on_mesh, peer = tangent_frames(mesh), potpourri3d.PointCloudHeatSolver(mesh.V)
+    for vertices, mesh in named(options.meshes).items():
+        on_mesh, peer = tangent_frames(mesh), PointCloudHeatSolver(mesh.V)
         heat, paths = (VectorHeatSolver(PointCloud(mesh.V), method=method) for method in ("heat", "windows"))
         solvers = {"heat": (heat.log_map, heat.frames.x, heat.frames.y)}
         solvers["paths"] = (paths.log_map, paths.frames.x, paths.frames.y)
@@ -246,30 +247,28 @@ def log_maps(options: argparse.Namespace) -> Iterator[Row]:
                 a, b = (v[away] @ [1, 1j] for v in (on_mesh.from_world(world, np.full(len(world), i)), exact))
                 angle = np.degrees(np.median(np.abs(np.angle(a * b.conj()))[a != 0]))
                 found[name].append((float(angle), float(100 * np.mean(np.abs(a - b) / np.abs(b)))))
-        yield {"vertices of": path.stem} | {name: np.mean(each, axis=0).tolist() for name, each in found.items()}
+        yield {"vertices of": vertices} | {name: np.mean(each, axis=0).tolist() for name, each in found.items()}
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     several = {"shapes": [*SHAPES], "sizes": [5000, 50000], "noise": [0.0, 0.01], "methods": [*METHODS]}
     options = parsed(__doc__, argv, "*", ("distances", "turns", "log-maps", "scans"), sources=6, repeats=15, **several)
     head = {"points on": "{points on}", "number": "{number}", "noise": "{noise:g}"}
-    if options.table == "distances":
-        columns = head | {f"{m}, %": f"{{{m}[error]:.2g}}" for m in options.methods}
-        columns |= {f"{m}, s + s": f"{{{m}[made]:.2g}} + {{{m}[asked]:.2g}}" for m in options.methods}
-        table = Table(collected(distances(options)), columns)
-    elif options.table == "turns":
-        columns = head | {"doubtful, %": "{doubtful}"}
-        columns |= {"default, %": "{default:.2g}", "potpourri3d, %": "{potpourri3d:.2g}", "solver": "{solver:.2f}"}
-        columns |= {"solver and first query": "{both:.2f}", "later query": "{later:.2f}"}
-        table = Table(collected(turns(options)), columns)
-    elif options.table == "scans":
-        cell = "{{{0}[default]:.2g}} / {{{0}[potpourri3d]:.2g}} / {{{0}[graph]:.2g}}{{{0}[warned]}}"
-        columns = {shape: cell.format(shape) for shape in options.shapes}
-        table = Table(collected(scans(options)), {"scan": "{scan}", "number": "{number}"} | columns)
-    else:
-        columns = {f"{m}, degrees, %": f"{{{m}[0]:.2g}}, {{{m}[1]:.2g}}" for m in ("heat", "paths", "potpourri3d")}
-        table = Table(collected(log_maps(options)), {"vertices of": "{vertices of}"} | columns)
-    publish(options, {options.table: table})
+    scan = "{{{0}[default]:.2g}} / {{{0}[potpourri3d]:.2g}} / {{{0}[graph]:.2g}}{{{0}[warned]}}"
+    columns = {
+        "distances": head
+        | {f"{m}, %": f"{{{m}[error]:.2g}}" for m in options.methods}
+        | {f"{m}, s + s": f"{{{m}[made]:.2g}} + {{{m}[asked]:.2g}}" for m in options.methods},
+        "turns": head
+        | {"doubtful, %": "{doubtful}", "default, %": "{default:.2g}", "restricted Delaunay, %": "{restricted:.2g}"}
+        | {"potpourri3d, %": "{potpourri3d:.2g}", "solver": "{solver:.2f}"}
+        | {"solver and first query": "{both:.2f}", "later query": "{later:.2f}"},
+        "scans": {"scan": "{scan}", "number": "{number}"} | {shape: scan.format(shape) for shape in options.shapes},
+        "log-maps": {"vertices of": "{vertices of}"}
+        | {f"{m}, degrees, %": f"{{{m}[0]:.2g}}, {{{m}[1]:.2g}}" for m in ("heat", "paths", "potpourri3d")},
+    }
+    rows = {"distances": distances, "turns": turns, "scans": scans, "log-maps": log_maps}[options.table](options)
+    publish(options, {options.table: Table(collected(rows), columns[options.table])})
 
 
 if __name__ == "__main__":
