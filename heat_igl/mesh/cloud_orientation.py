@@ -164,19 +164,17 @@ def two_sided_cover(surface: Mesh) -> Mesh:
         may lead from one to the other.
     """
     F, n = surface.F, surface.n_vertices
-    both = np.concatenate([F, F[:, [0, 2, 1]]])
     first, second, runs_alike = glued_sides(F, n)
+    # Corner h of one side is h, and of the other side h + 3 m. Where both triangles run along their edge, a path goes
+    # from one side to the other.
     pairs = []
-    for side in (0, 1):
-        # Across an edge along which both run, the neighbour on the same side is the one that is turned over.
-        other = np.where(runs_alike, 1 - side, side)
-        for end in (1, 2):
-            opposite_end = np.where(runs_alike, end, 3 - end)
-            of_first = _on_side(corner(first, end), side, F.size)
-            of_second = _on_side(corner(second, opposite_end), other, F.size)
-            pairs.append(np.stack([of_first, of_second], axis=1))
-    fan = components(np.concatenate(pairs), both.size)
-    return Mesh(*_numbered(surface, both, fan))
+    for end in (1, 2):
+        a, b = corner(first, end), corner(second, np.where(runs_alike, end, 3 - end))
+        pairs += [
+            np.stack([a, b + F.size * runs_alike], axis=1),
+            np.stack([a + F.size, b + F.size * ~runs_alike], axis=1),
+        ]
+    return Mesh(*_numbered(surface, components(np.concatenate(pairs), 2 * F.size)))
 
 
 def on_one_side(faces: IntArray, barycentric: FloatArray, m: int) -> tuple[IntArray, FloatArray]:
@@ -186,32 +184,19 @@ def on_one_side(faces: IntArray, barycentric: FloatArray, m: int) -> tuple[IntAr
     return np.where(is_other, faces - m, faces), found
 
 
-def _numbered(surface: Mesh, both: IntArray, fan: IntArray) -> tuple[IntArray, IntArray]:
-    """Positions and faces of the cover, from the label of the fan (6 m,) of each corner of its faces (2 m, 3)."""
-    n, vertex = surface.n_vertices, both.ravel()
-    n_fans = int(fan.max()) + 1
-    size, of_fan = np.bincount(fan, minlength=n_fans), np.empty(n_fans, np.int64)
-    of_fan[fan] = vertex
-    on_other_side = np.empty(n_fans, np.int64)
-    half = both.size // 2
-    of_side = np.arange(half)
-    on_other_side[fan[:half]] = fan[_on_side(of_side, np.ones(half, np.int64), half)]
-    on_other_side[fan[_on_side(of_side, np.ones(half, np.int64), half)]] = fan[:half]
+def _numbered(surface: Mesh, fan: IntArray) -> tuple[IntArray, IntArray]:
+    """Positions and faces of the cover, from the label of the fan (6 m,) of each corner of both sides."""
+    n, half = surface.n_vertices, surface.F.size
+    first_corner, size = np.unique(fan, return_index=True, return_counts=True)[1:]
+    of_fan, on_other_side = surface.F.ravel()[first_corner % half], np.roll(fan, half)[first_corner]
     # The largest fan of each vertex, of equal ones that of the first face; then the other side of it.
-    first_corner = np.full(n_fans, both.size)
-    np.minimum.at(first_corner, fan, np.arange(both.size))
     order = np.lexsort((first_corner, -size, of_fan))
     largest = order[np.diff(of_fan[order], prepend=-1) != 0]
-    number = np.full(n_fans, -1)
+    number = np.full(len(size), -1)
     number[largest] = of_fan[largest]
     number[on_other_side[largest]] = of_fan[largest] + n
     rest = np.flatnonzero(number < 0)
     number[rest] = 2 * n + np.arange(len(rest))
     V = np.concatenate([surface.V, surface.V, surface.V[of_fan[rest]]])
-    return V, number[fan].reshape(-1, 3)
-
-
-def _on_side(corners: IntArray, side: IntArray | int, size: int) -> IntArray:
-    """Corners of one side as corners of the cover: on the other side, corners 1 and 2 have changed places."""
-    turned = corners - corners % 3 + (3 - corners % 3) % 3
-    return np.where(np.equal(side, 0), corners, size + turned)
+    front, back = number[fan].reshape(2, -1, 3)
+    return V, np.concatenate([front, back[:, [0, 2, 1]]])
