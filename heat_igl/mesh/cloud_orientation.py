@@ -34,12 +34,13 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
     with one side, which that would tear. Then as many neighbours as possible are oriented alike.
     """
     is_turned, part, pairs, folds = _turned(P, F)
-    left_out = _in_pairs(pairs, len(F))
+    count, (a, b) = np.bincount(pairs.ravel(), minlength=len(F)), pairs.T
+    # Of each pair, the triangle that is in more of them.
+    left_out = np.where(count[a] > count[b], a, b)
     # On a surface with one side, neighbours contradict each other where it is flat.
     if len(left_out) and np.median(folds) > _FLAT:
-        stays = np.ones(len(F), bool)
-        stays[left_out] = False
-        F, is_turned, part, pairs, folds = F[stays], is_turned[stays], part[stays], pairs[:0], folds[:0]
+        F, is_turned, part = np.delete(F, left_out, 0), np.delete(is_turned, left_out), np.delete(part, left_out)
+        pairs, folds = pairs[:0], folds[:0]
     F = np.where(is_turned[:, None], F[:, [0, 2, 1]], F)
     if normals is not None:
         area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
@@ -87,13 +88,6 @@ def _folds(P: FloatArray, F: IntArray, pairs: IntArray, runs_alike: BoolArray) -
     """Cosine (k,) of the angle between neighbours around their edge: -1 where they are flat, 1 where they fold back."""
     normal = igl.per_face_normals(P, F, np.zeros(3))
     return np.asarray(np.einsum("kx,kx->k", normal[pairs[:, 0]], normal[pairs[:, 1]]) * np.where(runs_alike, 1, -1))
-
-
-def _in_pairs(pairs: IntArray, m: int) -> IntArray:
-    """One of each pair (k, 2) of m triangles: that which is in more of the pairs."""
-    count = np.bincount(pairs.ravel(), minlength=m)
-    a, b = pairs.T
-    return np.unique(np.where(count[a] > count[b], a, b))
 
 
 def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolArray:

@@ -154,10 +154,7 @@ def duplicate_faces(F: IntArray, n: int) -> IntArray:
 
 
 def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
-    """Vertices whose faces do not form one fan: two cones that touch in a point, or more than two faces on an edge.
-
-    For triangle meshes.
-    """
+    """Vertices whose triangles do not form one fan: two cones that touch in a point, or more than two on an edge."""
     bad = np.zeros(n, bool)
     bad[pinched_vertices(F, n)] = bad[found.vertices[found.n_faces > 2]] = True
     return np.flatnonzero(bad)
