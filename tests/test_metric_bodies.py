@@ -210,15 +210,18 @@ def test_vertices_do_not_lower_each_other_for_ever(seed):
 
 
 @pytest.mark.filterwarnings("ignore:the metric turns farther")
-def test_places_without_a_newton_step_are_inexact():
-    """Tensors 1:30 turned at random: the matrix of a Newton step was singular, which numpy's error said."""
-    rng = np.random.default_rng(12)
-    P = rng.random((60, 3))
-    T = Delaunay(P).simplices
-    turned = np.linalg.qr(rng.standard_normal((len(T), 3, 3)))[0]
-    phi, pull_back = solver(Mesh(P, T), turned @ np.diag([1.0, 1, 900]) @ np.swapaxes(turned, 1, 2)).distance_vjp(1)
+def test_derivatives_in_metrics_that_no_mesh_resolves():
+    """Fibres 1:3: on 5 of 8 meshes distances swung for ever, all inexact. 1:30: a Newton step is singular."""
+    unsettled = 0
+    for seed, ratio in [*((k, 3.0) for k in range(8)), (16, 30.0)]:
+        rng = np.random.default_rng(seed)
+        mesh = tetrahedra(rng.random((60, 3)))
+        g = fibre_metric(rng.standard_normal((mesh.n_faces, 3)), 1.0, ratio)
+        pull_back = solver(mesh, g).distance_vjp(0)[1]
+        assert np.isfinite(pull_back.by_metric(np.ones(mesh.n_vertices))).all()
+        unsettled += len(pull_back.inexact) == mesh.n_vertices
+    assert unsettled <= 3
     assert len(pull_back.inexact) > 0
-    assert np.isfinite(pull_back.by_metric(np.where(np.isfinite(phi), 1.0, 0.0))).all()
 
 
 def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():

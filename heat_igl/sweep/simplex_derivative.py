@@ -63,14 +63,14 @@ class _FacetUpdate:
     ----------
     is_sloped : (k, p) bool
         Whether the slope at a corner is known.
-    same : (k, p, p) bool
-        Whether two corners have the same source, and the second-order term between them is used.
+    weight : (k, p, p) float64
+        How far the second-order term between two corners is used: not if they have different sources.
     share : (k, p) float64
         Barycentric coordinates of the minimizer on the facet; coordinates that are 0 stay 0.
     """
 
-    def __init__(self, is_sloped: BoolArray, same: BoolArray, share: FloatArray) -> None:
-        self._is_sloped, self._same = is_sloped, same & is_sloped[:, :, None] & is_sloped[:, None]
+    def __init__(self, is_sloped: BoolArray, weight: FloatArray, share: FloatArray) -> None:
+        self._is_sloped, self._weight = is_sloped, weight * (is_sloped[:, :, None] & is_sloped[:, None])
         self.share = share.copy()
         self._of: AnyArray | None = None
 
@@ -199,7 +199,8 @@ class _FacetUpdate:
                 # The doubt is 0 for the distance from one point, and stays 0 when vertices move.
                 size = np.where(np.abs(np.real(ratio)) < _ROUNDING, 0, _size(doubt))
                 sag = sag - size * share * np.sign(np.real(sag))
-                sag = np.where(np.real(sag) < 0, sag * _smaller(trust[:, i], trust[:, j]), sag)
+                is_doubted = (np.real(sag) < 0) & (np.real(trust[:, [i, j]]) < 1).all(axis=1)
+                sag = np.where(is_doubted, sag * _smaller(trust[:, i], trust[:, j]), sag)
                 edge = [metric[:, m % metric.shape[1]] for m in (i, j)]
                 from_i, from_j = (
                     2 * d * np.sqrt(g[:, i, i] + g[:, j, j] - 2 * g[:, i, j])
@@ -207,7 +208,7 @@ class _FacetUpdate:
                 )
                 sag = _smaller(sag, _smaller(rise + from_i, from_j - rise) - level)
                 sag = _larger(sag, _larger(rise - from_i, -from_j - rise) - level)
-                result[:, i, j] = result[:, j, i] = np.where(doubted | ~self._same[:, i, j], 0, sag)
+                result[:, i, j] = result[:, j, i] = np.where(doubted, 0, self._weight[:, i, j] * sag)
         return result
 
 
@@ -331,7 +332,7 @@ class FixedPointDerivative(SimplexDerivative):
         Source vertices.
     answer : (n,) float64
         The distance that the engine returns.
-    distance, label, facet, place, slope, is_sloped, is_linear
+    distance, label, facet, place, slope, is_sloped, weight
         The result of `HopfLax` before the engine applied its bounds.
     """
 
@@ -346,7 +347,7 @@ class FixedPointDerivative(SimplexDerivative):
         place: FloatArray,
         slope: FloatArray,
         is_sloped: AnyArray,
-        is_linear: AnyArray,
+        weight: FloatArray,
     ) -> None:
         super().__init__(simplices, sources)
         n = simplices.n
@@ -359,9 +360,9 @@ class FixedPointDerivative(SimplexDerivative):
         self._vertices = simplices.corners[self._simplex[:, None], self._corner]
         labels = label[self._vertices[:, 1:]]
         self._first = np.take_along_axis(labels, sources.vertex_offset[labels].argmin(axis=1)[:, None], axis=1)[:, 0]
-        same = (labels[:, :, None] == labels[:, None]) & ~is_linear[v, None, None]
+        second_order = (labels[:, :, None] == labels[:, None]) * weight[v, None, None]
         is_known = is_sloped[self._vertices[:, 1:]].astype(bool)
-        self._update = _FacetUpdate(is_known, same, place[v])
+        self._update = _FacetUpdate(is_known, second_order, place[v])
         self._rank = np.empty(n, np.int64)
         self._rank[np.argsort(distance, kind="stable")] = np.arange(n)
         self._state = np.concatenate([distance[:, None], slope], axis=1)

@@ -6,11 +6,10 @@ cdef extern from *:
     #define SETTLED 1e-3
     // Difference of values, as a share of them, that is rounding.
     #define EQUAL 1e-12
+    // What a vertex may rise, as a share of its distance, though those it depends on do not: then its second order halves.
+    #define RISEN 0.1
     """
-    double SETTLED, EQUAL
-
-cdef enum:
-    MOST_ROUNDS = 100
+    double SETTLED, EQUAL, RISEN
 
 
 cdef class HopfLax(Facet):
@@ -37,11 +36,12 @@ cdef class HopfLax(Facet):
     # The derivative of distance by the position of each vertex, where it is known.
     cdef double[:, ::1] slope
     cdef unsigned char[::1] is_sloped
-    # What each vertex adds to T linear at its place, the sum of this over the open vertices up to each, and how often a
-    # vertex was in a circle around which it is negative.
+    # What each vertex adds to T linear at its place, and the sum of this over the open vertices up to each.
     cdef double[::1] step
     cdef double[::1] sum
-    cdef unsigned char[::1] n_circles
+    # What each vertex rose though those at its place did not, and how far T is of second order for it.
+    cdef double[::1] risen
+    cdef double[::1] weight
     # The corner whose facet gave each vertex its distance, the place there, and what bounds the values through each
     # simplex.
     cdef int[::1] facet
@@ -63,7 +63,7 @@ cdef class HopfLax(Facet):
     cdef void visit(self, int v) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
     cdef double through(self, int s, int c, double best) noexcept nogil
-    cdef double curved(self, int s, int c, double best, double limit) noexcept nogil
+    cdef double curved(self, int s, int c, double limit) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
     cdef double trust(self, int s, int c, int i) noexcept nogil
     cdef void find_slope(self, int s, int c) noexcept nogil

@@ -17,7 +17,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.signals import is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, invert, mean_velocity, multiply
-from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, MOST_ROUNDS, SETTLED
+from cython.cimports.heat_igl.kernels.sweep.hopf_lax import EQUAL, RISEN, SETTLED
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 from heat_igl.kernels.signals import raise_caught
@@ -211,23 +211,23 @@ class HopfLax(Facet):
             The shares of the other corners, in their order, at the best place on that facet.
         slope, is_sloped : (n, 3) float64, (n,) uint8
             The derivative of distance by the position of each vertex, and whether it is known.
-        is_linear : (n,) bool
-            Whether T linear is taken for a vertex, as in circles.
+        weight : (n,) float64
+            How far T is of second order for a vertex: from 1 to 0, where T is linear.
         """
         n = len(d)
         self.d, self.label, self.offset, self.low = d, label, offset, np.min(d)
         # Nearer than a source to itself is another one.
         self.fixed = (d == np.append(offset, np.inf)[label]).view(np.uint8)
-        self.slope, self.is_sloped, self.n_circles = np.zeros((n, 3)), np.zeros(n, np.uint8), np.zeros(n, np.uint8)
+        self.slope, self.is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
         self.facet, self.place = np.full(n, -1, np.int32), np.zeros((n, self.p))
         self.order = np.argsort(d, kind="stable").astype(np.int32)
         self.roots, self.state, self.stack = np.zeros(n, np.int32), np.zeros(n, np.uint8), np.zeros(4 * n, np.int32)
-        self.step, self.sum = np.zeros(n), np.zeros(n)
+        self.step, self.sum, self.risen, self.weight = np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n)
         self.pending, self.n_visits = np.where(np.isfinite(d), np.inf, 0.0), np.zeros(n, np.int32)
         with cython.nogil:
             self.sharpen()
         raise_caught()
-        return *map(np.asarray, (self.facet, self.place, self.slope, self.is_sloped)), np.asarray(self.n_circles) > 1
+        return tuple(map(np.asarray, (self.facet, self.place, self.slope, self.is_sloped, self.weight)))
 
     @cython.cfunc
     @cython.inline
@@ -346,11 +346,10 @@ class HopfLax(Facet):
         turn: cython.double[3]
         # Changes add up along a path.
         settled: cython.double = SETTLED * self.order.shape[0] ** (-1.0 / self.p)
-        for _round in range(MOST_ROUNDS):
-            is_settled: cython.bint = True
+        is_settled: cython.bint = False
+        while not is_settled and not is_interrupted():
+            is_settled = True
             self.arrange()
-            if is_interrupted():
-                break
             for at in range(self.order.shape[0]):
                 v = self.order[at]
                 # Where the metric turns far within a simplex, distances may go in circles: more so each time.
@@ -389,8 +388,6 @@ class HopfLax(Facet):
                             or ((change == INFINITY or self.d[v] < old) and self.through(s, c, self.d[u]) < self.d[u])
                         ):
                             self.pending[u] = most
-            if is_settled:
-                break
 
     def arrange(self) -> cython.void:
         """Order vertices topologically: each behind the corners that it has its distance from, but for circles.
@@ -403,9 +400,8 @@ class HopfLax(Facet):
         n_done: cython.int = 0
         n: cython.int = self.order.shape[0]
         so_far: cython.double = 0.0
-        for at in range(n):
-            self.roots[at] = self.order[at]
-            self.state[at] = 0
+        self.roots[:] = self.order
+        self.state[:] = 0
         for at in range(n):
             n_open: cython.int = 1
             self.stack[0] = self.roots[at]
@@ -437,22 +433,23 @@ class HopfLax(Facet):
                     n_done += 1
 
     def open_circle(self, u: cython.int, n_open: cython.int) -> cython.void:
-        """Take the second order from vertices that depend on u and on which u depends: those open above it.
-
-        At the second time: the first may be on the way from distances along edges.
-        """
+        """Halve the second order of vertices that depend on u and on which u depends: those open above it."""
         w: cython.int = -1
         while w != u:
             n_open -= 1
             w = self.stack[n_open]
-            if self.state[w] == 1 and self.n_circles[w] < 2:
-                self.n_circles[w] += 1
-                if self.n_circles[w] == 2:
-                    self.pending[w] = INFINITY
+            if self.state[w] == 1:
+                self.weight[w] *= 0.5
+                self.pending[w] = INFINITY
 
     def visit(self, v: cython.int) -> cython.void:
-        """Give v the least value over its simplices, and the slope that goes with it."""
+        """Give v the least value over its simplices, and the slope that goes with it.
+
+        With T linear it is at most that at the last place, so that it never rises but with the distances there. By the
+        second order it may, since the slopes there changed, and rise again and again. What it rises so is summed.
+        """
         size: cython.int = self.p + 1
+        rise: cython.double = -INFINITY
         best: cython.double = INFINITY
         best_at: cython.int = -1
         kept: cython.double[3]
@@ -464,6 +461,10 @@ class HopfLax(Facet):
             s: cython.int = at // size
             c: cython.int = at % size
             value: cython.double = self.through(s, c, best)
+            if k < self.first[v]:
+                rise = -self.step[v]
+                for i in range(self.p):
+                    rise -= self.place[v, i] * self.level[i]
             # Facets that share the best place have equal values but for rounding: the first one stays.
             if value + EQUAL * fabs(value) < best:
                 best, best_at = value, at
@@ -471,6 +472,10 @@ class HopfLax(Facet):
                     kept[i] = self.share[i]
         if best_at < 0:
             return
+        self.risen[v] += max(rise + best, 0.0)
+        if self.risen[v] > RISEN * (best - self.low):
+            self.risen[v] = 0.0
+            self.weight[v] *= 0.5
         s, c = best_at // size, best_at % size
         self.face(s, c)
         self.d[v], self.facet[v], self.step[v] = best, best_at, best
@@ -498,7 +503,7 @@ class HopfLax(Facet):
         if not room > 0.0:
             return INFINITY
         linear: cython.double = self.linear(s, c, room)
-        return self.curved(s, c, linear, best) if linear - nearest < room else INFINITY
+        return self.curved(s, c, best) if linear - nearest < room else INFINITY
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """What `Facet` knows of the metric of s, after `face`."""
@@ -520,23 +525,19 @@ class HopfLax(Facet):
             for k in range(3):
                 self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
 
-    def curved(self, s: cython.int, c: cython.int, best: cython.double, limit: cython.double) -> cython.double:
-        """The least value at corner c of simplex s with T of second order, after that of first order; sets `share`.
+    def curved(self, s: cython.int, c: cython.int, limit: cython.double) -> cython.double:
+        """The least value at corner c of simplex s with T of second order, after `linear`; sets `share`.
 
         It may be inf if it is not below `limit`.
         """
-        i: cython.int
-        j: cython.int
-        start: cython.double = INFINITY
+        self.start = INFINITY
         for i in range(self.p):
-            start = min(start, self.offset[self.label[self.corners[s, self.side[i]]]])
-        self.start = start
+            self.start = min(self.start, self.offset[self.label[self.corners[s, self.side[i]]]])
         self.lay(s, c)
         is_source: cython.bint = False
-        is_linear: cython.bint = self.n_circles[self.corners[s, c]] > 1
         x: cython.double[3]
         for i in range(self.p):
-            self.D[i] = self.d[self.corners[s, self.side[i]]] - start
+            self.D[i] = self.level[i] - self.start
             is_source = is_source or not self.D[i] > 0.0
         if is_source and self.q > 1:
             # T is not linear on an edge to the source, and its square not quadratic.
@@ -544,11 +545,9 @@ class HopfLax(Facet):
         for i in range(self.p):
             x[i] = self.trust(s, c, i)
             for j in range(i):
-                sag: cython.double = 0.0
-                if not is_linear:
-                    sag = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
-                self.sag[i][j] = self.sag[j][i] = sag
-        best = self.newton(limit)
+                sag: cython.double = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
+                self.sag[i][j] = self.sag[j][i] = self.weight[self.corners[s, c]] * sag
+        best: cython.double = self.newton(limit)
         if is_source:
             # Straight from the source, where the square of T may have no derivatives.
             for i in range(3):
@@ -602,8 +601,9 @@ class HopfLax(Facet):
         if fabs(doubt) >= fabs(sag):
             return 0.0
         sag -= fabs(doubt) * max(doubt / sag, -doubt / sag, 1.0 - trusted) * (1.0 if sag > 0.0 else -1.0)
-        # T above that of first order makes distances longer: if both slopes say so.
-        if sag < 0.0:
+        # T above that of first order makes distances longer: if both slopes say so, or one of this very metric, as at a
+        # border between two metrics, where the wave at the other end came through the border.
+        if sag < 0.0 and trusted + fabs(more) < 1.0 - EQUAL:
             sag *= trusted
         square_i: cython.double = self.mean[s, _pair(self.side[i], self.side[j])]
         square_j: cython.double = square_i
