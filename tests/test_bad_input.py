@@ -712,6 +712,7 @@ def whole_file_cases() -> Iterator[Case]:
     giant = tets.replace(b"\n4 0 0 1", b"\n2000000000 0 0 1")
     yield file_case("giant node number", "tet.msh", giant, "line 9 .*: node number 2000000000")
     yield file_case("version 4.0", "tet.msh", tets.replace(b"2.2", b"4.0"), "line 5 .*: expected 4 numbers")
+    yield file_case("a line more", "a.off", filled("off") + b"3 0 1 2\n", "longer than announced")
     yield file_case("BINARY", "a.off", b"OFF BINARY\n\0\0\0\4", "line 1|BINARY|binary")
     yield file_case("1e300", "a.off", filled("off", x="1e300"), "V spans .*rescale V")
     yield file_case("4OFF", "a.off", b"4OFF\n1 1 0\n0 0 0 0\n", "line 1.*not for points in space")

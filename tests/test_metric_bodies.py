@@ -393,8 +393,9 @@ def test_the_value_of_a_derivative_is_the_distance(at):
 @pytest.mark.parametrize(
     ("D", "times", "message"),
     [
-        (np.diag([1.0, 1, -1]), 0, r"D\[0\] = .* must be positive definite \(48 of 48"),
+        (np.eye(3) - np.diag([0, 0, 2]) * (np.arange(48) == 3)[:, None, None], 0, r"D\[3\] .* definite \(1 of 48"),
         (np.full((3, 3), np.nan), 0, r"D\[0\] = .* must be finite"),
+        (np.eye(3), np.inf, "times must be finite"),
         (np.triu(np.ones((3, 3))), 0, r"D\[0\] = .* must be symmetric"),
     ],
 )
@@ -403,7 +404,7 @@ def test_wrong_tissue_is_refused(D, times, message):
     assert len(activation_times(mesh, np.eye(3), 0)) == mesh.n_vertices
     with pytest.raises(ValueError, match=message):
         activation_times(mesh, D, 0, times)
-    with pytest.raises(SourceError):
+    with pytest.raises(SourceError, match="27 is no vertex"):
         activation_times(mesh, np.eye(3), [27])
 
 
