@@ -1,7 +1,7 @@
-"""Shortest paths, followed back from where windows arrived to the sources: straight lines over triangles.
+"""Shortest paths, traced back as straight lines over triangles from the ends of windows to the sources.
 
-Sources inside faces, points and segments, have the roots n + i for source i of a surface with n vertices. The
-derivatives of distances by the lengths of the edges come from the segments of these lines.
+On a surface with n vertices, source i among the points and segments inside faces has the root n + i. The derivatives of
+distances by edge lengths follow from the segments of these lines.
 """
 
 import cython
@@ -11,14 +11,14 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import foot, next_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import apart, at_corner, nearest_on
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
-# A vertex on the line makes up the distance to this fraction of it: more than rounding, and so little that a path
-# through the vertex is as long.
+# A path through a vertex near the line is taken if its length is the distance up to this fraction of it: more than
+# rounding, and too little to matter.
 _ON_LINE = cython.declare(cython.double, 1e-13)
-# The same at the root, to which the line is known to lead.
+# The same for the root, at which the line is known to start.
 _AT_ROOT = cython.declare(cython.double, 1e-9)
-# A line is given up when it is too far from the source by this fraction of the distance.
+# A line is abandoned if it is too far from the source by more than this fraction of the distance.
 _ASTRAY = cython.declare(cython.double, 1e-6)
-# Faces that one path crosses at most.
+# Largest number of faces that one path crosses.
 _MOST_STEPS = cython.declare(cython.int, 4000000)
 
 
@@ -33,12 +33,11 @@ def trace_back(
 ):
     """Paths from vertices and points to the sources of a search.
 
-    The search is that on `tables` of triangles that were not flipped, so that no face has a vertex twice, as for
-    `windows.Front`: what it `found`, its `sources` and its `targets`. Path i ends at ``vertex[i]``, or if that is -1,
-    at place ``target[i]`` of `targets`.
+    `tables`, `found`, `sources` and `targets` are those of the search, as for `windows.Front`, on triangles without
+    flips, so that no face has a vertex twice. Path i ends at ``vertex[i]``, or if that is -1, at target ``target[i]``.
 
     Returns the segments, path after path: the faces (r,), and the barycentric coordinates (r, 2, 3) of both ends. `end`
-    (k,) takes where the segments of each path end; nothing is added for a path that was lost.
+    (k,) takes the index after the last segment of each path; a path that was lost has no segments.
     """
     tracer: PathTracer = PathTracer(tables, found, sources)
     segments: SegmentList = tracer.segments
@@ -77,7 +76,7 @@ def trace_back(
 @cython.final
 @cython.cclass
 class PathTracer:
-    """Follows paths back to the sources of a search; `segments` takes what they cross."""
+    """Traces paths back to the sources of a search; `segments` takes their segments."""
 
     def __init__(self, tables, found, sources):
         self.vertex, self.twin, self.ring, self.aligned, self.length = tables.edges
@@ -92,7 +91,7 @@ class PathTracer:
         self.segment_offset = sources.segment_offset
 
     def source_face(self, root: cython.int) -> cython.int:
-        """The face that holds a source; -1 if the root is a vertex."""
+        """The face of a source inside a face; -1 if the root is a vertex."""
         i: cython.int = root - self.n
         if i < 0:
             return -1
@@ -105,7 +104,7 @@ class PathTracer:
         here: cython.p_double,
         found: cython.p_double,
     ) -> cython.double:
-        """Find the point of a source that is nearest to a point of its face with these sides; the source's offset."""
+        """Find the point of a source that is nearest to a point of its face; returns the offset of the source."""
         i: cython.int = root - self.n
         if i < self.n_points:
             for k in range(3):
@@ -116,7 +115,7 @@ class PathTracer:
         return self.segment_offset[i]
 
     def along_bends(self, v: cython.int) -> cython.int:
-        """From vertex v to a source; AT_SOURCE or LOST."""
+        """Trace the path from vertex v to a source; AT_SOURCE or LOST."""
         while v >= 0:
             if self.root[v] == v:
                 return AT_SOURCE
@@ -124,7 +123,7 @@ class PathTracer:
         return v
 
     def from_vertex(self, v: cython.int) -> cython.int:
-        """The vertex at which the straight last part of the path to vertex v starts, AT_SOURCE in a face, or LOST."""
+        """The vertex at which the last straight part of the path to v starts, AT_SOURCE for one in a face, or LOST."""
         begin: LineEnd
         h: cython.int = self.entered[v]
         corner: cython.double[3]
@@ -134,7 +133,7 @@ class PathTracer:
             return LOST
         begin.distance, begin.root, begin.entered, begin.crossing = self.distance[v], self.root[v], h, self.crossing[v]
         if h < 0:
-            # A source inside a face with this vertex, of which it may be two corners.
+            # A source inside a face at this vertex, which may be two corners of the face.
             begin.face = self.source_face(begin.root)
             sides = cython.address(self.length[3 * begin.face])
             for c in range(3):
@@ -185,7 +184,7 @@ class PathTracer:
         return LOST
 
     def leads(self, begin: cython.pointer[cython.const[LineEnd]], v: cython.int, left: cython.double) -> cython.bint:
-        """Whether a path of length `left` from vertex v makes up the distance at `begin`."""
+        """Whether the distance of v plus the length `left` equals the distance at `begin`."""
         tolerance: cython.double = _AT_ROOT if v == begin.root else _ON_LINE
         d: cython.double = self.distance[v]
         return d < begin.distance and d + left - begin.distance <= tolerance * begin.distance
@@ -193,7 +192,7 @@ class PathTracer:
     def go_through(
         self, begin: cython.pointer[cython.const[LineEnd]], line: cython.pointer[cython.const[Line]]
     ) -> cython.int:
-        """Carry a line through the face that it enters: a vertex it leads to, GO_ON, AT_SOURCE or LOST."""
+        """Continue a line through the face that it enters: a vertex at which it starts, GO_ON, AT_SOURCE or LOST."""
         t: cython.int = line.ray.h
         g: cython.int = t // 3
         here: cython.double[3]
@@ -227,9 +226,9 @@ class PathTracer:
     def is_too_far(
         self, begin: cython.pointer[cython.const[LineEnd]], line: cython.pointer[cython.const[Line]]
     ) -> cython.bint:
-        """Whether the ends of the half-edge that a line leaves over are farther from the source than it allows.
+        """Whether an end of the half-edge that a line crosses is too far from the source for the line to be a path.
 
-        A search that ended with the distance of `begin` knows of farther vertices only that they are farther.
+        If the search ended at the distance of `begin`, larger distances are only known to be larger.
         """
         h: cython.int = line.ray.h
         left: cython.double = begin.distance - line.walked + _ASTRAY * begin.distance
@@ -238,7 +237,7 @@ class PathTracer:
         return at_head > left + line.ray.x or at_tail > left + self.length[h] - line.ray.x
 
     def go_over(self, line: cython.pointer[cython.const[Line]]) -> cython.void:
-        """Note a line, in the outward frame of the half-edge that it leaves over, for each face beyond."""
+        """Store a line, in the outward frame of the half-edge that it crosses, for each face on the other side."""
         h: cython.int = line.ray.h
         t: cython.int = self.twin[h]
         if t >= 0:
@@ -250,7 +249,7 @@ class PathTracer:
                 t = self.ring[t]
 
     def note(self, t: cython.int, line: cython.pointer[cython.const[Line]], mirrored: cython.bint) -> cython.void:
-        """Note a line that enters a face over half-edge t, with its frame mirrored if the faces are not aligned."""
+        """Store a line that enters a face over half-edge t, with its frame mirrored if the faces are not aligned."""
         if self.n_lines == MOST_LINES:
             return
         to = cython.address(self.line[self.n_lines])
@@ -263,7 +262,7 @@ class PathTracer:
     def is_at_source(
         self, begin: cython.pointer[cython.const[LineEnd]], f: cython.int, here: cython.p_double, walked: cython.double
     ) -> cython.bint:
-        """Whether the source inside a face that the path comes from lies ahead in face f."""
+        """Whether the source of the path lies inside face f, at the distance that is left."""
         there: cython.double[3]
         side: cython.pointer[cython.const[cython.double]] = cython.address(self.length[3 * f])
         if self.source_face(begin.root) != f:
@@ -272,14 +271,14 @@ class PathTracer:
         return fabs(walked + apart(side, here, there) - begin.distance) <= _AT_ROOT * begin.distance
 
     def add(self, f: cython.int, here: cython.p_double, h: cython.int, x: cython.double) -> cython.int:
-        """Add a segment to the point of half-edge h that lies at x in its outward frame."""
+        """Add a segment that ends at x in the outward frame of half-edge h."""
         there: cython.double[3]
         share: cython.double = x / self.length[h]
         there[h % 3], there[previous_half_edge(h) % 3], there[next_half_edge(h) % 3] = 0.0, 1.0 - share, share
         return self.segments.append(f, here, there)
 
     def add_to_source(self, f: cython.int, here: cython.p_double, root: cython.int) -> cython.int:
-        """A segment to a source inside face f."""
+        """Add a segment that ends at a source inside face f."""
         there: cython.double[3]
         if self.source_face(root) != f:
             return LOST
@@ -292,7 +291,7 @@ class PathTracer:
 @cython.nogil
 @cython.exceptval(-4)
 def _follow(tracer: PathTracer, v: cython.int) -> cython.int:
-    """Follow the straight last part of the path to vertex v: the row of its root, -1 at a source or if it is lost."""
+    """Trace the last straight part of the path to vertex v: the row of its root, -1 at a source or if it is lost."""
     if tracer.root[v] == v:
         return -1
     tracer.n_steps = tracer.segments.n = 0
@@ -305,11 +304,11 @@ def _follow(tracer: PathTracer, v: cython.int) -> cython.int:
 def _derivative(
     tracer: PathTracer, j: cython.longlong, weight: cython.double, by_side: cython.p_double, by_end: cython.p_double
 ) -> cython.int:
-    """The derivative, times `weight`, of the length of segment j of a line by the sides of its face, and by its end.
+    """The derivative of the length of segment j, times `weight`, by the sides of its face and by its end.
 
-    In a triangle with sides l, a segment between places whose barycentric coordinates differ by delta has the length s,
-    s^2 = - sum over pairs i < k of delta_i delta_k l_ik^2. By the envelope theorem the places on the edges count as
-    fixed, so the derivative by l_ik is - delta_i delta_k l_ik / s. Returns the first side of the face.
+    In a triangle with sides l, a segment between points whose barycentric coordinates differ by delta has the length s,
+    s^2 = - sum over pairs i < k of delta_i delta_k l_ik^2. By the envelope theorem, the points on the edges are treated
+    as fixed, so the derivative by l_ik is - delta_i delta_k l_ik / s. Returns the first side of the face.
     """
     h: cython.int = 3 * tracer.segments.face[j]
     d: cython.double[3]
@@ -336,14 +335,14 @@ def pull_back(
     by_side: cython.double[::1],
     by_place: cython.double[:, ::1],
 ) -> None:
-    """Add up the derivative of the weighted sum of distances by the sides (3 m,), and by the places of source points.
+    """Add up the derivative of the weighted sum of distances by the sides (3 m,), and by the coordinates of sources.
 
-    A path consists of straight lines from a vertex to the next one that it passes, or to a source point. What is behind
-    the end of its last line is added by visiting the vertices in the order of distance.
+    A path consists of straight lines from a vertex to the next one that it passes, or to a source point. The weight of
+    each vertex is added to that of the vertex at which its last line starts, so each line is traced once.
 
     `tables`, `found` and `starts` are those of `trace_back`, with e source points, and `order` (n,) has the vertices by
-    ascending distance. The `weight` (n + e,) of each vertex is handed on along the paths, in descending order of
-    distance, and behind those of the vertices it becomes the sum of the weights of all paths to each source point.
+    ascending distance. The `weight` (n + e,) of the vertices is propagated along the paths in descending order of
+    distance; its last e entries become the sums of the weights of all paths to each source point.
     `by_side` (3 m,) and `by_place` (e, 3) take the derivatives.
     """
     tracer: PathTracer = PathTracer(tables, found, starts)

@@ -1,4 +1,4 @@
-"""The surface as windows read it: shapes of faces, corners of vertices, and whether paths may bend at a vertex.
+"""Tables of a surface for windows: shapes of faces, corners of vertices, and whether paths may bend at a vertex.
 
 Half-edge ``3 f + c`` is the side of face f opposite its corner c; the corner carries the same number.
 """
@@ -25,15 +25,15 @@ FLAT_VERTEX = cython.cast(cython.int, FLAT)
 
 
 def shapes(tables) -> bool:
-    """Fill what `heat_igl.windows.tables.Tables` holds beside its half-edges; returns whether it is intrinsic Delaunay.
+    """Fill the arrays of `heat_igl.windows.tables.Tables` from its half-edges; whether it is intrinsic Delaunay.
 
-    Raises a ValueError where two half-edges are not glued alike: windows would go around between them without an end.
+    A ValueError if the gluing of two half-edges is not symmetric: windows could circulate between them forever.
 
     Of n vertices and m faces:
 
     - `double_area` (m,): twice the area of each face;
-    - `bulge` (3 m,): the length of each half-edge times the cotangent of the angle opposite: the circle around the face
-      has the power ``x (x - length) + y (y + bulge)`` at the point (x, -y) of the frame of the half-edge;
+    - `bulge` (3 m,): the length of each half-edge times the cotangent of the opposite angle: the point (x, -y) in the
+      frame of the half-edge has the power ``x (x - length) + y (y + bulge)`` with respect to the circumcircle;
     - `corner_of_vertex` (n,), `next_corner` (3 m,): the corners of each vertex as linked lists that end with -1; the
       first must come full of -1;
     - `n_corners` (n,): the number of corners of each vertex; must come full of 0;
@@ -57,7 +57,7 @@ def shapes(tables) -> bool:
         for f in range(m):
             h = 3 * f
             a, b, d = length[h], length[h + 1], length[h + 2]
-            # A needle without height would have no circle.
+            # The lower bound gives a degenerate face a circumcircle.
             twice: cython.double = max(2.0 * area(a, b, d), 1e-20 * a * a)
             double_area[f] = twice
             bulge[h] = a * twice_product(b, d, a) / (2.0 * twice)
@@ -85,12 +85,12 @@ def shapes(tables) -> bool:
 
 
 def third(k: cython.int, side: cython.int) -> cython.int:
-    """The half-edge of the face that is neither of two others."""
+    """The third half-edge of the face of half-edges k and side."""
     return 9 * (k // 3) + 3 - k - side
 
 
 def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython.int:
-    """The corner of the same vertex beyond a side of corner k; -1 where there is not just one face."""
+    """The corner of the same vertex in the face across a side of corner k; -1 if there is none or more than one."""
     t: cython.int = s.twin[side]
     is_tail: cython.bint = side == previous_half_edge(k)
     if t < 0:
@@ -101,7 +101,7 @@ def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython
 
 
 def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Direction)) -> cython.void:
-    """Turn a direction by the angle of corner k, which has the side `side`."""
+    """Rotate a direction by the angle of corner k, one of whose sides is `side`."""
     p: cython.double = s.length[side]
     q: cython.double = s.length[third(k, side)]
     scale: cython.double = 0.5 / (p * q)
@@ -126,7 +126,7 @@ def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
         turn(s, k, side, cython.address(ray))
         n_half_turns += was_below != (ray.sine < 0.0)
         if side == previous_half_edge(k) and s.aligned[next_half_edge(k)]:
-            # The usual case, with fewer steps that wait for one another.
+            # The usual case, with a shorter chain of dependent instructions.
             side = s.twin[next_half_edge(k)]
             if side < 0:
                 break
