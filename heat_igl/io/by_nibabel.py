@@ -117,13 +117,13 @@ def write_maps(path: Path, maps: dict[str, FloatArray]) -> None:
     models, columns = None, []
     for structure, found in surfaces.items():
         if list(found) != names:
-            raise MeshError(f"{path}: the maps of {structure} are {', '.join(found)}, and not {', '.join(names)}")
+            raise MeshError(f"the maps of {structure} are {', '.join(found)}, and not {', '.join(names)}")
         rows = np.array(list(found.values()))
         inside = ~np.isnan(rows).all(axis=0)
         try:
             model = nibabel.cifti2.BrainModelAxis.from_mask(inside, structure)
         except ValueError:
-            raise MeshError(f"{path}: {structure!r} is no part of a brain: call a map 'cortex_left NAME'") from None
+            raise MeshError(f"{structure!r} is no part of a brain: call a map 'cortex_left NAME'") from None
         models = model if models is None else models + model
         columns.append(rows[:, inside])
     header = (nibabel.cifti2.ScalarAxis(names), models)
@@ -150,7 +150,7 @@ def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
         return
     wide = [name for name, values in attributes.items() if values.ndim > 1]
     if wide:
-        raise MeshError(f"{path}: GIFTI holds one number per vertex, and {wide[0]} has several: write them apart")
+        raise MeshError(f"GIFTI holds one number per vertex, and {wide[0]} has several: write them apart")
     arrays: list[tuple[str, AnyArray, dict[str, str]]] = [
         ("POINTSET", mesh.V.astype("<f4"), {}),
         ("TRIANGLE", mesh.F.astype("<i4"), {}),

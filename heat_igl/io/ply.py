@@ -296,7 +296,7 @@ def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
             comments.append(f"comment vector {name} {values.shape[1]}")
         for part, column in parts.items():
             if part in columns:
-                raise MeshError(f"{path}: PLY would hold two properties named {part}: rename the attribute {name}")
+                raise MeshError(f"PLY would hold two properties named {part}: rename the attribute {name}")
             columns[part] = column
     faces = np.empty(mesh.n_faces, [("degree", "u1"), ("corners", "<i4", 3)])
     faces["degree"] = 3
