@@ -123,8 +123,7 @@ class MetricSimplices:
         """What `lengths_in_velocity` returns, or the same of one metric for each simplex."""
         if self.velocity is not None:
             corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
-            found: tuple[Any, ...] = hopf_lax.lengths_in_velocity(corners, V, self.velocity, self.rows)
-            return found
+            return tuple(hopf_lax.lengths_in_velocity(corners, V, self.velocity, self.rows))
         lengths = self.lengths
         if not len(lengths):
             if self.tensors is None or self.place is None:
@@ -259,8 +258,12 @@ def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[F
     at_vertex = (found + level) / off
     sizes = np.linalg.eigvalsh(_symmetric(at_vertex))
     share[sizes[:, 0] <= 0] = 0
+    del row, values, by, of_corners, at  # what follows is as large
     rows = F.astype(np.int32)
     own, corner = np.nonzero(share[F] < 1 - _ROUNDING)
-    v, rows[own, corner] = F[own, corner], n + np.arange(len(own))
-    mixed = W[own] + share[v, None] * (at_vertex[v] - W[own])
-    return np.concatenate([at_vertex, mixed]), rows, float(1 / sizes.max())
+    v, rows[own, corner] = rows[own, corner], n + np.arange(len(own))
+    velocity = np.concatenate([at_vertex, at_vertex[v]])
+    velocity[n:] -= W[own]
+    velocity[n:] *= share[v, None]
+    velocity[n:] += W[own]
+    return velocity, rows, float(1 / sizes.max())

@@ -52,14 +52,13 @@ def lengths_in_velocity(
     size: cython.int = corners.shape[1]
     n_pairs: cython.int = size * (size - 1) // 2
     m = corners.shape[0]
-    found = np.zeros((m, n_pairs)), np.zeros((m, n_pairs)), np.zeros(m), np.ones(m), np.zeros(m)
-    inverses = np.zeros(np.shape(velocity))
+    found = *np.zeros((2, m, n_pairs)), np.zeros(m), np.ones(m), np.zeros(m), np.zeros_like(velocity)
     mean: cython.double[:, ::1] = found[0]
     lengths: cython.double[:, ::1] = found[1]
     widest: cython.double[::1] = found[2]
     slack: cython.double[::1] = found[3]
     growth: cython.double[::1] = found[4]
-    inverse: cython.double[:, ::1] = inverses
+    inverse: cython.double[:, ::1] = found[5]
     variation: cython.double = 0.0
     squares: cython.double[24]
     here: cython.double[6]
@@ -110,7 +109,7 @@ def lengths_in_velocity(
                 one = sqrt(min(squares[k], squares[6 + k], squares[12 + k]))
                 two = sqrt(max(squares[k], squares[6 + k], squares[12 + k]))
                 variation += (two - one) * (two - one) / (3.0 * m * mean[s, k])
-    return *found, inverses, variation
+    return *found, variation
 
 
 @cython.cfunc
@@ -190,8 +189,7 @@ class HopfLax(Facet):
         self.corners, self.first, self.incident, self.V = corners, first, incident, V
         self.velocity, self.inverses, self.rows = velocity, inverse, rows
         self.mean, self.widest, self.slack, self.growths = mean, widest, slack, growth
-        self.p = corners.shape[1] - 1
-        self.q = 1 if rows is None else self.p + 1
+        self.p, self.q = corners.shape[1] - 1, 1 if rows is None else corners.shape[1]
 
     def settle(self, d, label, offset):
         """Change distances along edges to those of second order, in place.
