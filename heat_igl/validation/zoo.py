@@ -1,9 +1,8 @@
-"""Shapes to try a default on: smooth, CAD, scattered points, terrain, hulls, voxels, mazes, slivers, components.
+"""Generated test shapes: smooth, CAD, scattered points, terrain, hulls, voxels, mazes, slivers, several components.
 
-A default that is chosen on some meshes is measured on others. A third of `SHAPES` is held out: nothing in the package
-may be tuned on them (`Shape.held_out`). `FAMILIES` are kinds of shapes with a random member for each seed, of some
-hundred to 3000 vertices; no default may be tuned on single members, and a change is measured over many seeds of every
-kind.
+Defaults are chosen on some of `SHAPES` and measured on all. A third of them are held out: nothing in the package may be
+tuned on them (`Shape.held_out`). `FAMILIES` generate a random mesh for each seed, of some hundred to 3000 vertices; no
+default may be tuned on single members, and a change is measured over many seeds of every family.
 """
 
 from __future__ import annotations
@@ -46,14 +45,14 @@ SHAPES: list[Shape] = []
 """All shapes, family after family."""
 
 FAMILIES: dict[str, Callable[[int], Mesh]] = {}
-"""All kinds with random members, by name: seed -> mesh, the same bits at every call."""
+"""All families of random shapes, by name: seed -> mesh, the same bits at every call."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape of the zoo: `make` returns the `Mesh`, the same bits at every call.
+    """A test shape: `make` returns the `Mesh`, the same bits at every call.
 
-    No default may be tuned on those that are `held_out`.
+    No default may be tuned on shapes that are `held_out`.
     """
 
     name: str
@@ -79,7 +78,7 @@ def shape(
 
 
 def family(name: str) -> Callable[[Callable[[Generator], Mesh]], Callable[[int], Mesh]]:
-    """Register a function of a random generator as a kind of shapes, and make it one of a seed."""
+    """Register a function of a random generator as a family, and turn it into a function of a seed."""
 
     def register(make: Callable[[Generator], Mesh]) -> Callable[[int], Mesh]:
         @wraps(make)
@@ -141,7 +140,7 @@ def extruded(points: FloatArray, F: IntArray, height: float) -> Mesh:
 
 
 def caps(rings: int, around: int) -> IntArray:
-    """Triangles that close the first and the last of some rings of vertices, in fans around one of their own."""
+    """Triangles that close the first and the last of some rings of vertices, in fans around a vertex of each."""
     k = np.arange(1, around - 1)
     first = np.stack([np.zeros_like(k), k + 1, k], axis=1)
     return np.concatenate([first, (rings - 1) * around + first[:, ::-1]])
@@ -189,7 +188,7 @@ def opened(is_open: BoolArray) -> Mesh:
 
 
 def walls(F: IntArray, above: int) -> IntArray:
-    """Triangles between the boundary of F and the same boundary with `above` added to its vertices."""
+    """Triangles between the boundary of F and its copy, whose vertices have numbers larger by `above`."""
     sides = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
     _, which, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
     a, b = sides[count[which.reshape(-1)] == 1].T
@@ -202,19 +201,19 @@ def raised(points: FloatArray, height: AnyArray | float = 0.0) -> FloatArray:
 
 
 def compact(V: FloatArray, F: IntArray) -> Mesh:
-    """The triangles or tetrahedra without the vertices that none uses."""
+    """The mesh of triangles or tetrahedra F without unreferenced vertices."""
     used, numbers = np.unique(F, return_inverse=True)
     return Mesh(V[used], numbers.reshape(F.shape))
 
 
 def tetrahedra(V: FloatArray) -> Mesh:
-    """Delaunay tetrahedra of points (n, 3) in the unit cube, slivers included, but for those without a volume."""
+    """Delaunay tetrahedra of points (n, 3) in the unit cube: slivers are kept, those without volume are not."""
     F = delaunay(V)
     return Mesh(V, F[np.abs(np.linalg.det(V[F[:, 1:]] - V[F[:, :1]])) > _LEAST_VOLUME])
 
 
 def carved(n: int, cut: Callable[[FloatArray], BoolArray]) -> Mesh:
-    """The unit cube of n^3 cells without the tetrahedra whose centres (m, 3) are `cut`."""
+    """The unit cube of n^3 cells without the tetrahedra for whose centroids (m, 3) `cut` is true."""
     cube = box(n)
     return compact(cube.V, cube.F[~cut(cube.V[cube.F].mean(axis=1))])
 
@@ -229,7 +228,7 @@ def joined(*parts: Mesh) -> Mesh:
 
 
 def merged(mesh: Mesh) -> Mesh:
-    """The mesh with equal positions made one vertex, and without the triangles that this collapses."""
+    """The mesh with vertices at equal positions merged, and without triangles that become degenerate."""
     scale = 1e-9 * float(np.ptp(mesh.V, axis=0).max())
     _, first, which = np.unique(np.round(mesh.V / scale), axis=0, return_index=True, return_inverse=True)
     F = which.reshape(-1)[mesh.F]
@@ -270,7 +269,7 @@ def boxes(cells: IntArray, size: FloatArray | float = 1.0) -> Mesh:
 
 
 # Fixed shapes.
-# Those that are one expression: family -> name -> mesh; those with a star are held out.
+# Shapes given by one expression: family -> name -> mesh; a star marks those held out.
 
 
 def _stretched(mesh: Mesh, factors: ArrayLike) -> Mesh:
@@ -1054,8 +1053,8 @@ def several_spheres(rng: Generator) -> Mesh:
     return joined(*(Mesh(part.V * 10 ** rng.uniform(-2, 1) + 30.0 * i, part.F) for i, part in enumerate(parts)))
 
 
-# Random members that are nearly flat: shortest paths pass many vertices whose angles sum to 2 pi up to rounding of
-# coordinates. Each is turned at random, rounded to single precision or moved far from the origin, or none of these.
+# Nearly flat random shapes, on which shortest paths pass many vertices whose angles sum to 2 pi up to the rounding of
+# coordinates. Some are rotated at random, rounded to single precision, or moved far from the origin.
 
 
 def _between(rng: Generator, least: float, most: float) -> float:
@@ -1064,7 +1063,7 @@ def _between(rng: Generator, least: float, most: float) -> float:
 
 
 def _stored(rng: Generator, mesh: Mesh) -> Mesh:
-    """A mesh as a file may have it: turned, far from the origin, in single precision."""
+    """A mesh as it may be stored in a file: rotated, far from the origin, in single precision."""
     V, size = mesh.V, np.ptp(mesh.V, axis=0).max()
     if rng.random() < 0.7:
         V = V @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -1076,7 +1075,7 @@ def _stored(rng: Generator, mesh: Mesh) -> Mesh:
 
 
 def _turned_rings(rng: Generator, radius: FloatArray, height: FloatArray, around: int) -> Mesh:
-    """Rings of vertices with these radii and heights, each turned against the ring before by the same angle."""
+    """Rings of vertices with these radii and heights, each rotated against the one before by the same angle."""
     turn = rng.choice([0.0, np.pi / around, rng.uniform(0, 1)])
     angle = 2 * np.pi * np.arange(around) / around + turn * np.arange(len(radius))[:, None]
     x, y = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
