@@ -318,12 +318,11 @@ class NormalIntegration:
         domain, backend = parts.operators, parts.options.backend
         self._V, self._F = mesh.V, mesh.F
         self._faces, self._triangulation = faces, triangulation
-        self._poisson = parts.poisson
         self._vector_flow = VectorHeatFlow(domain, edge_rotations(domain), parts.heat_flow.t, backend, parts.fitted)
         self._to_faces, self._to_triangles = face_rotations(domain)
         gradient = TriangleElements(triangulation).matrix().tocsr()
         self._D = divergence_matrix(gradient, triangulation.areas)
-        self._domain, self._heat_flow = domain, parts.heat_flow
+        self._domain, self._heat_flow, self._poisson = domain, parts.heat_flow, parts.poisson
 
     def distance(self, chosen: OrientedSet, level: Level) -> FloatArray:
         """The signed distance (n,): steps 1 to 3 of the method, less the level.

@@ -72,7 +72,8 @@ class _FacetUpdate:
     def __init__(self, is_sloped: BoolArray, weight: FloatArray, share: FloatArray) -> None:
         self._is_sloped, self._weight = is_sloped, weight * (is_sloped[:, :, None] & is_sloped[:, None])
         self.share = share.copy()
-        self._of: AnyArray | None = None
+        self._of: _Inputs | None = None
+        self._of_W: AnyArray | None = None
 
     def place(self, at: _Inputs) -> None:
         """Move each point to the minimizer on its facet by Newton's method; coordinates that reach 0 stay 0."""
@@ -84,12 +85,12 @@ class _FacetUpdate:
             self.share /= self.share.sum(axis=1, keepdims=True)
             self._is_corner = (~stays).sum(axis=1) == 1
             for i in range(p):
-                M[:, :p, i] = np.imag(self._gradient(at, self.share + 1j * _STEP * np.eye(p)[i])) / _STEP
+                M[:, :p, i] = np.imag(self._value(at, self.share + 1j * _STEP * np.eye(p)[i])[2]) / _STEP
             # The coordinates sum to 1.
             M[:, p, :p] = M[:, :p, p] = 1
             M[:, :p] = np.where(stays[:, :, None], np.eye(p, p + 1), M[:, :p])
             self.moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -_inverse(M)[:, :p, :p])
-            step = np.einsum("kij,kj->ki", self.moves, self._gradient(at, self.share))
+            step = np.einsum("kij,kj->ki", self.moves, self._value(at, self.share)[2])
             # The step ends at the boundary of the facet.
             room = np.min(np.where(step < 0, -self.share / np.minimum(step, -1e-300), 1.0), axis=1)
             self.share += np.where(np.isfinite(step), np.minimum(room, 1.0)[:, None] * step, 0.0)
@@ -99,7 +100,7 @@ class _FacetUpdate:
     def values(self, at: _Inputs) -> AnyArray:
         """The distance and slope (k, 4) of the vertices; complex inputs also move the minimizers."""
         share = self.share
-        change = np.imag(self._gradient(at, share))
+        change = np.imag(self._value(at, share)[2])
         if change.any():
             share = share + 1j * np.einsum("kij,kj->ki", self.moves, change)
         T, length, _, lean = self._value(at, share)
@@ -107,19 +108,16 @@ class _FacetUpdate:
         slope = np.einsum("kpx,kpq,kq->kx", e, _inverse(e @ np.swapaxes(e, 1, 2)), lean)
         return np.concatenate([(at.start + T + length)[:, None], slope], axis=1)
 
-    def _gradient(self, at: _Inputs, x: AnyArray) -> AnyArray:
-        return self._value(at, x)[2]
-
     def _value(self, at: _Inputs, x: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray, AnyArray]:
         """Interpolated distance T and path length at the point x (k, p) of the facet, with two derivatives (k, p).
 
         These are the gradient of T + length by x, and the derivative of the length when the vertex moves towards each
         corner. The formulas are those of `Facet.value` and `Facet.length`.
         """
-        D = at.distance - at.start[:, None]
-        e = at.X[:, 1:] - at.X[:, :1]
-        product = np.einsum("kix,kqxy,kjy->kqij", e, at.tensors, e, optimize=True)
-        hang = 0.5 * np.einsum("kij,kj->ki", self._sag(at, D, e, product), x)
+        if self._of is not at:
+            self._of, self._fixed = at, self._anywhere(at)
+        D, product, sag, W, e = self._fixed
+        hang = 0.5 * np.einsum("kij,kj->ki", sag, x)
         mean = (x * D).sum(axis=1)
         # At a corner T is the distance there. At a source it is 0, where the square root has no derivative.
         T = np.where(self._is_corner, mean, np.sqrt(np.where(self._is_corner, 1.0, mean**2 - (x * hang).sum(axis=1))))
@@ -129,7 +127,6 @@ class _FacetUpdate:
             length = np.sqrt((x * by).sum(axis=1))
             g = by / length[:, None]
             return T, length, to_T + g, -g
-        W, e = self._velocity(at, e)
         mean = np.trace(W, axis1=2, axis2=3) / e.shape[2]
         one, two = mean[:, 0], (x * mean[:, 1:]).sum(axis=1)
         middle = _inverse((W[:, 0] + np.einsum("kj,kjab->kab", x, W[:, 1:])) / 2)
@@ -152,13 +149,17 @@ class _FacetUpdate:
         lean = factor[:, None] * (by[:, :1] - along - by[:, 1:]) - longer[:, None] * (mean[:, 1:] / one[:, None] - 1)
         return T, length, to_T + g, lean
 
+    def _anywhere(self, at: _Inputs) -> tuple[AnyArray, ...]:
+        """What the value takes that is the same at all places on the facet."""
+        D, e = at.distance - at.start[:, None], at.X[:, 1:] - at.X[:, :1]
+        product = np.einsum("kix,kqxy,kjy->kqij", e, at.tensors, e, optimize=True)
+        return D, product, self._sag(at, D, e, product), *((e, e) if product.shape[1] == 1 else self._velocity(at, e))
+
     def _velocity(self, at: _Inputs, e: AnyArray) -> tuple[AnyArray, AnyArray]:
         """The tensors to the power -1/2 (k, q, p, p) and the edge vectors (k, p, p), of triangles in their planes."""
         if e.shape[1] == 3:
-            if np.iscomplexobj(at.tensors):
-                return _inverse_root(at.tensors), e
-            if self._of is not at.tensors:
-                self._of, self._W = at.tensors, _inverse_root(at.tensors)
+            if self._of_W is not at.tensors:
+                self._of_W, self._W = at.tensors, _inverse_root(at.tensors)
             return self._W, e
         x, y = e[:, 0], e[:, 1]
         x = x / np.sqrt((x**2).sum(axis=1, keepdims=True))
