@@ -59,11 +59,14 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
     if (part[0] == part[1]).any():
         folds = _folds(P, F, pairs, runs_alike)
         weight = ((1 - folds) / 2) ** _POWER
-        # Flat edges join first, but for those around a surface with one side.
-        is_flat = folds < _FLAT
+        # Triangles without a fold join first, but for those around a surface with one side. A wrong join between sheets
+        # bends where it begins; along its flat edges alone it would join them once and for all.
+        is_bent = np.zeros(len(F), bool)
+        is_bent[pairs[folds >= _FLAT]] = True
+        is_flat = ~is_bent[pairs].any(axis=1)
         sheet, is_turned = _parts(pairs[is_flat], runs_alike[is_flat], len(F))
         group = np.where(sheet[0] == sheet[1], 2 * len(F) + np.arange(len(F)), sheet.min(axis=0))
-        group = np.unique(group, return_inverse=True)[1]
+        group = (np.cumsum(np.bincount(group) > 0) - 1)[group]
         is_turned &= sheet[0] != sheet[1]
         wants_one = runs_alike != (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]])
         is_turned ^= turned_groups(pairs, np.where(wants_one, -weight, weight), group)
@@ -96,13 +99,14 @@ def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolA
     Elements of one of the groups (m,), counted from 0, are turned alike. Groups are joined as in `oriented`.
     """
     is_turned, size, (a, b) = np.zeros(len(group), bool), np.bincount(group), group[pairs].T
+    # Of equal shares, an arbitrary order: with that of the numbers, groups would be joined one after the other.
+    order = 1 + 1e-6 * (np.arange(len(pairs)) * 7919 % 1009)
     while True:
         n, between = len(size), a != b
         # All pairs between the same two groups are one, with the sum of their weights.
         ends, which = np.unique((np.minimum(a, b) * n + np.maximum(a, b))[between], return_inverse=True)
         a, b, weight = ends // n, ends % n, np.bincount(which, weight[between]).astype(np.float64)
-        # Of equal shares, an arbitrary order: with that of the numbers, groups would be joined one after the other.
-        share = np.abs(weight) / (size[a] + size[b]) * (1 + 1e-6 * (np.arange(len(a)) * 7919 % 1009))
+        share = np.abs(weight) / (size[a] + size[b]) * order[: len(a)]
         most, to, turns = np.zeros(n), np.arange(n), np.zeros(n, bool)
         for end in (a, b):
             np.maximum.at(most, end, share)
