@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, Body, Ray
+from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, Body, Line, Ray
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 # Share of the longest edge at a vertex by which a way to it may be too long, and the search still goes on behind it.
@@ -56,6 +56,8 @@ def bend_around(
     one.at, one.before, one.has_before = np.full((e, 5), np.inf), np.zeros((e, 3)), np.zeros(e, np.uint8)
     one.start, one.along, one.height, one.fits = np.zeros(e), np.zeros(e), np.zeros(e), np.zeros(e, np.uint8)
     one.seen, one.lit, one.queue = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
+    one.line.lit = one.reverse.lit = cython.address(one.lit[0])
+    one.reverse.stamp = -2
     with cython.nogil:
         for _rounds in range(_MOST_ROUNDS):
             before: cython.int = one.stamp
@@ -77,11 +79,11 @@ class _Bends(Ray):
     Distance along an edge that `fits` is ``start + |(x - along, height)|``, x along the edge; at its ends, the quarters
     and the middle it is `at`. `before` is the point from which the way comes to the middle, if it `has_before`.
 
-    Of the way that was last asked for, `x` (3,) is the point at which it bends last, `share` the place of this point
+    Of the way that was last asked for, `bend` (3,) is the point at which it bends last, `share` the place of this point
     along the edge, and `beyond` by how much the way would miss the edge on a line through it.
 
     Of the search around the edge `sought`, `stamp` is the number; `seen` (n,) has the last search that came to each
-    vertex, and `lit` (n,) the last in which it saw the edge.
+    vertex, and `lit` (n,) the last in which it saw the edge. `line` goes to the edge, and `reverse` from it.
     """
 
     edges: cython.const[cython.int][:, ::1]
@@ -97,7 +99,7 @@ class _Bends(Ray):
     height: cython.double[::1]
     fits: cython.uchar[::1]
     way: cython.int[::1]
-    x: cython.double[3]
+    bend: cython.double[3]
     share: cython.double
     beyond: cython.double
     sought: cython.int
@@ -106,6 +108,8 @@ class _Bends(Ray):
     lit: cython.int[::1]
     queue: cython.int[::1]
     beside: cython.double
+    line: Line
+    reverse: Line
 
     @cython.cfunc
     @cython.nogil
@@ -149,7 +153,7 @@ class _Bends(Ray):
                 self.value(a, x)
                 self.has_before[i] = self.way[a] > -2
                 for k in range(3):
-                    self.before[i, k] = self.x[k]
+                    self.before[i, k] = self.bend[k]
         self.lay_flat(i, a, b)
 
     @cython.cfunc
@@ -190,7 +194,7 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def value(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """Distance at a point near vertex v, by the way to v; `x` becomes the point at which this way bends last."""
+        """Distance at a point near vertex v, by the way to v; `bend` becomes the point at which this way bends last."""
         if self.way[v] >= 0:
             return self.around(self.way[v], x)
         source: cython.int = v
@@ -199,14 +203,14 @@ class _Bends(Ray):
             source, value = self.sources[self.label[v]], self.offset[self.label[v]]
         squared: cython.double = 0.0
         for k in range(3):
-            self.x[k] = self.body.positions[source, k]
-            squared += (x[k] - self.x[k]) * (x[k] - self.x[k])
+            self.bend[k] = self.body.positions[source, k]
+            squared += (x[k] - self.bend[k]) * (x[k] - self.bend[k])
         return value + sqrt(squared)
 
     @cython.cfunc
     @cython.nogil
     def around(self, i: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """Length of the way to a point that bends around an edge last; sets `x`, `share` and `beyond`."""
+        """Length of the way to a point that bends around an edge last; sets `bend`, `share` and `beyond`."""
         away: cython.double = 0.0
         along: cython.double = 0.0
         for k in range(3):
@@ -235,7 +239,7 @@ class _Bends(Ray):
                 if through < best:
                     best, self.share = through, 0.25 * j
         for k in range(3):
-            self.x[k] = self.body.positions[self.edges[i, 0], k] + self.share * self.length[i] * self.tangent[i, k]
+            self.bend[k] = self.body.positions[self.edges[i, 0], k] + self.share * self.length[i] * self.tangent[i, k]
         return best
 
     @cython.cfunc
@@ -247,24 +251,41 @@ class _Bends(Ray):
         if self.way[v] != -1:
             return False
         self.share = share
-        return self.sees(self.sources[self.label[v]], x)
+        self.aim_at_edge(x)
+        source: cython.int = self.sources[self.label[v]]
+        return self.is_near(cython.address(self.line), source) or self.follows(cython.address(self.line), source)
 
     @cython.cfunc
     @cython.nogil
-    def is_there(self, t: cython.int) -> cython.bint:
-        """As `Ray.is_there`: at the point of the edge at `share`."""
-        has_a: cython.bint = self.share > 1 - NUDGE
-        has_b: cython.bint = self.share < NUDGE
-        for c in range(4):
-            has_a = has_a or self.body.corners[t, c] == self.edges[self.sought, 0]
-            has_b = has_b or self.body.corners[t, c] == self.edges[self.sought, 1]
-        return has_a and has_b
+    def aim_at_edge(self, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
+        """Make a point of the edge `sought`, at `share`, the goal of `line`."""
+        self.line.goal, self.line.stamp = x, self.stamp
+        self.line.goal_a = self.edges[self.sought, 1 if self.share > 1 - NUDGE else 0]
+        self.line.goal_b = self.edges[self.sought, 0 if self.share < NUDGE else 1]
 
     @cython.cfunc
     @cython.nogil
-    def is_lit(self, v: cython.int) -> cython.bint:
-        """As `Ray.is_lit`: in this search."""
-        return self.lit[v] == self.stamp
+    def is_seen_by(self, v: cython.int) -> cython.bint:
+        """Whether the line from v to the `bend` on the edge `sought`, at `share`, stays in the tetrahedra.
+
+        To a vertex, it is followed from both ends until they meet: most lines that are hidden are so near an end.
+        """
+        self.aim_at_edge(self.bend)
+        line: cython.pointer[Line] = cython.address(self.line)
+        reverse: cython.pointer[Line] = cython.address(self.reverse)
+        a: cython.int = line.goal_a
+        if self.is_near(line, v):
+            return True
+        if a != line.goal_b:
+            return self.follows(line, v)
+        reverse.goal, reverse.goal_a, reverse.goal_b = cython.address(self.body.positions[v, 0]), v, v
+        back: cython.int = self.cone(reverse, a)
+        if back < 0:
+            return self.begins(reverse, a, 0) >= 0 and self.follows(line, v)
+        begin: cython.int = self.cone(line, v)
+        if begin < 0:
+            return self.follows(line, v)
+        return self.enters(line, begin, -1, -1) and self.enters(reverse, back, -1, -1) and self.meets(line, reverse)
 
     @cython.cfunc
     @cython.nogil
@@ -290,11 +311,11 @@ class _Bends(Ray):
                 continue
             # A vertex that gains nothing may lie between those that do.
             if is_better:
-                if not self.sees(u, self.x):
+                if not self.is_seen_by(u):
                     continue
                 self.lit[u] = stamp
                 self.d[u], self.way[u] = value, i
-                self.begin[u] = value - self.away(u, self.x)
+                self.begin[u] = value - self.away(u, self.bend)
                 self.label[u] = self.label[a if self.share < 0.5 else b]
             size = self.push_around(u, size, stamp)
 

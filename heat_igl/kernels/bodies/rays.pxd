@@ -4,24 +4,45 @@ cdef extern from *:
     #define GAIN 1e-9
     // Part of the way to the middle of a tetrahedron by which the ends of a line are moved inside.
     #define NUDGE 1e-6
+    // Part of a triangle by which a straight line may miss it, along its rim.
+    #define ON_SIDE 1e-9
     """
-    double GAIN, NUDGE
+    double GAIN, NUDGE, ON_SIDE
+
+
+# A line on its way through tetrahedra. It goes `forward` or against the axis `up`, from p; seen along it, it is at the
+# origin of `x` and `y`, where the corners are of the triangle through which it leaves tetrahedron t, in this order if
+# `sign` is 1; `out` is the fourth corner of t. It arrives where a tetrahedron `has` the vertices `goal_a` and `goal_b`,
+# bits 1 and 2, and between three vertices that see the goal, bit 4: for these, `lit` is `stamp`.
+cdef struct Line:
+    const double* origin
+    const double* goal
+    int goal_a, goal_b
+    const int* lit
+    int stamp
+    int up, east, north
+    double p_x, p_y, p_z, tilt_x, tilt_y, forward
+    int t, out
+    int corner[3]
+    int has[3]
+    double x[3]
+    double y[3]
+    double sign, least, slack
+    int side
 
 
 cdef class Body:
     cdef readonly object _arrays
-    cdef const int[:, ::1] corners
+    cdef int[:, ::1] cells
     cdef const int[::1] first
     cdef const int[::1] incident
     cdef const double[:, ::1] positions
-    cdef int[:, ::1] behind
     cdef int[::1] first_neighbour
     cdef int[::1] neighbours
     cdef double[::1] reach
 
     cdef int across(self, int t, int o) noexcept nogil
     cdef int list_around(self, int v, int[::1] mark, int[::1] into, int at) noexcept nogil
-    cdef double longest_edge(self, int v) noexcept nogil
     cdef double apart(self, int v, int u) noexcept nogil
 
 
@@ -32,20 +53,17 @@ cdef class Ray:
     cdef double[::1] d
     cdef double[::1] begin
     cdef int[::1] label
-    cdef const double* goal
-    cdef double p[3]
-    cdef double w[3]
-    cdef int t, a, b, c, sign
+    cdef int[::1] last_cone
 
-    cdef bint sees(self, int v, const double* goal) noexcept nogil
-    cdef bint is_there(self, int t) noexcept nogil
-    cdef bint is_lit(self, int v) noexcept nogil
+    cdef bint follows(self, Line* line, int v) noexcept nogil
+    cdef int begins(self, Line* line, int v, int i) noexcept nogil
+    cdef bint is_near(self, Line* line, int v) noexcept nogil
     cdef double away(self, int v, const double* x) noexcept nogil
-    cdef bint arrives_from(self, int v, int begin) noexcept nogil
-    cdef bint arrives(self, int v, int begin, int into, int toward) noexcept nogil
-    cdef int cone(self, int v) noexcept nogil
-    cdef int worst_side(self, int k) noexcept nogil
-    cdef void aim(self, int v, int t, int into, double nudge, int toward) noexcept nogil
-    cdef bint enters(self, int t, int o) noexcept nogil
-    cdef int cross(self) noexcept nogil
-    cdef bint turn(self, int o) noexcept nogil
+    cdef bint arrives_from(self, Line* line, int begin) noexcept nogil
+    cdef bint arrives(self, Line* line, int begin, int into, int toward) noexcept nogil
+    cdef bint enters(self, Line* line, int begin, int into, int toward) noexcept nogil
+    cdef bint meets(self, Line* line, Line* reverse) noexcept nogil
+    cdef int step(self, Line* line) noexcept nogil
+    cdef int cone(self, Line* line, int v) noexcept nogil
+    cdef void aim(self, Line* line, int t, int into, double nudge, int toward) noexcept nogil
+    cdef bint leaves(self, Line* line, int k, double part) noexcept nogil

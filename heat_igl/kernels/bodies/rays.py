@@ -2,13 +2,11 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE
+from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, ON_SIDE, Line
 from cython.cimports.libc.math import fabs, sqrt
 
 # What lies behind a side that has not been looked at.
 _UNKNOWN = cython.declare(cython.int, -2)
-# Part of a triangle by which a straight line may miss it, along its rim.
-_ON_SIDE = cython.declare(cython.double, 1e-9)
 # Tetrahedra along a line, and those around a vertex that are walked through before all are tried one by one.
 _MOST_STEPS = cython.declare(cython.int, 1000000)
 _MOST_TURNS = cython.declare(cython.int, 20)
@@ -19,9 +17,10 @@ _MOST_TURNS = cython.declare(cython.int, 20)
 class Body:
     """A body of tetrahedra in space.
 
-    `behind` (m, 4) is the tetrahedron behind the side opposite each corner, -1 on the boundary; the neighbours of
-    vertex v are at ``first_neighbour[v]`` to ``first_neighbour[v + 1]`` of `neighbours`, and `reach` (n,) is the
-    longest edge at each vertex.
+    `cells` (m, 8) has the corners of the tetrahedra, then the corner ``4 * tetrahedron + corner`` behind the side
+    opposite each, -1 on the boundary, side by side in memory for lines that pass through. The neighbours of vertex v
+    are at ``first_neighbour[v]`` to ``first_neighbour[v + 1]`` of `neighbours`, and `reach` (n,) is the longest edge at
+    each vertex.
 
     It is made of tetrahedra `corners` (m, 4) int32, positions (n, 3) of the vertices, and the corners
     ``4 * tetrahedron + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
@@ -35,18 +34,19 @@ class Body:
         positions: cython.const[cython.double][:, ::1],
     ):
         self._arrays = tuple(map(np.asarray, (corners, first, incident, positions)))
-        self.corners, self.first, self.incident, self.positions = corners, first, incident, positions
+        self.first, self.incident, self.positions = first, incident, positions
         n: cython.Py_ssize_t = positions.shape[0]
         m: cython.Py_ssize_t = corners.shape[0]
-        self.behind, self.reach = np.full((m, 4), _UNKNOWN, np.int32), np.zeros(n)
+        self.cells, self.reach = np.full((m, 8), _UNKNOWN, np.int32), np.zeros(n)
+        np.asarray(self.cells)[:, :4] = corners
         counts, all_marks = np.zeros(n + 1, np.int32), np.full(n, -1, np.int32)
         n_around: cython.int[::1] = counts
         mark: cython.int[::1] = all_marks
         one_list: cython.int[::1] = np.empty(n, np.int32)
         with cython.nogil:
             for i in range(4 * m):
-                if self.behind[i // 4, i % 4] == _UNKNOWN:
-                    self.behind[i // 4, i % 4] = self.across(i // 4, i % 4)
+                if self.cells[i // 4, 4 + i % 4] == _UNKNOWN:
+                    self.cells[i // 4, 4 + i % 4] = self.across(i // 4, i % 4)
             for i in range(n):
                 n_around[i + 1] = self.list_around(i, mark, one_list, 0)
         all_marks[:] = -1
@@ -55,37 +55,38 @@ class Body:
         with cython.nogil:
             for i in range(n):
                 self.list_around(i, mark, self.neighbours, self.first_neighbour[i])
-                self.reach[i] = self.longest_edge(i)
+                for k in range(self.first_neighbour[i], self.first_neighbour[i + 1]):
+                    self.reach[i] = max(self.reach[i], self.apart(i, self.neighbours[k]))
 
     def __reduce__(self):
         """What it was made of."""
         return Body, self._arrays
 
     def sides_behind(self):
-        """`behind`, as an array."""
-        return np.asarray(self.behind)
+        """The tetrahedron (m, 4) behind the side opposite each corner, -1 on the boundary."""
+        return np.asarray(self.cells)[:, 4:] >> 2
 
     def across(self, t: cython.int, o: cython.int) -> cython.int:
-        """The first other tetrahedron at the side of t opposite corner o, or -1; that one is told as well."""
-        a: cython.int = self.corners[t, (o + 1) % 4]
-        b: cython.int = self.corners[t, (o + 2) % 4]
-        c: cython.int = self.corners[t, (o + 3) % 4]
+        """The corner behind the side of t opposite corner o, or -1; its tetrahedron is told as well."""
+        a: cython.int = self.cells[t, (o + 1) % 4]
+        b: cython.int = self.cells[t, (o + 2) % 4]
+        c: cython.int = self.cells[t, (o + 3) % 4]
         for k in range(self.first[a], self.first[a + 1]):
             other: cython.int = self.incident[k] // 4
             if other != t:
                 n_shared: cython.int = 0
                 beside: cython.int = 0
                 for i in range(4):
-                    u: cython.int = self.corners[other, i]
+                    u: cython.int = self.cells[other, i]
                     if u in (a, b, c):
                         n_shared += 1
                     else:
                         beside = i
                 if n_shared == 3:
                     # The first other one of that is t, unless an earlier one has been there.
-                    if self.behind[other, beside] == _UNKNOWN:
-                        self.behind[other, beside] = t
-                    return other
+                    if self.cells[other, 4 + beside] == _UNKNOWN:
+                        self.cells[other, 4 + beside] = 4 * t + o
+                    return 4 * other + beside
         return -1
 
     def list_around(self, v: cython.int, mark: cython.int[::1], into: cython.int[::1], at: cython.int) -> cython.int:
@@ -93,19 +94,12 @@ class Body:
         mark[v] = v
         for k in range(self.first[v], self.first[v + 1]):
             for c in range(4):
-                u: cython.int = self.corners[self.incident[k] // 4, c]
+                u: cython.int = self.cells[self.incident[k] // 4, c]
                 if mark[u] != v:
                     mark[u] = v
                     into[at] = u
                     at += 1
         return at
-
-    def longest_edge(self, v: cython.int) -> cython.double:
-        """The distance of v from its farthest neighbour."""
-        longest: cython.double = 0.0
-        for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
-            longest = max(longest, self.apart(v, self.neighbours[k]))
-        return longest
 
     def apart(self, v: cython.int, u: cython.int) -> cython.double:
         """The distance of two vertices in space."""
@@ -142,45 +136,47 @@ class Body:
 
 @cython.cclass
 class Ray:
-    """Distances of the vertices of a body, and a line that is followed to see whether a way is clear.
+    """Distances of the vertices of a body, and lines that are followed to see whether a way is clear.
 
-    The line goes from p along w. It is in tetrahedron t, and leaves that through the triangle abc; `sign` tells the
-    order of abc. Classes derived from this one say where the line is to arrive. `sources`, `offset`, `d`, `begin` and
-    `label` are those of `sight.look_around`.
+    `sources`, `offset`, `d`, `begin` and `label` are those of `sight.look_around`. `last_cone` (n,) is the corner at
+    each vertex at which its last line began.
     """
 
     def __init__(self, body: Body, sources, offset, d, begin, label):
         self.body, self.sources, self.offset, self.d, self.begin, self.label = body, sources, offset, d, begin, label
+        self.last_cone = np.full(d.shape[0], -1, np.int32)
 
-    def is_there(self, t: cython.int) -> cython.bint:  # noqa: ARG002
-        """Whether the line has arrived once it is in tetrahedron t."""
-        return False
-
-    def is_lit(self, v: cython.int) -> cython.bint:  # noqa: ARG002
-        """Whether v is known to see the goal, so that a line between three such vertices arrives."""
-        return False
-
-    def sees(self, v: cython.int, goal: cython.pointer[cython.const[cython.double]]) -> cython.bint:
-        """Whether the line from v to a point stays in the tetrahedra."""
-        self.goal = goal
-        # A point of a tetrahedron at v is at most as far away as a corner.
-        if self.away(v, goal) <= self.body.reach[v] * (1 + GAIN):
-            for k in range(self.body.first[v], self.body.first[v + 1]):
-                if self.is_there(self.body.incident[k] // 4):
-                    return True
-        begin: cython.int = self.cone(v)
+    def follows(self, line: cython.pointer[Line], v: cython.int) -> cython.bint:
+        """Whether the line from v, which is not near its goal, stays in the tetrahedra."""
+        begin: cython.int = self.cone(line, v)
         if begin >= 0:
-            return self.arrives_from(v, begin)
+            return self.arrives_from(line, begin)
         # Along faces and edges, several tetrahedra are as good to begin with, and some may end at a wall.
-        for k in range(self.body.first[v], self.body.first[v + 1]):
-            t: cython.int = self.body.incident[k] // 4
-            o: cython.int = self.body.incident[k] % 4
-            a: cython.int = self.body.corners[t, (o + 1) % 4]
-            b: cython.int = self.body.corners[t, (o + 2) % 4]
-            self.aim(v, t, -1, 0.0, -1)
-            is_through: cython.bint = _leaves(self, v, a, b, self.body.corners[t, (o + 3) % 4], _ON_SIDE) != 0
-            if is_through and self.arrives_from(v, self.body.incident[k]):
+        i: cython.int = self.begins(line, v, 0)
+        while i >= 0:
+            if self.arrives_from(line, self.body.incident[i]):
                 return True
+            self.aim(line, 0, -1, 0.0, -1)
+            i = self.begins(line, v, i + 1)
+        return False
+
+    def begins(self, line: cython.pointer[Line], v: cython.int, i: cython.int) -> cython.int:
+        """Where in `incident`, from i on, a corner at v is in whose tetrahedron the line begins; else -1."""
+        for k in range(max(i, self.body.first[v]), self.body.first[v + 1]):
+            if self.leaves(line, self.body.incident[k], ON_SIDE):
+                return k
+        return -1
+
+    def is_near(self, line: cython.pointer[Line], v: cython.int) -> cython.bint:
+        """Whether the goal is in a tetrahedron at v."""
+        # A point of such a one is at most as far away as a corner.
+        if self.away(v, line.goal) <= self.body.reach[v] * (1 + GAIN):
+            for k in range(self.body.first[v], self.body.first[v + 1]):
+                has: cython.int = 0
+                for c in range(4):
+                    has |= _has(line, self.body.cells[self.body.incident[k] // 4, c])
+                if has & 3 == 3:
+                    return True
         return False
 
     def away(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
@@ -190,181 +186,165 @@ class Ray:
             squared += (self.body.positions[v, i] - x[i]) * (self.body.positions[v, i] - x[i])
         return sqrt(squared)
 
-    def arrives_from(self, v: cython.int, begin: cython.int) -> cython.bint:
-        """Whether the line from v that begins in the tetrahedron of a corner arrives."""
-        return self.arrives(v, begin, -1, -1)
+    def arrives_from(self, line: cython.pointer[Line], begin: cython.int) -> cython.bint:
+        """Whether the line that begins in the tetrahedron of a corner arrives."""
+        return self.arrives(line, begin, -1, -1)
 
-    def arrives(self, v: cython.int, begin: cython.int, into: cython.int, toward: cython.int) -> cython.bint:
+    def arrives(
+        self, line: cython.pointer[Line], begin: cython.int, into: cython.int, toward: cython.int
+    ) -> cython.bint:
         """Whether the line arrives before it leaves the body; it begins and ends as `aim` moves it."""
-        self.aim(v, begin // 4, into, NUDGE, toward)
-        if not self.enters(begin // 4, begin % 4):
+        if not self.enters(line, begin, into, toward):
             return False
         for _steps in range(_MOST_STEPS):
-            if self.is_lit(self.a) and self.is_lit(self.b) and self.is_lit(self.c):
-                return True
-            o: cython.int = self.cross()
-            if o < 0:
-                return False
-            if self.is_there(self.t):
-                return True
-            if not self.turn(o):
-                return False
+            found: cython.int = self.step(line)
+            if found != 0:
+                return found > 0
         return False
 
-    def cone(self, v: cython.int) -> cython.int:
+    def enters(
+        self, line: cython.pointer[Line], begin: cython.int, into: cython.int, toward: cython.int
+    ) -> cython.bint:
+        """Begin in the tetrahedron of a corner, and find the side through which the line leaves it."""
+        self.aim(line, begin // 4, into, NUDGE, toward)
+        # Most likely that opposite the corner.
+        for i in range(4):
+            k: cython.int = begin // 4 * 4 + ((begin + i) & 3)
+            if self.leaves(line, k, 0.0):
+                line.t, line.out = k >> 2, k & 3
+                for j in range(3):
+                    line.x[j] *= line.sign
+                    line.has[j] = _has(line, line.corner[j])
+                return True
+        return False
+
+    def meets(self, line: cython.pointer[Line], reverse: cython.pointer[Line]) -> cython.bint:
+        """Whether two lines between the same points meet, or one arrives, before they leave the body."""
+        for _steps in range(_MOST_STEPS):
+            if line.t == reverse.t:
+                return True
+            found: cython.int = self.step(line)
+            if found == 0 and line.t != reverse.t:
+                found = self.step(reverse)
+            if found != 0:
+                return found > 0
+        return False
+
+    def step(self, line: cython.pointer[Line]) -> cython.int:
+        """Go on to the next tetrahedron: 1 if the line has arrived, -1 if it has left the body, else 0."""
+        if line.has[0] & line.has[1] & line.has[2] & 4:
+            return 1
+        k: cython.int = self.body.cells[line.t, 4 + line.out]
+        if k < 0:
+            return -1
+        line.t = k >> 2
+        corners: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[line.t, 0])
+        o: cython.int = corners[k & 3]
+        has_o: cython.int = _has(line, o)
+        if (line.has[0] | line.has[1] | line.has[2] | has_o) & 3 == 3:
+            return 1
+        at: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[o, 0])
+        z: cython.double = at[line.up] - line.p_z
+        x: cython.double = line.sign * (at[line.east] - line.p_x - line.tilt_x * z)
+        y: cython.double = at[line.north] - line.p_y - line.tilt_y * z
+        of_a: cython.double = x * line.y[0] - y * line.x[0]
+        of_b: cython.double = x * line.y[1] - y * line.x[1]
+        of_c: cython.double = x * line.y[2] - y * line.x[2]
+        # The line leaves through the triangle of o and two corners, which are on both sides.
+        no_c: cython.int = (of_a >= 0) & (of_b <= 0)
+        no_a: cython.int = (of_b >= 0) & (of_c <= 0)
+        if not no_c | no_a | ((of_c >= 0) & (of_a <= 0)):
+            return -1
+        # Without a branch, which no processor foresees.
+        k = 2 * no_c + (1 - no_c) * (1 - no_a)
+        u: cython.int = line.corner[k]
+        line.out = (corners[1] == u) + 2 * (corners[2] == u) + 3 * (corners[3] == u)
+        line.corner[k], line.has[k], line.x[k], line.y[k] = o, has_o, x, y
+        return 0
+
+    def cone(self, line: cython.pointer[Line], v: cython.int) -> cython.int:
         """The corner ``4 t + corner`` at v through whose tetrahedron the line to the goal begins, well inside; else -1.
 
         From tetrahedron to tetrahedron around v, through the side that the line lies farthest behind. That ends at the
         boundary, and where the line runs along a side.
         """
-        k: cython.int = self.body.incident[self.body.first[v]]
-        self.aim(v, k // 4, -1, 0.0, -1)
+        k: cython.int = self.last_cone[v]
+        if k < 0:
+            k = self.body.incident[self.body.first[v]]
+        line.origin = cython.address(self.body.positions[v, 0])
+        self.aim(line, 0, -1, 0.0, -1)
         for _turns in range(_MOST_TURNS):
-            side: cython.int = self.worst_side(k)
-            if side < 0:
-                return k if side == -1 else -1
-            t: cython.int = self.body.behind[k // 4, side]
+            self.last_cone[v] = k
+            if self.leaves(line, k, -ON_SIDE):
+                return k
+            if line.least >= -line.slack:
+                return -1
+            t: cython.int = self.body.cells[k >> 2, 4 + line.side] >> 2
             if t < 0:
                 return -1
             for i in range(4):
-                if self.body.corners[t, i] == v:
+                if self.body.cells[t, i] == v:
                     k = 4 * t + i
         return -1
 
-    def worst_side(self, k: cython.int) -> cython.int:
-        """The side of the cone at corner k that the line is farthest behind: the corner opposite it in the tetrahedron.
-
-        -1 if the line is inside the cone, -2 if it is along a side.
-        """
-        t: cython.int = k // 4
-        o: cython.int = k % 4
-        a: cython.int = self.body.corners[t, (o + 1) % 4]
-        b: cython.int = self.body.corners[t, (o + 2) % 4]
-        c: cython.int = self.body.corners[t, (o + 3) % 4]
-        sign: cython.double = 1.0 if _volume(self, self.body.corners[t, o], a, b, c) > 0 else -1.0
-        of_a: cython.double = sign * _side(self, b, c)
-        of_b: cython.double = sign * _side(self, c, a)
-        of_c: cython.double = sign * _side(self, a, b)
-        least: cython.double = min(of_a, of_b, of_c)
-        slack: cython.double = _ON_SIDE * (fabs(of_a) + fabs(of_b) + fabs(of_c))
-        if least > slack:
-            return -1
-        if least >= -slack:
-            return -2
-        if least == of_a:
-            return (o + 1) % 4
-        return (o + 2) % 4 if least == of_b else (o + 3) % 4
-
     def aim(
-        self, v: cython.int, t: cython.int, into: cython.int, nudge: cython.double, toward: cython.int
+        self, line: cython.pointer[Line], t: cython.int, into: cython.int, nudge: cython.double, toward: cython.int
     ) -> cython.void:
-        """Take the line from v to the goal, both ends moved by a part of the way to the middle of a tetrahedron.
+        """Take the line from origin to goal, both ends moved by a part of the way to the middle of a tetrahedron.
 
         A line along edges and faces, as on a grid, would touch several tetrahedra at once. The end stays if `into` is
         negative, and the beginning is moved towards one corner of t if `toward` names it.
         """
+        p: cython.double[3]
+        w: cython.double[3]
         for i in range(3):
-            p: cython.double = (1 - nudge) * self.body.positions[v, i]
-            q: cython.double = self.goal[i]
-            for c in range(4):
+            p[i], w[i] = (1 - nudge) * line.origin[i], line.goal[i]
+            for c in range(4 if nudge > 0 else 0):
                 part: cython.double = 0.25 if toward < 0 else 0.7 if c == toward else 0.1
-                p += part * nudge * self.body.positions[self.body.corners[t, c], i]
-            if into >= 0:
-                q *= 1 - nudge
-                for c in range(4):
-                    q += 0.25 * nudge * self.body.positions[self.body.corners[into, c], i]
-            self.p[i], self.w[i] = p, q - p
+                p[i] += part * nudge * self.body.positions[self.body.cells[t, c], i]
+                if into >= 0:
+                    w[i] += 0.25 * nudge * (self.body.positions[self.body.cells[into, c], i] - line.goal[i])
+            w[i] -= p[i]
+        line.up = 0 if fabs(w[0]) >= fabs(w[1]) else 1
+        if fabs(w[2]) > fabs(w[line.up]):
+            line.up = 2
+        line.east = line.up + 1 if line.up < 2 else 0
+        line.north = line.east + 1 if line.east < 2 else 0
+        line.p_x, line.p_y, line.p_z = p[line.east], p[line.north], p[line.up]
+        line.tilt_x, line.tilt_y = w[line.east] / w[line.up], w[line.north] / w[line.up]
+        line.forward = 1.0 if w[line.up] > 0 else -1.0
 
-    def enters(self, t: cython.int, o: cython.int) -> cython.bint:
-        """Find the triangle through which the line, which begins inside t, leaves it; opposite corner o at first."""
-        self.t = t
-        for i in range(o, o + 4):
-            self.a = self.body.corners[t, (i + 1) % 4]
-            self.b = self.body.corners[t, (i + 2) % 4]
-            self.c = self.body.corners[t, (i + 3) % 4]
-            self.sign = _leaves(self, self.body.corners[t, i % 4], self.a, self.b, self.c, 0.0)
-            if self.sign != 0:
-                return True
-        return False
+    def leaves(self, line: cython.pointer[Line], k: cython.int, part: cython.double) -> cython.bint:
+        """Whether the line, which begins in the tetrahedron of corner k, leaves it through the triangle opposite k.
 
-    def cross(self) -> cython.int:
-        """Go through abc; returns the fourth vertex of the tetrahedron behind it, or -1 on the boundary."""
-        for i in range(4):
-            u: cython.int = self.body.corners[self.t, i]
-            if u != self.a and u != self.b and u != self.c:
-                break
-        self.t = self.body.behind[self.t, i]
-        if self.t < 0:
-            return -1
-        u = self.a ^ self.b ^ self.c
-        for i in range(4):
-            u ^= self.body.corners[self.t, i]
-        return u
-
-    def turn(self, o: cython.int) -> cython.bint:
-        """Find the triangle at o through which the line leaves t, which it entered through abc."""
-        of_a: cython.double = self.sign * _side(self, o, self.a)
-        of_b: cython.double = self.sign * _side(self, o, self.b)
-        if of_a >= 0 and of_b <= 0:
-            self.c = o
-            return True
-        of_c: cython.double = self.sign * _side(self, o, self.c)
-        if of_b >= 0 and of_c <= 0:
-            self.a = o
-        elif of_c >= 0 and of_a <= 0:
-            self.b = o
-        else:
-            return False
-        return True
+        It may miss the triangle by a part of it, or be inside by that if it is negative. `side` becomes the corner
+        opposite the side of the cone at k that the line is farthest behind.
+        """
+        z: cython.double[3]
+        for i in range(3):
+            u: cython.int = self.body.cells[k >> 2, (k + 1 + i) & 3]
+            at: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[u, 0])
+            z[i] = at[line.up] - line.p_z
+            line.x[i] = at[line.east] - line.p_x - line.tilt_x * z[i]
+            line.y[i] = at[line.north] - line.p_y - line.tilt_y * z[i]
+            line.corner[i] = u
+        of_a: cython.double = line.x[1] * line.y[2] - line.y[1] * line.x[2]
+        of_b: cython.double = line.x[2] * line.y[0] - line.y[2] * line.x[0]
+        of_c: cython.double = line.x[0] * line.y[1] - line.y[0] * line.x[1]
+        # The line meets the plane of the triangle ahead.
+        line.sign = line.forward if z[0] * of_a + z[1] * of_b + z[2] * of_c > 0 else -line.forward
+        of_a, of_b, of_c = line.sign * of_a, line.sign * of_b, line.sign * of_c
+        line.least = min(of_a, of_b, of_c)
+        line.slack = ON_SIDE * (fabs(of_a) + fabs(of_b) + fabs(of_c))
+        line.side = (k + (1 if line.least == of_a else 2 if line.least == of_b else 3)) & 3
+        if part < 0:
+            return line.least > line.slack
+        return line.least >= -line.slack if part > 0 else line.least >= 0
 
 
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _side(ray: Ray, a: cython.int, b: cython.int) -> cython.double:
-    """On which side the edge ab passes the line: the determinant of w, a - p and b - p."""
-    ax: cython.double = ray.body.positions[a, 0] - ray.p[0]
-    ay: cython.double = ray.body.positions[a, 1] - ray.p[1]
-    az: cython.double = ray.body.positions[a, 2] - ray.p[2]
-    bx: cython.double = ray.body.positions[b, 0] - ray.p[0]
-    by: cython.double = ray.body.positions[b, 1] - ray.p[1]
-    bz: cython.double = ray.body.positions[b, 2] - ray.p[2]
-    return ray.w[0] * (ay * bz - az * by) + ray.w[1] * (az * bx - ax * bz) + ray.w[2] * (ax * by - ay * bx)
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _leaves(ray: Ray, o: cython.int, a: cython.int, b: cython.int, c: cython.int, part: cython.double) -> cython.int:
-    """How the line leaves the tetrahedron oabc through abc: 0 if it does not, else the sign of its corners' order.
-
-    The line may miss the triangle by a part of it.
-    """
-    of_a: cython.double = _side(ray, b, c)
-    of_b: cython.double = _side(ray, c, a)
-    of_c: cython.double = _side(ray, a, b)
-    least: cython.double = -part * (fabs(of_a) + fabs(of_b) + fabs(of_c))
-    sign: cython.int = 1 if of_a + of_b + of_c > 0 else -1
-    if min(sign * of_a, sign * of_b, sign * of_c) < least:
-        return 0
-    # The line leaves where o lies behind: w and the normal of abc that points away from o agree.
-    return sign if sign * _volume(ray, o, a, b, c) > 0 else 0
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _volume(ray: Ray, o: cython.int, a: cython.int, b: cython.int, c: cython.int) -> cython.double:
-    """Six times the volume of oabc, with the sign of the order of its corners."""
-    found: cython.double = 0.0
-    for i in range(3):
-        j: cython.int = (i + 1) % 3
-        k: cython.int = (i + 2) % 3
-        at: cython.double = ray.body.positions[o, i]
-        found += (ray.body.positions[a, i] - at) * (
-            (ray.body.positions[b, j] - ray.body.positions[o, j])
-            * (ray.body.positions[c, k] - ray.body.positions[o, k])
-            - (ray.body.positions[b, k] - ray.body.positions[o, k])
-            * (ray.body.positions[c, j] - ray.body.positions[o, j])
-        )
-    return found
+def _has(line: cython.pointer[Line], v: cython.int) -> cython.int:
+    """What a tetrahedron `has` with v."""
+    return (v == line.goal_a) + 2 * (v == line.goal_b) + 4 * (line.lit[v] == line.stamp)

@@ -2,11 +2,9 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, Body, Ray
+from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, Body, Line, Ray
 from cython.cimports.libc.math import INFINITY, sqrt
 
-# Part by which a way may be longer than a straight line and still be one.
-_STRAIGHT_LINE = cython.declare(cython.double, 1e-6)
 # Sources that a vertex looks for each time, the nearest first, and passes over the vertices that wait.
 _MOST_LOOKS = cython.declare(cython.int, 4)
 _MOST_PASSES = cython.declare(cython.int, 100)
@@ -41,6 +39,10 @@ def look_around(
     n = order.shape[0]
     one = _Sight(body, sources, offset, d, begin, label)
     one.turns, one.is_concave, one.guess = turns, is_concave, guess
+    one.lit = np.full(n, -1, np.int32)
+    for i in range(sources.shape[0]):
+        one.lit[sources[i]] = i
+    one.to_source.lit = cython.address(one.lit[0])
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
     one.is_waiting = is_waiting
     with cython.nogil:
@@ -57,13 +59,15 @@ def look_around(
 @cython.final
 @cython.cclass
 class _Sight(Ray):
-    """What is read and written, the line that is followed, and the source that is looked for."""
+    """What is read and written, the source that is looked for, the line to it, and `lit` (n,), the source on a line."""
 
     turns: cython.const[cython.uchar][::1]
     is_concave: cython.bint
     guess: cython.int[::1]
     is_waiting: cython.uchar[::1]
+    lit: cython.int[::1]
     sought: cython.int
+    to_source: Line
 
     @cython.cfunc
     @cython.nogil
@@ -101,9 +105,10 @@ class _Sight(Ray):
     def take(self, v: cython.int, label: cython.int) -> cython.void:
         """Give v the straight line from a source, and wake those around it that may have use for this source."""
         self.d[v], self.begin[v], self.label[v] = self.line(v, label), self.offset[label], label
+        self.lit[v] = label
         for k in range(self.body.first_neighbour[v], self.body.first_neighbour[v + 1]):
             u: cython.int = self.body.neighbours[k]
-            if self.label[u] != label or not self.has_line(u, label):
+            if self.lit[u] != label:
                 self.is_waiting[u] = True
 
     @cython.cfunc
@@ -138,43 +143,22 @@ class _Sight(Ray):
         return self.offset[label] + sqrt(squared)
 
     @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def has_line(self, v: cython.int, label: cython.int) -> cython.bint:
-        """Whether the way to v is known to be a straight line from this source."""
-        if self.label[v] != label:
-            return False
-        return (self.d[v] - self.offset[label]) * (1 - _STRAIGHT_LINE) <= self.line(v, label) - self.offset[label]
-
-    @cython.cfunc
     @cython.nogil
     def sees_source(self, v: cython.int, label: cython.int) -> cython.bint:
         """Whether the straight line from v to a source stays in the tetrahedra."""
         source: cython.int = self.sources[label]
         if self.body.first[v] == self.body.first[v + 1] or self.body.first[source] == self.body.first[source + 1]:
             return False
+        line: cython.pointer[Line] = cython.address(self.to_source)
+        line.goal, line.goal_a, line.goal_b = cython.address(self.body.positions[source, 0]), source, source
         self.sought = label
-        return self.sees(v, cython.address(self.body.positions[source, 0]))
+        # The corner of a cavity may stand between three vertices that see the source.
+        line.stamp = -2 if self.is_concave else label
+        return self.is_near(line, v) or self.follows(line, v)
 
     @cython.cfunc
     @cython.nogil
-    def is_there(self, t: cython.int) -> cython.bint:
-        """As `Ray.is_there`: at the source."""
-        source: cython.int = self.sources[self.sought]
-        for c in range(4):
-            if self.body.corners[t, c] == source:
-                return True
-        return False
-
-    @cython.cfunc
-    @cython.nogil
-    def is_lit(self, v: cython.int) -> cython.bint:
-        """As `Ray.is_lit`, without concave walls: the corner of a cavity may stand between such vertices."""
-        return not self.is_concave and self.has_line(v, self.sought)
-
-    @cython.cfunc
-    @cython.nogil
-    def arrives_from(self, v: cython.int, begin: cython.int) -> cython.bint:
+    def arrives_from(self, line: cython.pointer[Line], begin: cython.int) -> cython.bint:
         """As `Ray.arrives_from`; a line that touches a wall is moved to all sides, one of which is inside."""
         into: cython.int = self.body.incident[self.body.first[self.sources[self.sought]]] // 4
         if self.turns[self.sought]:
@@ -182,7 +166,7 @@ class _Sight(Ray):
         for toward in range(-1, 4 if self.is_concave else 0):
             if toward == begin % 4:
                 continue
-            if self.arrives(v, begin, into, toward):
+            if self.arrives(line, begin, into, toward):
                 return True
             into = -1
         return False
