@@ -18,9 +18,8 @@ class Body:
     """A body of tetrahedra in space.
 
     `cells` (m, 8) has the corners of the tetrahedra, then the corner ``4 * tetrahedron + corner`` behind the side
-    opposite each, -1 on the boundary, side by side in memory for lines that pass through. The neighbours of vertex v
-    are at ``first_neighbour[v]`` to ``first_neighbour[v + 1]`` of `neighbours`, and `reach` (n,) is the longest edge at
-    each vertex.
+    opposite each, -1 on the boundary; the neighbours of vertex v are at ``first_neighbour[v]`` to
+    ``first_neighbour[v + 1]`` of `neighbours`, and `reach` (n,) is the longest edge at each vertex.
 
     It is made of tetrahedra `corners` (m, 4) int32, positions (n, 3) of the vertices, and the corners
     ``4 * tetrahedron + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
@@ -207,7 +206,6 @@ class Ray:
     ) -> cython.bint:
         """Begin in the tetrahedron of a corner, and find the side through which the line leaves it."""
         self.aim(line, begin // 4, into, NUDGE, toward)
-        # Most likely that opposite the corner.
         for i in range(4):
             k: cython.int = begin // 4 * 4 + ((begin + i) & 3)
             if self.leaves(line, k, 0.0):

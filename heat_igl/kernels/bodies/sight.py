@@ -40,8 +40,7 @@ def look_around(
     one = _Sight(body, sources, offset, d, begin, label)
     one.turns, one.is_concave, one.guess = turns, is_concave, guess
     one.lit = np.full(n, -1, np.int32)
-    for i in range(sources.shape[0]):
-        one.lit[sources[i]] = i
+    np.asarray(one.lit)[np.asarray(sources)] = np.arange(sources.shape[0])
     one.to_source.lit = cython.address(one.lit[0])
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
     one.is_waiting = is_waiting
