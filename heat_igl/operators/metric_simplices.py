@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.kernels.sweep import hopf_lax
+from heat_igl.kernels.sweep.simplex_metrics import lengths_in_velocity
 from heat_igl.mesh import Mesh
 from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -123,7 +123,7 @@ class MetricSimplices:
         """What `lengths_in_velocity` returns, or the same of one metric for each simplex."""
         if self.velocity is not None:
             corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
-            return tuple(hopf_lax.lengths_in_velocity(corners, V, self.velocity, self.rows))
+            return tuple(lengths_in_velocity(corners, V, self.velocity, self.rows))
         lengths = self.lengths
         if not len(lengths):
             if self.tensors is None or self.place is None:

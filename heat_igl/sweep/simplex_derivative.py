@@ -169,7 +169,7 @@ class _FacetUpdate:
         return W, e @ np.swapaxes(axes, 1, 2)
 
     def _sag(self, at: _Inputs, D: AnyArray, e: AnyArray, product: AnyArray) -> AnyArray:
-        """Second difference of the squared distance between two corners (k, p, p), as `HopfLax.sag_between`."""
+        """Second difference of the squared distance between two corners (k, p, p), as `SimplexUpdate.sag_between`."""
         k, p = D.shape
         metric = product if product.shape[1] == 1 else product[:, 1:]
         w = np.einsum("kix,kjx->kij", at.slope, e)

@@ -6,7 +6,9 @@ from cython.cimports.heat_igl.kernels.sweep.facets import (
     MOST_STEPS,
     PLACED,
     invert,
+    model,
     multiply,
+    on_interval,
 )
 from cython.cimports.libc.math import INFINITY, asinh, fabs, sqrt
 
@@ -22,8 +24,6 @@ class Facet:
     For p = 2 the third of each is 0.
     """
 
-    @cython.cfunc
-    @cython.nogil
     def dual(self, k: cython.int, e: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """The square of a slope in the inverse metric: e at corner k - 1, or that which rises by e if q = 1."""
         if self.q > 1:
@@ -111,8 +111,6 @@ class Facet:
         # Of small arguments asinh has no digits.
         return self.even * (asinh(half) / half if half > 1e-4 else 1.0 - half * half / 6.0)
 
-    @cython.cfunc
-    @cython.nogil
     def lean(self, i: cython.int) -> cython.double:
         """What the last `length` gains by moving v towards corner i."""
         if self.q == 1:
@@ -127,8 +125,6 @@ class Facet:
             gain -= self.u[k] * (self.E[i][k] + e[k])
         return self.factor * gain - self.near * self.factor_1 * self.sx / self.s[0] * (self.s[i + 1] - self.s[0])
 
-    @cython.cfunc
-    @cython.nogil
     def value(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """T(x) + |v - x| for shares x of the corners, inf if there is none; sets its derivatives `g`."""
         mean: cython.double = x[0] * self.D[0] + x[1] * self.D[1] + x[2] * self.D[2]
@@ -175,8 +171,6 @@ class Facet:
                     found -= 0.25 * turn * (self.g[i] - self.rise[i]) * (self.g[j] - self.rise[j])
                 self.H[i][j] = self.H[j][i] = found
 
-    @cython.cfunc
-    @cython.nogil
     def newton(self, limit: cython.double) -> cython.double:
         """The least value over the facet, by Newton's method from `share`, which is changed; inf if not below `limit`.
 
@@ -208,7 +202,7 @@ class Facet:
             de: cython.double = 0.0
             if self.p == 2:
                 bend: cython.double = self.H[0][0] - 2.0 * self.H[0][1] + self.H[1][1]
-                db = _on_interval(self.g[1] - self.g[0], bend, -x[1], x[0])
+                db = on_interval(self.g[1] - self.g[0], bend, -x[1], x[0])
             else:
                 db, de = self.on_triangle(x)
             is_last = fabs(db) + fabs(de) <= PLACED
@@ -226,8 +220,6 @@ class Facet:
                 x[i] = self.share[i] = y[i]
         return best
 
-    @cython.cfunc
-    @cython.nogil
     def on_triangle(self, x: cython.pointer[cython.const[cython.double]]) -> tuple[cython.double, cython.double]:
         """The step, in shares of the last two corners, to the least value of the quadratic model on the triangle."""
         gb: cython.double = self.g[1] - self.g[0]
@@ -244,42 +236,17 @@ class Facet:
             if x[1] + db >= 0.0 and x[2] + de >= 0.0 and db + de <= x[0]:
                 return db, de
         # On the three edges.
-        one: cython.double = _on_interval(gb - be * x[2], bb, -x[1], 1.0 - x[1])
+        one: cython.double = on_interval(gb - be * x[2], bb, -x[1], 1.0 - x[1])
         two: cython.double = -x[2]
-        least: cython.double = _model(gb, ge, bb, be, ee, one, two)
+        least: cython.double = model(gb, ge, bb, be, ee, one, two)
         db, de = one, two
-        one, two = -x[1], _on_interval(ge - be * x[1], ee, -x[2], 1.0 - x[2])
-        value: cython.double = _model(gb, ge, bb, be, ee, one, two)
+        one, two = -x[1], on_interval(ge - be * x[1], ee, -x[2], 1.0 - x[2])
+        value: cython.double = model(gb, ge, bb, be, ee, one, two)
         if value < least:
             least, db, de = value, one, two
         # With no share of the first corner: db + de = x[0].
-        one = _on_interval(gb - ge + (be - ee) * x[0], bb - 2.0 * be + ee, -x[1], 1.0 - x[1])
+        one = on_interval(gb - ge + (be - ee) * x[0], bb - 2.0 * be + ee, -x[1], 1.0 - x[1])
         two = x[0] - one
-        if _model(gb, ge, bb, be, ee, one, two) < least:
+        if model(gb, ge, bb, be, ee, one, two) < least:
             db, de = one, two
         return db, de
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _on_interval(slope: cython.double, bend: cython.double, low: cython.double, high: cython.double) -> cython.double:
-    """Where slope x + bend x^2 / 2 is least between two bounds."""
-    if bend > 0.0:
-        return min(max(-slope / bend, low), high)
-    return low if slope * low + 0.5 * bend * low * low < slope * high + 0.5 * bend * high * high else high
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _model(
-    gb: cython.double,
-    ge: cython.double,
-    bb: cython.double,
-    be: cython.double,
-    ee: cython.double,
-    b: cython.double,
-    e: cython.double,
-) -> cython.double:
-    return gb * b + ge * e + 0.5 * (bb * b * b + ee * e * e) + be * b * e

@@ -1,0 +1,45 @@
+from heat_igl.kernels.sweep.facets cimport Facet
+
+cdef extern from *:
+    """
+    // Difference of values, as a share of them, that is rounding.
+    #define EQUAL 1e-12
+    """
+    double EQUAL
+
+
+cdef class LinearUpdate(Facet):
+    cdef const int[:, ::1] corners
+    cdef const double[:, ::1] mean
+    cdef double[::1] d
+    # The corners of the facet in the simplex, and distance at these.
+    cdef int side[3]
+    cdef double level[3]
+
+    cdef double face(self, int s, int c) noexcept nogil
+    cdef double linear(self, int s, int c, double room) noexcept nogil
+    cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
+    cdef double across(self, int s, int c, double room) noexcept nogil
+
+
+cdef class SimplexUpdate(LinearUpdate):
+    cdef const double[:, ::1] velocity, inverses, V
+    cdef const int[:, ::1] rows
+    # What bounds the values through each simplex.
+    cdef double[::1] widest, slack, growths
+    # The source of each vertex, the offset of each, and the least distance.
+    cdef int[::1] label
+    cdef const double[::1] offset
+    cdef double low
+    # The derivative of distance by the position of each vertex, where it is known.
+    cdef double[:, ::1] slope
+    cdef unsigned char[::1] is_sloped
+    # How far T is of second order for each vertex.
+    cdef double[::1] weight
+
+    cdef double through(self, int s, int c, double best) noexcept nogil
+    cdef void lay(self, int s, int c) noexcept nogil
+    cdef double curved(self, int s, int c, double limit) noexcept nogil
+    cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
+    cdef double trust(self, int s, int c, int i) noexcept nogil
+    cdef void find_slope(self, int s, int c) noexcept nogil

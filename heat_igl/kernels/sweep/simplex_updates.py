@@ -1,0 +1,308 @@
+"""The least of T(x) + |v - x| over the facet opposite a corner v: with T linear, and of second order by slopes."""
+
+import cython
+from cython.cimports.heat_igl.kernels.sweep.facets import Facet, gradient, mean_velocity, pair, squares_of
+from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL
+from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
+
+
+@cython.cclass
+class LinearUpdate(Facet):
+    """The value at a corner of a simplex of which `mean` has the squared lengths, from the distances `d` at the others.
+
+    `face` chooses the corner; the other corners are `side`, and have the distances `level`.
+    """
+
+    def face(self, s: cython.int, c: cython.int) -> cython.double:
+        """Look at the facet opposite corner c of simplex s: sets `side` and `level`, returns the least distance."""
+        k: cython.int = 0
+        i: cython.int
+        nearest: cython.double = INFINITY
+        for i in range(self.p + 1):
+            if i != c:
+                self.side[k] = i
+                self.level[k] = self.d[self.corners[s, i]]
+                nearest = min(nearest, self.level[k])
+                k += 1
+        return nearest
+
+    def linear(self, s: cython.int, c: cython.int, room: cython.double) -> cython.double:
+        """The least value at corner c of simplex s with T linear, after `face`; sets `share`.
+
+        It may be inf if it is above the nearest corner by `room` or more.
+        """
+        self.share[0] = self.share[1] = self.share[2] = 0.0
+        if self.p == 2:
+            return self.over_edge(s, c, 0, 1, INFINITY)
+        least: cython.double = self.across(s, c, room)
+        if least == INFINITY:
+            # Values are convex: the least one is on an edge beyond which that over the whole plane lies.
+            is_within: cython.bint[3]
+            for k in range(3):
+                is_within[k] = self.share[k] > 0.0
+            for k in range(3):
+                i: cython.int = 1 if k == 0 else 0
+                j: cython.int = 1 if k == 2 else 2
+                if not is_within[k]:
+                    least = self.over_edge(s, c, i, j, least)
+        return least
+
+    def over_edge(
+        self, s: cython.int, c: cython.int, i: cython.int, j: cython.int, least: cython.double
+    ) -> cython.double:
+        """The smaller of `least` and the least value over the edge between two corners of `side`; then sets `share`."""
+        sq = cython.address(self.mean[s, 0])
+        base: cython.double = sq[pair(self.side[j], self.side[i])]
+        to: cython.double = sq[pair(c, self.side[i])]
+        rise: cython.double = self.level[j] - self.level[i]
+        rest: cython.double = base - rise * rise
+        # From corner i, along the edge to corner j: at one of them if T is steeper than the metric allows.
+        along: cython.double = -rise
+        far: cython.double = 0.0
+        if rest > 0.0:
+            along = 0.5 * (base + to - sq[pair(c, self.side[j])])
+            far = sqrt(max(to * base - along * along, 0.0) / rest)
+            along -= far * rise
+        value: cython.double
+        if not along > 0.0:
+            along, value = 0.0, self.level[i] + sqrt(to)
+        elif along < base and rest > 0.0:
+            along /= base
+            value = self.level[i] + rise * along + far
+        else:
+            along, value = 1.0, self.level[j] + sqrt(sq[pair(c, self.side[j])])
+        if not value < least:
+            return least
+        for k in range(3):
+            self.share[k] = 0.0
+        self.share[i], self.share[j] = 1.0 - along, along
+        return value
+
+    def across(self, s: cython.int, c: cython.int, room: cython.double) -> cython.double:
+        """The least value if it lies inside the triangle of `side`, else inf; sets `share`.
+
+        Else shares are those where the value over the whole plane is least, 0 if there is no such place, and 1 if no
+        value is above the nearest corner by less than `room`.
+        """
+        sq = cython.address(self.mean[s, 0])
+        to: cython.double = sq[pair(c, self.side[0])]
+        bb: cython.double = sq[pair(self.side[1], self.side[0])]
+        ee: cython.double = sq[pair(self.side[2], self.side[0])]
+        be: cython.double = 0.5 * (bb + ee - sq[pair(self.side[2], self.side[1])])
+        det: cython.double = bb * ee - be * be
+        b: cython.double = self.level[1] - self.level[0]
+        e: cython.double = self.level[2] - self.level[0]
+        if not det > 0.0:
+            return INFINITY
+        det = 1.0 / det
+        wb: cython.double = 0.5 * (bb + to - sq[pair(c, self.side[1])])
+        we: cython.double = 0.5 * (ee + to - sq[pair(c, self.side[2])])
+        # The foot of v on the plane, and the slope of T there, in shares of b and e.
+        fb: cython.double = (ee * wb - be * we) * det
+        fe: cython.double = (bb * we - be * wb) * det
+        height: cython.double = max(to - fb * wb - fe * we, 0.0)
+        if height >= room * room:
+            self.share[0] = self.share[1] = self.share[2] = 1.0
+            return INFINITY
+        gb: cython.double = (ee * b - be * e) * det
+        ge: cython.double = (bb * e - be * b) * det
+        rest: cython.double = 1.0 - gb * b - ge * e
+        if not rest > 0.0:
+            return INFINITY
+        far: cython.double = sqrt(height / rest)
+        fb -= far * gb
+        fe -= far * ge
+        self.share[0], self.share[1], self.share[2] = 1.0 - fb - fe, fb, fe
+        if not (fb > 0.0 and fe > 0.0 and fb + fe < 1.0):
+            return INFINITY
+        return self.level[0] + b * fb + e * fe + far
+
+
+@cython.final
+@cython.cclass
+class SimplexUpdate(LinearUpdate):
+    """Triangles, p = 2, or tetrahedra, p = 3, with a metric on each, or one at each of their corners.
+
+    Parameters
+    ----------
+    corners : (m, p + 1) int32
+        Vertices of each simplex.
+    velocity, inverse : (k, 6) float64 or None
+        The inverse root of metrics, whose entries on and above the diagonal come row by row, and its inverse. None if
+        each simplex has one metric (q = 1).
+    rows : (m, p + 1) int32 or None
+        If not (q = p + 1), the row of these at each corner; velocity is linear in between.
+    mean : (m, pairs) float64
+        Squared distances in one metric for each simplex, in which T is found that is linear; pairs of corners in the
+        order of `np.tril_indices`.
+    widest, slack : (m,) float64
+        The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
+    growth : (m,) float64
+        If q > 1, the length of the gradient of the mean velocity, in the metric of the centre.
+    V : (n, 3) float64
+        Positions.
+    """
+
+    def __init__(self, corners, velocity, inverse, rows, mean, widest, slack, growth, V):
+        self.corners, self.velocity, self.inverses, self.rows, self.V = corners, velocity, inverse, rows, V
+        self.mean, self.widest, self.slack, self.growths = mean, widest, slack, growth
+        self.p, self.q = corners.shape[1] - 1, 1 if rows is None else corners.shape[1]
+
+    def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
+        """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
+
+        Its lower bound is what T linear and the nearest corner say, with some margin.
+        """
+        nearest: cython.double = self.face(s, c)
+        # Between corners at one distance from a point, the square is less by at most a third of a squared edge.
+        most: cython.double = 0.5 * self.widest[s]
+        near: cython.double = max(nearest - self.low, sqrt(most))
+        sag: cython.double = near - sqrt(max(near * near - most, 0.0))
+        room: cython.double = (best + sag - nearest) / self.slack[s]
+        if not room > 0.0:
+            return INFINITY
+        linear: cython.double = self.linear(s, c, room)
+        return self.curved(s, c, best) if linear - nearest < room else INFINITY
+
+    def lay(self, s: cython.int, c: cython.int) -> cython.void:
+        """What `Facet` knows of the metric of s, after `face`."""
+        if self.q == 1:
+            sq = cython.address(self.mean[s, 0])
+            m = cython.address(self.product[0])
+            for i in range(self.p):
+                m[4 * i] = sq[pair(c, self.side[i])]
+                for j in range(i):
+                    between: cython.double = m[4 * i] + m[4 * j] - sq[pair(self.side[i], self.side[j])]
+                    m[3 * i + j] = m[3 * j + i] = 0.5 * between
+            return
+        self.growth = self.growths[s]
+        for i in range(4):  # the fourth of a triangle has the share 0
+            at: cython.int = c if i == 0 or i > self.p else self.side[i - 1]
+            self.W[i] = cython.address(self.velocity[self.rows[s, at], 0])
+            self.s[i] = mean_velocity(self.W[i])
+        for i in range(self.p):
+            for k in range(3):
+                self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
+
+    def curved(self, s: cython.int, c: cython.int, limit: cython.double) -> cython.double:
+        """The least value at corner c of simplex s with T of second order, after `linear`; sets `share`.
+
+        It may be inf if it is not below `limit`.
+        """
+        self.start = INFINITY
+        for i in range(self.p):
+            self.start = min(self.start, self.offset[self.label[self.corners[s, self.side[i]]]])
+        self.lay(s, c)
+        is_source: cython.bint = False
+        x: cython.double[3]
+        for i in range(self.p):
+            self.D[i] = self.level[i] - self.start
+            is_source = is_source or not self.D[i] > 0.0
+        if is_source and self.q > 1:
+            # T is not linear on an edge to the source, and its square not quadratic.
+            return self.along_edges()
+        for i in range(self.p):
+            x[i] = self.trust(s, c, i)
+            for j in range(i):
+                sag: cython.double = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
+                self.sag[i][j] = self.sag[j][i] = self.weight[self.corners[s, c]] * sag
+        best: cython.double = self.newton(limit)
+        if is_source:
+            # Straight from the source, where the square of T may have no derivatives.
+            for i in range(3):
+                x[i] = self.share[i]
+            straight: cython.double = self.along_edges()
+            if straight < best:
+                return straight
+            for i in range(3):
+                self.share[i] = x[i]
+        return best
+
+    def sag_between(
+        self, s: cython.int, i: cython.int, j: cython.int, more: cython.double, trusted: cython.double
+    ) -> cython.double:
+        """By how much the squared distance between two corners sags below that of T linear, over their shares.
+
+        The squared distance from one point in one metric is a quadratic function, found from the slopes at both ends.
+        Where these contradict the values, it sags less. T may not be steeper at the ends than the metric allows.
+
+        Parameters
+        ----------
+        s, i, j
+            The simplex, and the two corners of `side`.
+        more, trusted
+            By how much the slope at i is trusted more than that at j, and the smaller trust of both.
+        """
+        v: cython.int = self.corners[s, self.side[i]]
+        u: cython.int = self.corners[s, self.side[j]]
+        if self.label[v] != self.label[u] or not (self.is_sloped[v] and self.is_sloped[u]):
+            return 0.0
+        Di: cython.double = self.D[i]
+        Dj: cython.double = self.D[j]
+        at_i: cython.double = 0.0
+        at_j: cython.double = 0.0
+        e: cython.double[3]
+        for k in range(3):
+            e[k] = self.V[u, k] - self.V[v, k]
+            at_i += self.slope[v, k] * e[k]
+            at_j += self.slope[u, k] * e[k]
+        at_i *= 2.0 * Di
+        at_j *= 2.0 * Dj
+        rise: cython.double = Dj * Dj - Di * Di
+        # A slope of another metric is replaced by what the other end says, unless T would fall below both ends.
+        if more > 0.0:
+            at_j += more * ((2.0 * rise - at_i if rise > 0.0 else min(2.0 * rise - at_i, 0.0)) - at_j)
+        else:
+            at_i -= more * ((2.0 * rise - at_j if rise < 0.0 else max(2.0 * rise - at_j, 0.0)) - at_i)
+        level: cython.double = (Dj - Di) * (Dj - Di)
+        sag: cython.double = 0.5 * (at_j - at_i) - level
+        doubt: cython.double = rise - 0.5 * (at_i + at_j)
+        if fabs(doubt) >= fabs(sag):
+            return 0.0
+        sag -= fabs(doubt) * max(doubt / sag, -doubt / sag, 1.0 - trusted) * (1.0 if sag > 0.0 else -1.0)
+        # T above that of first order makes distances longer: if both slopes say so, or one of this very metric, as at a
+        # border between two metrics, where the wave at the other end came through the border.
+        if sag < 0.0 and trusted + fabs(more) < 1.0 - EQUAL:
+            sag *= trusted
+        square_i: cython.double = self.mean[s, pair(self.side[i], self.side[j])]
+        square_j: cython.double = square_i
+        if self.q > 1:
+            squares_of(cython.address(self.inverses[self.rows[s, self.side[i]], 0]), e, 1, cython.address(square_i))
+            squares_of(cython.address(self.inverses[self.rows[s, self.side[j]], 0]), e, 1, cython.address(square_j))
+        from_i: cython.double = 2.0 * Di * sqrt(square_i)
+        from_j: cython.double = 2.0 * Dj * sqrt(square_j)
+        most: cython.double = min(rise + from_i, from_j - rise) - level
+        least: cython.double = max(rise - from_i, -from_j - rise) - level
+        return max(min(sag, most), least)
+
+    def trust(self, s: cython.int, c: cython.int, i: cython.int) -> cython.double:
+        """How far the slope at a corner i of `side` has length 1 in simplex s, as unless metrics jump: from 0 to 1.
+
+        With the square of the logarithm, distances have a derivative where metrics begin to differ.
+        """
+        v: cython.int = self.corners[s, self.side[i]]
+        if not self.is_sloped[v]:
+            return 0.0
+        e: cython.double[3]
+        for j in range(3):
+            e[j] = self.slope[v, j] if self.q > 1 else 0.0
+            if self.q == 1 and j < self.p:
+                for k in range(3):
+                    e[j] += self.slope[v, k] * (
+                        self.V[self.corners[s, self.side[j]], k] - self.V[self.corners[s, c], k]
+                    )
+        square: cython.double = self.dual(i + 1 if self.q > 1 else 0, e)
+        square = log(square) if square > 0.0 else 1.0
+        return max(1.0 - square * square, 0.0)
+
+    def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
+        """The derivative of the length of v - x by the position of v, at the best place x."""
+        v: cython.int = self.corners[s, c]
+        E: cython.double[9]
+        lean: cython.double[3]
+        self.is_sloped[v] = self.length(self.share) > 0.0
+        for i in range(self.p):
+            lean[i] = self.lean(i)
+            for k in range(3):
+                E[3 * i + k] = self.V[self.corners[s, self.side[i]], k] - self.V[v, k]
+        gradient(E, lean, self.p, cython.address(self.slope[v, 0]))
