@@ -235,15 +235,13 @@ class DistanceDerivative:
         return on_faces
 
 
-def differentiable_surface(surface: Surface | None, sources: SourceSet, mesh: Mesh | PointCloud | None) -> Surface:
+def differentiable_surface(surface: Surface, sources: SourceSet, mesh: Mesh | PointCloud | None) -> Surface:
     """The surface, if a distance from `sources` on it has a derivative.
 
-    A ValueError if there is none, if it is that of a point cloud, or if a curve is among the sources.
+    A ValueError if it is that of a point cloud, if vertices were merged, or if a curve is among the sources.
     """
-    if surface is None or isinstance(mesh, PointCloud):
-        raise ValueError(
-            "derivatives need a surface of triangles: this domain has none, or is a point cloud: take its triangles"
-        )
+    if isinstance(mesh, PointCloud):
+        raise ValueError("derivatives need a surface of triangles, and the domain is a point cloud: take its triangles")
     if mesh is not None and mesh.has_copies:
         raise ValueError(
             "derivatives need vertices none of which is a copy of another, and seams of this mesh were merged"

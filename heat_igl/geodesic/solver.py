@@ -429,25 +429,24 @@ class GeodesicSolver(BatchedSolver):
     def distance_vjp(self, sources: Sources) -> tuple[FloatArray, DistanceDerivative | SimplexDerivative]:
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
-        Arguments and errors as for `distance`, whose values ``phi`` are; a ValueError also if the engine is a sweep,
-        and for what has no derivative, see `differentiable_surface`. Of windows, the derivative is that of exact paths;
-        where `plan` names lines or the Hopf-Lax formula, it is a `SimplexDerivative`. ``pull_back.distance`` is what is
-        differentiated: of the formula its fixed point, which ``phi`` is near.
+        Arguments and errors as for `distance`; a ValueError also if the engine is a sweep, and for what has no
+        derivative, see `differentiable_surface`. Of windows, the derivative is that of exact paths; of lines and the
+        Hopf-Lax formula, it is a `SimplexDerivative`. ``phi`` is what `distance` returns, but for a metric or speed per
+        face on triangles where `plan` names the Hopf-Lax formula: value and derivative are those of windows there, and
+        ``phi`` may differ from `distance` by the difference of both engines. ``method="exact"`` makes both the same.
+        ``pull_back.distance`` is what is differentiated: of the formula its fixed point, which ``phi`` is near.
         """
         from heat_igl.sweep.simplex_engine import SimplexEngine
 
         chosen, domain = self._source_set(sources), self._domain
-        if isinstance(asked := self._asked(chosen), SimplexEngine):
+        # The formula interpolates tensors per face before it uses them: it has no derivatives by those given.
+        if isinstance(asked := self._asked(chosen), SimplexEngine) and not getattr(domain, "metric", None):
             return asked.distance(chosen), asked.derivative(chosen)
         from heat_igl.geodesic.derivatives import DistanceDerivative, differentiable_surface
         from heat_igl.operators import SideLengths
 
         engine = self._windows("derivatives are those of")
-        surface = differentiable_surface(
-            None if self._triangles is None else self._triangles.surface,
-            chosen,
-            None if isinstance(domain, Operators) else domain,
-        )
+        surface = differentiable_surface(cast(Triangles, self._triangles).surface, chosen, self._mesh)
         sides = domain.metric if isinstance(domain, Operators) else SideLengths(cast(Mesh, domain))
         distance = engine.distance(chosen, np.inf, n_threads())
         return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_faces)

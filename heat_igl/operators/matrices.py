@@ -169,7 +169,7 @@ class Operators:
         Tetrahedra, or triangles in metrics that do not fit together or vary within them, for the engines that pass
         through them; else None.
     metric : MetricSides or None
-        The lengths of triangles in a metric, to be differentiated; None without one, and for `simplices`.
+        The lengths of triangles in a metric per face, to be differentiated; None without one, and without a `surface`.
     drawn_on : Surface or None
         The triangles that points and curves refer to, where these are not `surface`: those of polygons.
     fans : PolygonFans or None

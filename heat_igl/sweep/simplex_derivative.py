@@ -279,7 +279,7 @@ class SimplexDerivative(ABC):
         ------
         ValueError
             If g has another shape or is not finite at a reachable vertex, or if the solver does not use the given
-            tensors directly: tensors per tetrahedron that sample a smooth field, tensors of triangles, and one tensor
+            tensors directly: tensors per tetrahedron that sample a smooth field, tensors per triangle, and one tensor
             for all tetrahedra. Give the metric at the vertices then.
         """
         rows = gradient_rows(g, self.distance)
@@ -302,7 +302,7 @@ class SimplexDerivative(ABC):
         if not self._simplices.is_given:
             raise ValueError(
                 "the solver does not use the given tensors directly, so only derivatives by offsets are known: "
-                "give metric_operators the metric at the vertices, (n, 3, 3), or on triangles take method='exact'"
+                "give metric_operators the metric at the vertices, (n, 3, 3)"
             )
 
     @abstractmethod
