@@ -117,9 +117,8 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
             return Plan("lines", None, "shortest paths through tetrahedra are straight lines that bend around edges")
         return Plan("hopf-lax", None, "the metric changes between simplices, and the Hopf-Lax formula converges there")
     if kind == "varying metric" and method == "auto" and tolerance > 0:
-        reason = "the metric varies within triangles: Hopf-Lax is nearer; windows answer from points and curves, and "
-        reason += "distance_vjp for a metric or speed per face, whose value may differ from distance by the difference "
-        reason += "of both engines: with method='exact' both are the same"
+        reason = "the metric varies within triangles, where the Hopf-Lax formula is nearer; windows answer from points "
+        reason += "and curves, and distance_vjp for a metric or speed per face"
         return Plan("hopf-lax", None, reason)
     if method == "sweep":
         return Plan("sweep", None, "a sweep was asked for")
