@@ -34,7 +34,7 @@ from heat_igl.reference import exact
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
 from heat_igl.validation import closed_forms
-from heat_igl.validation.zoo import hull
+from heat_igl.validation.construction import hull
 
 from harness import METHODS, Method, Row, Table, collected, drawn, errors, ours, parsed, publish, seconds
 from harness import subdivided as finer

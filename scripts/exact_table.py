@@ -39,7 +39,7 @@ from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.zoo import hull
+from heat_igl.validation.construction import hull
 from heat_igl.windows.exact import ExactSurface
 
 from harness import METHODS, Row, Table, collected, drawn, named, on_sphere, paired, parsed, publish, seconds

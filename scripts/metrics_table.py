@@ -64,7 +64,7 @@ from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine, LineEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.closed_forms import around_the_edge, by_fermat, straight
-from heat_igl.validation.zoo import carved, compact, tetrahedra
+from heat_igl.validation.construction import carved, compact, tetrahedra
 
 from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds, subdivided
 

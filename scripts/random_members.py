@@ -10,7 +10,7 @@ A table has a row for each kind, with the largest of each figure, and the seeds 
 `LARGEST` and than rounding explains: with smallest angle a in radians, a rounded length changes the shape of a triangle
 by 2^-52 / a^2 of itself. The exit status is 1 if there are any.
 
-exact: distance by windows on nearly flat surfaces (validation/zoo.py) and on coarse rough ones, from three
+exact: distance by windows on nearly flat surfaces (validation/random_shapes.py) and on coarse rough ones, from three
 vertices, on the intrinsic Delaunay triangulation and on the triangles as given. "edges": by how much distance grows
 faster than along an edge, inf where a vertex has none. "triangulations": the difference of both. "straight lines": on
 at most 60 vertices, the difference to `straight_lines`. All as shares of the largest distance.
@@ -69,8 +69,9 @@ from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.operators import operators
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
+from heat_igl.validation.construction import hull
 from heat_igl.validation.shapes import lattice_faces
-from heat_igl.validation.zoo import FAMILIES, hull
+from heat_igl.validation.zoo import FAMILIES
 from heat_igl.windows import ExactSurface, exact_distance
 from heat_igl.windows.tables import MARGIN, from_mesh
 

@@ -30,7 +30,7 @@ from heat_igl import (
 from heat_igl.geodesic import SolverChoice
 from heat_igl.geodesic.choice import Solver
 from heat_igl.validation.closed_forms import around_the_wall, by_fermat, straight
-from heat_igl.validation.zoo import tetrahedra
+from heat_igl.validation.construction import tetrahedra
 
 METHODS = ("exact", "sweep", "heat")
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()

@@ -13,7 +13,7 @@ from conftest import perturbed
 from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
 from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.validation.zoo import joined
+from heat_igl.validation.construction import joined
 
 
 def twice(mesh: Mesh, apart: float | np.ndarray = 5.0) -> Mesh:

@@ -20,7 +20,8 @@ from heat_igl.kernels.windows import windows
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import FloatArray
-from heat_igl.validation.zoo import FAMILIES, joined
+from heat_igl.validation.construction import joined
+from heat_igl.validation.zoo import FAMILIES
 from heat_igl.windows import Engine, GuardedEngine, Invariants, WindowEngine, directions
 
 SOURCE, FAR = 40, 399

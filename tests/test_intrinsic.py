@@ -38,7 +38,7 @@ from heat_igl.intrinsic import (
 )
 from heat_igl.operators import cotan_operators, intrinsic_operators, operators, tufted_operators
 from heat_igl.typing import FloatArray, IntArray
-from heat_igl.validation.zoo import joined
+from heat_igl.validation.construction import joined
 from heat_igl.windows import exact_distance
 from heat_igl.windows.guards import edge_paths
 

@@ -23,7 +23,7 @@ from heat_igl import (
     shapes,
 )
 from heat_igl.mesh import connectivity
-from heat_igl.validation.zoo import tetrahedra
+from heat_igl.validation.construction import tetrahedra
 
 TETRAHEDRON_V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 TETRAHEDRON_F = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

@@ -25,7 +25,7 @@ from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine
 from heat_igl.typing import FloatArray
 from heat_igl.validation.closed_forms import straight
-from heat_igl.validation.zoo import tetrahedra
+from heat_igl.validation.construction import tetrahedra
 
 
 def solver(mesh: Mesh, metric: FloatArray, method: str = "auto") -> GeodesicSolver:

@@ -13,7 +13,7 @@ from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 from heat_igl.validation.closed_forms import around_the_edge
-from heat_igl.validation.zoo import carved, tetrahedra
+from heat_igl.validation.construction import carved, tetrahedra
 
 
 def scattered(n: int, seed: int = 0) -> Mesh:
