@@ -16,15 +16,16 @@ import numpy as np
 from heat_igl.curves.places import CommonFaces, Waypoints, checked_places, corners
 from heat_igl.errors import MeshError, SourceError, names_guessed, shown, truth
 from heat_igl.intrinsic import HalfEdges, corner_angles, lengths_to_divide_by
-from heat_igl.kernels.paths import routes, shortening
+from heat_igl.kernels.paths import face_table, routes, shortening
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
 from heat_igl.mesh.connectivity import group_by_label
 from heat_igl.mesh.surface_points import require_faces, unchecked_curve
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-# The compiled module, whose signatures are those of Cython.
-_kernels: Any = shortening
+# Compiled modules, whose signatures are those of Cython.
+_face_table: Any = face_table
+_shortening: Any = shortening
 # Of each face the edge `length` opposite each corner, the `angle` at each, `vertex` and `edge` numbers. Corner c lies
 # `along` of the way from corner c + 2 to c + 1, and `above` this edge, in lengths of the edge.
 _FACE = np.dtype(
@@ -112,13 +113,13 @@ def shortener(mesh: Mesh) -> tuple[Any, Any]:
     face, edge = _faces(mesh), mesh.facets
     edges, _ = HalfEdges.of_mesh(mesh)
     first_corner, corner = (rows.astype(np.int32) for rows in group_by_label(mesh.F.ravel(), mesh.n_vertices))
-    table = _kernels.FaceTable(face, edges, first_corner, corner)
+    table = _face_table.FaceTable(face, edges, first_corner, corner)
     sums = np.bincount(mesh.F.ravel(), face["angle"].ravel(), mesh.n_vertices)
     # At a vertex with angles of 2 pi or more, and on the boundary, at most one side is locally shortest. On edges of
     # more than two faces there are more than two sides.
     sums[edge.vertices[edge.n_faces != 2]] = np.inf
     half_turn = np.cos(np.minimum(sums, 2 * np.pi) / 2)
-    return table, _kernels.Shortener(table, half_turn, int(np.diff(first_corner).max()))
+    return table, _shortening.Shortener(table, half_turn, int(np.diff(first_corner).max()))
 
 
 def _faces(mesh: Mesh) -> AnyArray:

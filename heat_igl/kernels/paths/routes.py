@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.paths.shortening import FaceTable
+from cython.cimports.heat_igl.kernels.paths.face_table import FaceTable
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.libc.math import INFINITY, sqrt
 
