@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import webbrowser
-from dataclasses import fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -37,6 +37,7 @@ from heat_igl.mesh import as_simplices
 from heat_igl.reference.guarded import TIMEOUT
 from heat_igl.sources import vertex_sources
 from heat_igl.validation import METHODS, ValidationRow, draw_sources
+from heat_igl.validation.report import plain
 
 _NARROW = "mean %", "max %", "precompute s", "solve ms", "memory MB"
 _DEFAULT_METHODS = "heat,sweep,exact,meshlab,igl"
@@ -46,9 +47,7 @@ def info(mesh: opt.MeshArgument, points: opt.PointsOption = False, json_file: op
     """Describe a mesh or the triangles of a point cloud: sizes, defects, and properties that affect distances."""
     loaded = read_mesh_or_cloud(mesh, points)
     report = loaded.report()
-    values = [getattr(report, field.name) for field in fields(report)]
-    plain = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
-    rows = [(*row, value) for row, value in zip(report.rows(), plain, strict=True)]
+    rows = [(*row, value) for row, value in zip(report.rows(), plain(asdict(report)).values(), strict=True)]
     try:
         plan = [plan_row(heat_igl.GeodesicSolver(loaded).plan)]
     except heat_igl.MeshError:  # the report above says what is wrong

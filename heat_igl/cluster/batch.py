@@ -205,7 +205,10 @@ class _Run:
                 most = self._n_threads() + _BUNDLES_AHEAD
                 while waiting and len(running) < most:
                     bundle = waiting.popleft()
-                    running[self._submit(bundle)] = bundle
+                    self._priority -= 1
+                    # Not pure: a task writes to the store, which the arguments do not show.
+                    future = self._client.submit(work, bundle, pure=False, priority=self._priority)
+                    running[future] = bundle
                 with contextlib.suppress(distributed.TimeoutError):
                     distributed.wait(list(running), timeout=1, return_when="FIRST_COMPLETED")
                 if self._client.status != "running":
@@ -221,11 +224,6 @@ class _Run:
 
     def _n_threads(self) -> int:
         return sum(self._client.nthreads().values())
-
-    def _submit(self, bundle: TaskBundle) -> Any:
-        self._priority -= 1
-        # Not pure: a task writes to the store, which the arguments do not show.
-        return self._client.submit(work, bundle, pure=False, priority=self._priority)
 
     def _collect(self, future: Any, bundle: TaskBundle) -> list[TaskBundle]:
         """Record the outcomes of a bundle; returns the bundles that it leaves.
@@ -247,22 +245,17 @@ class _Run:
         return [*left, others] if others else left
 
     def _record(self, task: Task, outcome: Outcome) -> list[Task]:
-        """Record the outcome of a task; returns the tasks that it leaves."""
+        """Record the outcome of a task, and that of its mesh with the last one; returns the tasks that it leaves."""
         name = task.item.name
         remaining = [replace(task, blocks=blocks) for blocks in outcome.remaining]
         self._tasks_left[name] = self._tasks_left.get(name, 1) - 1 + len(remaining)
         if outcome.reason is not None:
             self._reason.setdefault(name, outcome.reason)
         if not self._tasks_left[name]:
-            self._close(task)
+            reason = self._reason.get(name)
+            if reason is None:
+                self._store.group(name).finish()
+            else:
+                self._store.fail(name, task.item.label, reason)
+            self._watch.mesh_done(task.item.label, reason)
         return remaining
-
-    def _close(self, task: Task) -> None:
-        """Mark a mesh as done, or as failed if a task failed."""
-        name = task.item.name
-        reason = self._reason.get(name)
-        if reason is None:
-            self._store.group(name).finish()
-        else:
-            self._store.fail(name, task.item.label, reason)
-        self._watch.mesh_done(task.item.label, reason)

@@ -34,6 +34,7 @@ from heat_igl.runtime import release_free_memory
 from heat_igl.sampling import farthest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import IntArray
+from heat_igl.validation.report import plain
 
 # A task solves about this many values, and at least this many rows: factoring takes as long as 50 to 100 rows, so that
 # spreading a mesh over workers pays from a few hundred rows each.
@@ -64,10 +65,7 @@ def memory_for_solvers() -> int:
     """Bytes that the solvers of this worker may take together: the memory limit, less `PROCESS_MEMORY`."""
     from distributed import get_worker
 
-    try:
-        limit = get_worker().memory_manager.memory_limit
-    except ValueError:  # not on a worker
-        limit = None
+    limit = get_worker().memory_manager.memory_limit
     physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 8 * 2**30
     # A tenth is left for errors of the estimate.
     return int(0.9 * (limit or physical)) - PROCESS_MEMORY
@@ -112,15 +110,16 @@ class SolverCache:
                 entry.n_users -= 1
                 self._changed.notify_all()
 
-    def drop_idle(self) -> None:
-        """Free the solvers that no thread uses."""
+    def drop_idle(self, but: str = "") -> None:
+        """Free the solvers that no thread uses, other than that of a key."""
         with self._changed:
-            self._drop_idle()
+            for key in [key for key, entry in self._entries.items() if not entry.n_users and key != but]:
+                del self._entries[key]
 
     def clear(self) -> None:
         """Free the solvers that no thread uses, and give their memory back to the system."""
         with self._changed:
-            self._drop_idle()
+            self.drop_idle()
             self._highest = 0
             release_free_memory()
 
@@ -133,10 +132,10 @@ class SolverCache:
             )
         with self._changed:
             if key not in self._entries:
-                self._drop_idle()
+                self.drop_idle()
             while key not in self._entries and self._reserved() + needed > limit:
                 self._changed.wait()
-                self._drop_idle(but=key)
+                self.drop_idle(but=key)
             entry = self._entries.setdefault(key, CacheEntry(needed))
             entry.n_users += 1
             if self._reserved() > self._highest:
@@ -148,10 +147,6 @@ class SolverCache:
 
     def _reserved(self) -> int:
         return sum(entry.bytes for entry in self._entries.values())
-
-    def _drop_idle(self, but: str = "") -> None:
-        for key in [key for key, entry in self._entries.items() if not entry.n_users and key != but]:
-            del self._entries[key]
 
 
 _SOLVERS = SolverCache()
@@ -283,8 +278,7 @@ def _new(
 ) -> tuple[MeshGroup, list[IntArray]]:
     """A new group for a mesh, with the sources."""
     source_sets = _source_sets(task.plan, mesh, solver)
-    report = {key: _json_value(value) for key, value in asdict(mesh.report()).items()}
-    attributes = {"mesh": task.item.label, **identity, "versions": _versions(), "report": report}
+    attributes = {"mesh": task.item.label, **identity, "versions": _versions(), "report": plain(asdict(mesh.report()))}
     return store.begin(task.item.name, source_sets, mesh.n_vertices, task.dtype, attributes), source_sets
 
 
@@ -325,13 +319,6 @@ def _source_sets(plan: SourcePlan, mesh: Mesh | PointCloud, solver: Solver) -> l
     if plan.farthest is None:
         return list(np.arange(n).reshape(-1, 1))
     return list(farthest_points(solver, min(plan.farthest, n)).reshape(-1, 1))
-
-
-def _json_value(value: Any) -> Any:
-    """A value that JSON can carry: Python's numbers and lists for numpy's, the word for an infinity."""
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    return value if not isinstance(value, float) or np.isfinite(value) else str(value)
 
 
 def _spans(group: MeshGroup) -> list[tuple[int, ...]]:
@@ -376,7 +363,4 @@ def _send(kind: str, task: Task, **facts: Any) -> None:
     """Report an event to the client, if one listens."""
     from distributed import get_worker
 
-    try:
-        get_worker().log_event(TOPIC, {"kind": kind, "mesh": task.item.name, **facts})
-    except ValueError:  # not on a worker
-        return
+    get_worker().log_event(TOPIC, {"kind": kind, "mesh": task.item.name, **facts})

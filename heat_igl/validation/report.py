@@ -249,7 +249,7 @@ def plain(value: Any) -> Any:
         return str(float(value))
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
-    return value.item() if hasattr(value, "item") else str(value)
+    return plain(value.tolist()) if hasattr(value, "tolist") else str(value)
 
 
 def error_figure(title: str, mesh: Mesh, truth: FloatArray, distances: Mapping[str, FloatArray]) -> Figure:
