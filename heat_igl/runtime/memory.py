@@ -15,40 +15,21 @@ from typing import Any
 _SAMPLE_SECONDS = 0.005
 
 
-def _status(field: str) -> int | None:
-    """A field of ``/proc/self/status`` (Linux) in bytes; None on other systems."""
+def memory_field(file: str, field: str) -> int | None:
+    """A field of a file below ``/proc`` (Linux) in bytes; None on other systems."""
     try:
-        text = Path("/proc/self/status").read_text()
+        text = Path("/proc", file).read_text()
     except OSError:
         return None
     found = re.search(rf"^{field}:\s+(\d+) kB$", text, re.MULTILINE)
     return None if found is None else int(found[1]) * 1024
 
 
-def _psutil_process() -> Any:
-    try:
-        return importlib.import_module("psutil").Process()
-    except ImportError:
-        return None
-
-
-def resident_memory() -> int | None:
-    """Physical memory of this process in bytes; None if it cannot be determined."""
-    known = _status("VmRSS")
-    if known is None and (process := _psutil_process()) is not None:
-        known = int(process.memory_info().rss)
-    return known
-
-
 def available_memory() -> float:
     """Bytes that can be allocated without swapping, as far as the system tells; infinite if it does not."""
-    try:
-        with open("/proc/meminfo") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return 1024.0 * int(line.split()[1])
-    except OSError:
-        pass
+    known = memory_field("meminfo", "MemAvailable")
+    if known is not None:
+        return float(known)
     try:
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
@@ -71,10 +52,15 @@ class PeakMemory:
 
     def __enter__(self) -> PeakMemory:
         release_free_memory()
-        self._start = self._highest = resident_memory() or 0
-        if not _reset_high_water() and (process := _psutil_process()) is not None:
-            self._sampler = threading.Thread(target=self._sample, args=(process,), daemon=True)
-            self._sampler.start()
+        self._start = memory_field("self/status", "VmRSS") or 0
+        try:
+            Path("/proc/self/clear_refs").write_text("5")  # resets VmHWM
+        except OSError:
+            with contextlib.suppress(ImportError):
+                process = importlib.import_module("psutil").Process()
+                self._start = self._highest = int(process.memory_info().rss)
+                self._sampler = threading.Thread(target=self._sample, args=(process,), daemon=True)
+                self._sampler.start()
         return self
 
     def __exit__(
@@ -84,7 +70,7 @@ class PeakMemory:
             self._done.set()
             self._sampler.join()
             self.bytes = self._highest - self._start
-        elif (highest := _status("VmHWM")) is not None:
+        elif (highest := memory_field("self/status", "VmHWM")) is not None:
             self.bytes = max(0, highest - self._start)
 
     def _sample(self, process: Any) -> None:
@@ -96,11 +82,3 @@ def release_free_memory() -> None:
     """Return freed memory to the system (glibc only). Reuse of such memory would not count as growth."""
     with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
-
-
-def _reset_high_water() -> bool:
-    try:
-        Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        return False
-    return True
