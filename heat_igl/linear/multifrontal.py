@@ -220,11 +220,10 @@ class MultifrontalAnalysis:
     backend = "multifrontal"
 
     def __init__(self, pattern: sp.csc_matrix) -> None:
-        self._ends = pattern.indptr.astype(np.int32, copy=False)
-        self._neighbours = pattern.indices.astype(np.int32, copy=False)
+        self.pattern = pattern.indptr.astype(np.int32, copy=False), pattern.indices.astype(np.int32, copy=False)
         with Pool(n_threads()) as workers:
-            tree = dissect(self._ends, self._neighbours, workers)
-        self.fronts = fronts(self._ends, self._neighbours, tree)
+            tree = dissect(*self.pattern, workers)
+        self.fronts = fronts(*self.pattern, tree)
         # As numpy takes indices: it converts others at each use, which takes three times as long as what they are for.
         self.order: IntArray | None = self.fronts.order.astype(np.intp)
         self.place = self.fronts.place.astype(np.intp)
@@ -237,26 +236,13 @@ class MultifrontalAnalysis:
 
     def fits(self, A: sp.csc_matrix) -> bool:
         """Whether A has the pattern that was analysed."""
-        own = self._ends, self._neighbours
-        return all(a is b or np.array_equal(a, b) for a, b in zip(own, (A.indptr, A.indices), strict=True))
+        return all(a is b or np.array_equal(a, b) for a, b in zip(self.pattern, (A.indptr, A.indices), strict=True))
 
     def factorize(self, A: sp.csc_matrix, free: BoolArray | None = None) -> MultifrontalFactorization:
         """Factor `A`, or the principal submatrix on the vertices that are `free`."""
         if not self.fits(A):
             raise ValueError("A has another pattern than the matrix that was analysed: analyse A")
         return MultifrontalFactorization(self, A, free)
-
-    def eliminate(self, A: sp.csc_matrix, free: BoolArray | None, entries: FloatArray) -> None:
-        """Write the factor of `A` to `entries`; rows that are not free are those of the identity.
-
-        A FactorizationError if A is not positive definite.
-        """
-        data = A.data.astype(np.float64, copy=False)
-        is_free = np.ones(A.shape[0], np.uint8) if free is None else free.astype(np.uint8)
-        failed = _elimination.factor(self._ends, self._neighbours, data, is_free, self.fronts, entries, _SINGULAR)
-        if failed >= 0:
-            raise_caught()
-            raise FactorizationError(f"the matrix ({A.shape[0]} rows) is singular or not positive definite")
 
 
 class MultifrontalFactorization:
@@ -277,7 +263,13 @@ class MultifrontalFactorization:
         self.nonzeros = int(fronts.end_entry[-1])
         self._held = fronts.place[:0] if free is None else fronts.place[~free]
         entries = np.empty(self.nonzeros)
-        analysis.eliminate(A, free, entries)
+        # Rows that are not free become those of the identity.
+        is_free = np.ones(A.shape[0], np.uint8) if free is None else free.astype(np.uint8)
+        data = A.data.astype(np.float64, copy=False)
+        failed = _elimination.factor(*analysis.pattern, data, is_free, fronts, entries, _SINGULAR)
+        if failed >= 0:
+            raise_caught()
+            raise FactorizationError(f"the matrix ({A.shape[0]} rows) is singular or not positive definite")
         self._kernel, self._above = _solves.TriangularSolves(fronts, entries), np.flatnonzero(fronts.above >= 0)
         self.n_bytes = entries.nbytes + fronts.rows.nbytes + fronts.first_row.nbytes + fronts.first_entry.nbytes
         check_probe(self, A, free)

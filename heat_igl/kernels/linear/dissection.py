@@ -159,7 +159,14 @@ def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
     if size > LEAF:
         reached: cython.Py_ssize_t = _line_up(d, low, high)
         if reached < size:
-            _split_off(d, low, reached)
+            # The component in the queue moves to the front, as a piece of its own.
+            for i in range(reached):
+                v: cython.int = d.queue[i]
+                w: cython.int = d.order[low + i]
+                p: cython.int = d.position[v]
+                d.order[low + i], d.order[p] = v, w
+                d.position[v], d.position[w] = low + i, p
+                d.piece[v] = d.n_pieces
             _push(d, low, low + reached, above, d.n_pieces)
             _push(d, low + reached, high, above, piece.number)
             d.n_pieces += 1
@@ -175,7 +182,7 @@ def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
     second: cython.Py_ssize_t = _arrange(d, first, low, high, 1)
     _arrange(d, second, low, high, SEPARATOR)
     for i in range(low, high):
-        v: cython.Py_ssize_t = d.queue[i - low]
+        v = d.queue[i - low]
         d.order[i] = v
         d.position[v] = i
         d.piece[v] = d.n_pieces if i < first else d.n_pieces + 1 if i < second else -1
@@ -238,19 +245,6 @@ def _breadth_first(d: Dissecting, root: cython.int, distance: cython.int[::1]) -
             distance[w] = further if new else old
             tail += new
     return tail
-
-
-@cython.cfunc
-@cython.nogil
-def _split_off(d: Dissecting, low: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.void:
-    """Move the first vertices of the queue to the front of a piece and make them one of their own."""
-    for i in range(count):
-        v: cython.int = d.queue[i]
-        w: cython.int = d.order[low + i]
-        p: cython.int = d.position[v]
-        d.order[low + i], d.order[p] = v, w
-        d.position[v], d.position[w] = low + i, p
-        d.piece[v] = d.n_pieces
 
 
 @cython.cfunc

@@ -112,7 +112,15 @@ def _front(e: Elimination, b: cython.Py_ssize_t) -> cython.Py_ssize_t:
         panel[i] = 0.0
     for i in range(left * left):
         update[i] = 0.0
-    _add_matrix(e, start, columns, size, panel)
+    for j in range(columns):
+        v: cython.Py_ssize_t = e.order[start + j]
+        if not e.free[v]:
+            panel[in_panel(j, j, size)] = 1.0
+            continue
+        for p in range(e.ends[v], e.ends[v + 1]):
+            w: cython.Py_ssize_t = e.neighbours[p]
+            if e.place[w] >= start + j and e.free[w]:
+                panel[in_panel(j, e.local[e.place[w]], size)] += e.data[p]
     for j in range(columns):
         e.diagonal[j] = panel[in_panel(j, j, size)]
     below: cython.Py_ssize_t = e.top
@@ -135,24 +143,6 @@ def _front(e: Elimination, b: cython.Py_ssize_t) -> cython.Py_ssize_t:
         e.waiting[e.n_waiting] = b
         e.n_waiting += 1
     return -1
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _add_matrix(
-    e: Elimination, start: cython.Py_ssize_t, columns: cython.Py_ssize_t, size: cython.Py_ssize_t, panel: numbers
-) -> cython.void:
-    """Add the matrix's own entries in the columns of a front."""
-    for j in range(columns):
-        v: cython.Py_ssize_t = e.order[start + j]
-        if not e.free[v]:
-            panel[in_panel(j, j, size)] = 1.0
-            continue
-        for p in range(e.ends[v], e.ends[v + 1]):
-            w: cython.Py_ssize_t = e.neighbours[p]
-            if e.place[w] >= start + j and e.free[w]:
-                panel[in_panel(j, e.local[e.place[w]], size)] += e.data[p]
 
 
 @cython.cfunc
