@@ -24,6 +24,9 @@ OVERSAMPLING = 2
 LINE = 2.2  # width of an isoline in pixels
 SOURCE = "#e8000b"
 DPI = 400  # resolution of raster output: 1260 pixels for 8 cm
+_WIDTH = 3.15  # inches, one column of a journal
+_FONT = 7.0  # points
+_CURVE = "#ff4fd8"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +70,6 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         return self._rendered("png", dpi=DPI / 2)
-
-
-_WIDTH = 3.15  # inches, one column of a journal
-
-_FONT = 7.0  # points
-
-_CURVE = "#ff4fd8"
 
 
 def lay_out(seen: Scene, lines: list[FloatArray], style: Style, table: Any, label: str, without_value: str) -> Picture:

@@ -172,7 +172,8 @@ def page(
     return Page(
         Template((folder / "page.html").read_text(encoding="utf8")).substitute(
             title=html.escape(title),
-            meta=_in_script(meta),
+            # Without the character "<", which could end the surrounding script element.
+            meta=json.dumps(meta, allow_nan=False).replace("<", "\\u003c"),
             data=base64.b64encode(_packed(list(arrays.values()))).decode(),
             # One script in the end: view.js, the last by name, uses what the others define.
             scripts="\n".join((folder / name).read_text(encoding="utf8") for name in names),
@@ -210,11 +211,6 @@ def _bytes(table: AnyArray) -> list[list[int]]:
     """Colours (k, 4) between 0 and 1 as red, green and blue up to 255."""
     colours_as_bytes: list[list[int]] = np.rint(255 * table[:, :3]).astype(int).tolist()
     return colours_as_bytes
-
-
-def _in_script(value: object) -> str:
-    """`value` as JSON without the character "<", which could end the surrounding script element."""
-    return json.dumps(value, allow_nan=False).replace("<", "\\u003c")
 
 
 def _packed(arrays: list[AnyArray]) -> bytes:

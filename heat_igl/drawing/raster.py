@@ -155,8 +155,6 @@ def visible_runs(points: FloatArray, depth: FloatArray, tolerance: float) -> lis
     A point is hidden if it is behind the depth buffer by more than `tolerance` pixels. Of each piece: whether it is
     visible, and the vertices (j, 3). The ends of pieces are accurate to about two pixels.
     """
-    if len(points) < 2:
-        return []
     length = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
     pieces = np.maximum(np.ceil(length / 2.0), 1).astype(np.int64)
     place = np.concatenate([np.repeat(np.arange(len(pieces)), pieces), [len(pieces) - 1]])

@@ -8,7 +8,7 @@ class Renderer {
     this.surfaceProgram = this.program(SURFACE_VERTEX, inked(SURFACE_FRAGMENT));
     this.discProgram = this.program(DISC_VERTEX, inked(DISC_FRAGMENT));
     this.dotProgram = this.program(DOT_VERTEX, DOT_FRAGMENT);
-    this.needleProgram = this.program(ARROW_VERTEX, ARROW_FRAGMENT);
+    this.needleProgram = this.program(DOT_VERTEX, ARROW_FRAGMENT);
     this.shared = {
       position: [this.buffer(V), 3], normal: [this.buffer(vertexNormals(V, F)), 3], radius: [this.buffer(discRadii(V, F)), 1],
     };

@@ -75,23 +75,17 @@ const DISC_FRAGMENT = `#version 300 es
     colour = vec4(lit(inkOf(here, vec4(0.0), 0.0), facing), 1.0);
     gl_FragDepth = gl_FragCoord.z - depth * height;
   }`;
-const ARROW_VERTEX = `#version 300 es
-  uniform mat3 turn; uniform vec2 zoom, pan;
-  in vec3 position;
-  void main() {
-    vec3 place = turn * position;
-    gl_Position = vec4((place.xy + pan) * zoom, -0.5 * place.z - 0.008, 1.0);
-  }`;
 const ARROW_FRAGMENT = `#version 300 es
   precision highp float;
   out vec4 colour;
   void main() { colour = vec4(0.12, 0.12, 0.12, 1.0); }`;
+// Dots and needles, a little in front of the surface.
 const DOT_VERTEX = `#version 300 es
   uniform mat3 turn; uniform vec2 zoom, pan; uniform float size;
   in vec3 position;
   void main() {
     vec3 place = turn * position;
-    gl_Position = vec4((place.xy + pan) * zoom, -0.5 * place.z - 0.006, 1.0);
+    gl_Position = vec4((place.xy + pan) * zoom, -0.5 * place.z - 0.008, 1.0);
     gl_PointSize = size;
   }`;
 const DOT_FRAGMENT = `#version 300 es
