@@ -93,10 +93,12 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     triangles = as_simplices(mesh)
     faces, barycentric = checked_places("points", triangles, points)
     weight = _checked_weights(weights, len(faces))
-    power = _checked_power(p)
+    if not is_number(p) or not 1 <= p <= _LARGEST_POWER:
+        raise ValueError(
+            f"p must be a number from 1 to {_LARGEST_POWER}, not {shown(p)}: 2 for the mean, 1 for the median"
+        )
     used = weight > 0
-    search = _Mean(triangles, Tracer(mesh), faces[used], barycentric[used], weight[used], power)
-    return search.found()
+    return _Mean(triangles, Tracer(mesh), faces[used], barycentric[used], weight[used], float(p)).found()
 
 
 class _State(NamedTuple):
@@ -254,8 +256,6 @@ class _Mean:
         sums = np.einsum("kc,kc->k", (self._weight @ fields)[corners], self._barycentric)
         best = int(np.argmin(sums))
         at = self._state(int(self._faces[best]), self._barycentric[best])
-        if not np.isfinite(sums[best]):
-            return None
         # Points in the same place weigh together.
         here = at.distances <= 10 * _INSIDE * self._mesh.edge_lengths.mean()
         pull = self._weight[~here] @ (at.vectors[~here] / at.distances[~here, None])
@@ -283,11 +283,3 @@ def _checked_weights(weights: ArrayLike | None, k: int) -> FloatArray:
     if not array.any():
         raise ValueError("weights are all 0: one point at least needs a positive weight")
     return array
-
-
-def _checked_power(p: float) -> float:
-    if not is_number(p) or not 1 <= p <= _LARGEST_POWER:
-        raise ValueError(
-            f"p must be a number from 1 to {_LARGEST_POWER}, not {shown(p)}: 2 for the mean, 1 for the median"
-        )
-    return float(p)

@@ -79,7 +79,8 @@ class Text:
 
     def tokens(self, line: int) -> list[bytes]:
         """The tokens of a line."""
-        return self._data[self._start[self.first[line]] : self._line_end(line)].split()
+        last = self.first[line] + self.count[line] - 1
+        return self._data[self._start[self.first[line]] : self._end[last]].split()
 
     def where(self, line: int) -> str:
         """Path, line number (counted from 1) and text of a line, for errors."""
@@ -147,13 +148,6 @@ class Text:
         self.refuse(lines, short, f"a vertex needs three coordinates ({int(short.sum())} lines have fewer)")
         values, start = self.numbers(lines, skip)
         return np.asarray(values[start[:, None] + np.arange(3)])
-
-    def all_numbers(self) -> FloatArray:
-        """The numbers of all lines, for formats in which line breaks have no meaning."""
-        return self.numbers(np.arange(len(self)))[0]
-
-    def _line_end(self, line: int) -> int:
-        return int(self._end[self.first[line] + self.count[line] - 1])
 
     def _not_a_number(self, lines: IntArray, skip: int, up_to_slash: bool) -> MeshError:
         for line in lines.tolist():

@@ -227,7 +227,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, /, **attributes: Ar
     >>> heat_igl.read_attributes("strip.ply")["distance"][:4].round(6).tolist()
     [0.0, 1.0, 2.0, 3.0]
     """
-    path = _checked(path)
+    path = checked_path(path, MESH_SUFFIXES, _PACKED)
     form = _FORMATS[form_suffix(path)]
     mesh = as_simplices(mesh)
     if mesh.is_tetrahedral and not form.tetrahedra:
@@ -287,10 +287,6 @@ def _those_with(capability: str) -> str:
     return ", ".join(names[:-1]) + " and " + names[-1]
 
 
-def _checked(path: str | os.PathLike[str]) -> Path:
-    return checked_path(path, MESH_SUFFIXES, _PACKED)
-
-
 def checked_path(path: str | os.PathLike[str], suffixes: Collection[str], packed: Collection[str] = ()) -> Path:
     """`path` as a Path; a MeshError if it cannot be one, or has none of the suffixes, or of those `packed` and .gz."""
     try:
@@ -318,7 +314,7 @@ def checked_path(path: str | os.PathLike[str], suffixes: Collection[str], packed
 
 
 def _load(path: str | os.PathLike[str]) -> tuple[Path, Contents]:
-    path = _checked(path)
+    path = checked_path(path, MESH_SUFFIXES, _PACKED)
     return path, _FORMATS[form_suffix(path)].read(path, file_bytes(path))
 
 
@@ -493,7 +489,7 @@ def _from_xyz(path: Path, data: bytes) -> _Points:
         "a point has 3 numbers, or 6 with a normal, or 2 in the plane, and all points as many "
         f"({int(wrong.sum())} lines differ); PointCloud(numpy.loadtxt(path)[:, :3]) takes the first three of more",
     )
-    values = text.all_numbers().reshape(-1, width)
+    values = text.numbers(np.arange(len(text)))[0].reshape(-1, width)
     return values[:, :3], _normals_or_colours(values[:, 3:])
 
 
