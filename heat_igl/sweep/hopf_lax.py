@@ -81,21 +81,17 @@ class HopfLaxEngine(SimplexEngine):
         ratio = np.sqrt(stretch.max(axis=1) / stretch.min(axis=1))
         return float(np.quantile(ratio.reshape(-1, size).max(axis=1), 0.9))
 
-    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:  # noqa: ARG002
-        """Lower distance to that of second order."""
-        self._found(offset, distance, label)
-
-    def _found(self, offset: FloatArray, distance: FloatArray, label: AnyArray) -> tuple[AnyArray, ...]:
+    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:  # noqa: ARG002
+        """Lower distance to that of second order; returns the rest of what `HopfLax.settle` finds."""
         self._along_edges(distance, label)
         kernel: Any = HopfLax
         scheme = kernel(self._corners, self._first, self._incident, *self._in_metric)
-        found: tuple[AnyArray, ...] = scheme.settle(distance, label, offset)
-        return found
+        return scheme.settle(distance, label, offset)
 
     def derivative(self, sources: SourceSet) -> FixedPointDerivative:
         """The distance from source vertices with its derivative."""
         distance, label = self._begun(sources)
-        found = self._found(sources.vertex_offset, distance, label)
+        found = self._lower(sources.vertices, sources.vertex_offset, distance, label)
         answer = distance.copy()
         self._keep_bounds(sources, answer, label.copy())
         return FixedPointDerivative(self._simplices, sources, answer, distance, label, *found)

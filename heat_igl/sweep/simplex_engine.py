@@ -34,7 +34,7 @@ class SimplexEngine(Engine):
         self._first, self._incident = incidence.corners_by_vertex(self._corners, simplices.n)
 
     @abstractmethod
-    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
+    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> object:
         """Lower distance (n,), which begins with the offsets of the vertices and ``inf``; label (n,) counts these."""
 
     @abstractmethod

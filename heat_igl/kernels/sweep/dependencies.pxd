@@ -5,7 +5,7 @@ cdef class Dependencies:
     cdef double[:, ::1] place
     cdef double[::1] step, weight, pending
     # Depth-first search has not seen a vertex, has it open, or is done with it; sums of steps over the open ones.
-    cdef int[::1] order, roots, stack
+    cdef int[::1] order, stack
     cdef unsigned char[::1] state
     cdef double[::1] sum
 

@@ -10,10 +10,10 @@ from cython.cimports.libc.math import INFINITY
 class Dependencies:
     """A vertex depends on the corners of its facet that have a share of its place; arrays are those of `HopfLax`."""
 
-    def __init__(self, corners, order, facet, place, step, weight, pending):
-        self.corners, self.order, self.facet, self.place, self.step = corners, order, facet, place, step
-        self.weight, self.pending, n = weight, pending, len(order)
-        self.roots, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
+    def __init__(self, corners, facet, place, step, weight, pending):
+        self.corners, self.facet, self.place, self.step = corners, facet, place, step
+        self.weight, self.pending, n = weight, pending, len(facet)
+        self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
         self.sum = np.zeros(n)
 
     def arrange(self) -> cython.void:
@@ -26,11 +26,10 @@ class Dependencies:
         size: cython.int = self.corners.shape[1]
         n_done: cython.int = 0
         so_far: cython.double = 0.0
-        self.roots[:] = self.order
         self.state[:] = 0
-        for at in range(self.order.shape[0]):
+        for root in range(self.order.shape[0]):
             n_open: cython.int = 1
-            self.stack[0] = self.roots[at]
+            self.stack[0] = root
             while n_open > 0:
                 v = self.stack[n_open - 1]
                 if self.state[v] == 0 and self.facet[v] >= 0:

@@ -20,8 +20,7 @@ class Facet:
     Of its corners, `D` are the distances less `start`, and `sag[i][j]` is by how much the square of T sags below that
     of the linear function between two of them. In one metric (q = 1), `product` has the scalar products of the vectors
     from v to the corners; else `W` has the velocity at v and the corners (q = p + 1). The best place has the shares
-    `share`.
-    For p = 2 the third of each is 0.
+    `share`. For p = 2 the third of each is 0.
     """
 
     def dual(self, k: cython.int, e: cython.pointer[cython.const[cython.double]]) -> cython.double:
@@ -174,7 +173,7 @@ class Facet:
     def newton(self, limit: cython.double) -> cython.double:
         """The least value over the facet, by Newton's method from `share`, which is changed; inf if not below `limit`.
 
-        Values are convex, so that none is below the tangent plane of the first.
+        Values are convex, so that none is below a tangent plane.
         """
         x: cython.double[3]
         y: cython.double[3]
@@ -186,15 +185,15 @@ class Facet:
             for i in range(self.p):
                 x[i] = self.share[i] = 1.0 / self.p
             best = self.value(x)
-        low: cython.double = INFINITY
-        at: cython.double = 0.0
-        for i in range(self.p):
-            low = min(low, self.g[i])
-            at += self.g[i] * x[i]
-        if best + low - at >= limit:
-            return INFINITY
         is_last: cython.bint = False
         for _step in range(MOST_STEPS):
+            low: cython.double = INFINITY
+            at: cython.double = 0.0
+            for i in range(self.p):
+                low = min(low, self.g[i])
+                at += self.g[i] * x[i]
+            if best + low - at >= limit:
+                return INFINITY
             if best == INFINITY or is_last:
                 return best
             self.curve()

@@ -1,10 +1,11 @@
+from heat_igl.kernels.priority_queue cimport PriorityQueue
 from heat_igl.kernels.sweep.dependencies cimport Dependencies
 from heat_igl.kernels.sweep.simplex_updates cimport SimplexUpdate
 
 cdef extern from *:
     """
     // By which share of a distance the changes along a path that are not handed on may add up, about.
-    #define SETTLED 1e-3
+    #define SETTLED 5e-4
     // What a vertex may rise, as a share of its distance, though those it depends on do not: then its second order halves.
     #define RISEN 0.1
     """
@@ -14,12 +15,16 @@ cdef extern from *:
 cdef class HopfLax:
     cdef SimplexUpdate update
     cdef Dependencies dependencies
+    cdef PriorityQueue waiting
+    # Visits from near to far that are left.
+    cdef Py_ssize_t left
     cdef const int[:, ::1] corners
     cdef const int[::1] first, incident
     cdef const unsigned char[::1] fixed
     cdef double[::1] d, pending
-    cdef int[::1] label, order, n_visits
-    cdef double low, settled
+    cdef int[::1] label, n_visits
+    # Distance at the nearest source, the change that is not handed on, and that of the slope of the last vertex.
+    cdef double low, settled, turn[3]
     # The corner whose facet gave each vertex its distance, the place there, and what it adds to T linear.
     cdef int[::1] facet
     cdef double[:, ::1] place
@@ -28,5 +33,6 @@ cdef class HopfLax:
     cdef double[::1] risen, weight
 
     cdef void sharpen(self) noexcept nogil
-    cdef void hand_on(self, int v, double old, double change, double* turn) noexcept nogil
+    cdef void renew(self, int v) noexcept nogil
+    cdef void hand_on(self, int v, double old, double change) noexcept nogil
     cdef void visit(self, int v) noexcept nogil

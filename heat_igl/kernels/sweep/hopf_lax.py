@@ -15,7 +15,8 @@ Distances begin with those along edges, and are updated in rounds, each vertex a
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.signals import is_interrupted
+from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
+from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.dependencies import Dependencies
 from cython.cimports.heat_igl.kernels.sweep.hopf_lax import RISEN, SETTLED
 from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, SimplexUpdate
@@ -67,16 +68,16 @@ class HopfLax:
         n, update = len(d), self.update
         facet, place, weight = np.full(n, -1, np.int32), np.zeros((n, update.p)), np.ones(n)
         slope, is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
-        step, pending = np.zeros(n), np.where(np.isfinite(d), np.inf, 0.0)
-        order = np.argsort(d, kind="stable").astype(np.int32)
-        self.d, self.label, self.low, self.order, self.pending = d, label, np.min(d), order, pending
+        # Nearer than a source to itself is another one.
+        fixed = d == np.append(offset, np.inf)[label]
+        step, pending = np.zeros(n), np.where(np.isfinite(d) & ~fixed, np.inf, 0.0)
+        self.d, self.label, self.low, self.pending = d, label, np.min(d), pending
         self.facet, self.place, self.step, self.weight = facet, place, step, weight
         self.risen, self.n_visits = np.zeros(n), np.zeros(n, np.int32)
-        # Nearer than a source to itself is another one.
-        self.fixed = (d == np.append(offset, np.inf)[label]).view(np.uint8)
+        self.fixed, self.waiting = fixed.view(np.uint8), PriorityQueue(n)
         update.d, update.label, update.low, update.offset = d, label, self.low, offset
         update.slope, update.is_sloped, update.weight = slope, is_sloped, weight
-        self.dependencies = Dependencies(self.corners, order, facet, place, step, weight, pending)
+        self.dependencies = Dependencies(self.corners, facet, place, step, weight, pending)
         # Changes add up along a path.
         self.settled = SETTLED * n ** (-1.0 / update.p)
         with cython.nogil:
@@ -85,35 +86,51 @@ class HopfLax:
         return facet, place, slope, is_sloped, weight
 
     def sharpen(self) -> cython.void:
-        """Second order, in rounds: each vertex after those it has its distance from, which may be farther away."""
+        """Second order, from near to far, then in rounds: each vertex after those it has its distance from.
+
+        From near to far, changes are handed on before others depend on them. Where metrics are long in one direction,
+        distances depend on larger ones: after two visits per vertex that order is given up.
+        """
         v: cython.int
-        turn: cython.double[3]
         is_settled: cython.bint = False
+        for v in range(self.d.shape[0]):
+            if self.pending[v] > 0.0:
+                self.waiting.set_key(v, 1.0 / (self.d[v] - self.low))
+        self.left = 2 * self.d.shape[0]
+        while self.waiting.count > 0 and self.left > 0:
+            if self.left % ASK == 0 and is_interrupted():
+                return
+            self.left -= 1
+            v = cython.cast(cython.int, self.waiting.first())
+            self.waiting.set_key(v, 0.0)
+            self.renew(v)
+        self.left = 0
         while not is_settled and not is_interrupted():
             is_settled = True
             self.dependencies.arrange()
-            for at in range(self.order.shape[0]):
-                v = self.order[at]
+            for at in range(self.d.shape[0]):
+                v = self.dependencies.order[at]
                 # Where the metric turns far within a simplex, distances may go in circles: more so each time.
-                if not self.pending[v] > self.settled * self.n_visits[v] or self.fixed[v]:
-                    continue
-                is_settled = False
-                self.pending[v] = 0.0
-                self.n_visits[v] += 1
-                old: cython.double = self.d[v]
-                change: cython.double = 0.0 if self.update.is_sloped[v] else INFINITY
-                for k in range(3):
-                    turn[k] = self.update.slope[v, k]
-                self.visit(v)
-                span: cython.double = max(fabs(old - self.low), fabs(self.d[v] - self.low))
-                change = max(change, fabs(self.d[v] - old) / span)
-                for k in range(3):
-                    turn[k] = (self.update.slope[v, k] - turn[k]) / (8.0 * span)
-                self.hand_on(v, old, change, turn)
+                if self.pending[v] > self.settled * self.n_visits[v]:
+                    is_settled = False
+                    self.n_visits[v] += 1
+                    self.renew(v)
 
-    def hand_on(
-        self, v: cython.int, old: cython.double, change: cython.double, turn: cython.pointer[cython.double]
-    ) -> cython.void:
+    def renew(self, v: cython.int) -> cython.void:
+        """Visit v, and hand on what has changed."""
+        self.pending[v] = 0.0
+        old: cython.double = self.d[v]
+        change: cython.double = 0.0 if self.update.is_sloped[v] else INFINITY
+        for k in range(3):
+            self.turn[k] = self.update.slope[v, k]
+        self.visit(v)
+        span: cython.double = max(fabs(old - self.low), fabs(self.d[v] - self.low))
+        change = max(change, fabs(self.d[v] - old) / span)
+        for k in range(3):
+            self.turn[k] = (self.update.slope[v, k] - self.turn[k]) / (8.0 * span)
+        self.hand_on(v, old, change)
+
+    def hand_on(self, v: cython.int, old: cython.double, change: cython.double) -> cython.void:
         """Ask for visits to the vertices around v, whose value was `old`, by how much it and the slope changed."""
         size: cython.int = self.corners.shape[1]
         for k in range(self.first[v], self.first[v + 1]):
@@ -124,11 +141,11 @@ class HopfLax:
                 u: cython.int = self.corners[s, c]
                 by: cython.double = 0.0
                 for i in range(3):
-                    by += turn[i] * (self.update.V[u, i] - self.update.V[v, i])
+                    by += self.turn[i] * (self.update.V[u, i] - self.update.V[v, i])
                 most = max(most, fabs(by))
             for c in range(size):
                 u = self.corners[s, c]
-                if u == v or not most > self.settled or not most > self.pending[u]:
+                if u == v or self.fixed[u] or not most > max(self.settled, self.pending[u]):
                     continue
                 # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
                 if (
@@ -137,6 +154,8 @@ class HopfLax:
                     or ((change == INFINITY or self.d[v] < old) and self.update.through(s, c, self.d[u]) < self.d[u])
                 ):
                     self.pending[u] = most
+                    if self.left > 0:
+                        self.waiting.set_key(u, 1.0 / (self.d[u] - self.low))
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it.
@@ -182,5 +201,4 @@ class HopfLax:
             if kept[i] > kept[most]:
                 most = i
         self.label[v] = self.label[self.corners[s, self.update.side[most]]]
-        self.update.lay(s, c)
         self.update.find_slope(s, c)

@@ -8,23 +8,13 @@ cdef extern from *:
     double EQUAL
 
 
-cdef class LinearUpdate(Facet):
-    cdef const int[:, ::1] corners
-    cdef const double[:, ::1] mean
-    cdef double[::1] d
+cdef class SimplexUpdate(Facet):
+    cdef const int[:, ::1] corners, rows
+    cdef const double[:, ::1] mean, velocity, inverses, V
     # The corners of the facet in the simplex, and distance at these.
     cdef int side[3]
     cdef double level[3]
-
-    cdef double face(self, int s, int c) noexcept nogil
-    cdef double linear(self, int s, int c, double room) noexcept nogil
-    cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
-    cdef double across(self, int s, int c, double room) noexcept nogil
-
-
-cdef class SimplexUpdate(LinearUpdate):
-    cdef const double[:, ::1] velocity, inverses, V
-    cdef const int[:, ::1] rows
+    cdef double[::1] d
     # What bounds the values through each simplex.
     cdef double[::1] widest, slack, growths
     # The source of each vertex, the offset of each, and the least distance.
@@ -37,9 +27,13 @@ cdef class SimplexUpdate(LinearUpdate):
     # How far T is of second order for each vertex.
     cdef double[::1] weight
 
+    cdef double face(self, int s, int c) noexcept nogil
+    cdef double linear(self, int s, int c, double room) noexcept nogil
+    cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
+    cdef double across(self, int s, int c, double room) noexcept nogil
     cdef double through(self, int s, int c, double best) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
     cdef double curved(self, int s, int c, double limit) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
-    cdef double trust(self, int s, int c, int i) noexcept nogil
+    cdef double trust(self, int s, int i) noexcept nogil
     cdef void find_slope(self, int s, int c) noexcept nogil

@@ -6,12 +6,35 @@ from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 
+@cython.final
 @cython.cclass
-class LinearUpdate(Facet):
-    """The value at a corner of a simplex of which `mean` has the squared lengths, from the distances `d` at the others.
+class SimplexUpdate(Facet):
+    """Triangles, p = 2, or tetrahedra, p = 3, with a metric on each, or one at each of their corners.
 
-    `face` chooses the corner; the other corners are `side`, and have the distances `level`.
+    Parameters
+    ----------
+    corners : (m, p + 1) int32
+        Vertices of each simplex.
+    velocity, inverse : (k, 6) float64 or None
+        The inverse root of metrics, whose entries on and above the diagonal come row by row, and its inverse. None if
+        each simplex has one metric (q = 1).
+    rows : (m, p + 1) int32 or None
+        If not (q = p + 1), the row of these at each corner; velocity is linear in between.
+    mean : (m, pairs) float64
+        Squared distances in one metric for each simplex, in which T is found that is linear; pairs of corners in the
+        order of `np.tril_indices`.
+    widest, slack : (m,) float64
+        The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
+    growth : (m,) float64
+        If q > 1, the length of the gradient of the mean velocity, in the metric of the centre.
+    V : (n, 3) float64
+        Positions.
     """
+
+    def __init__(self, corners, velocity, inverse, rows, mean, widest, slack, growth, V):
+        self.corners, self.velocity, self.inverses, self.rows, self.V = corners, velocity, inverse, rows, V
+        self.mean, self.widest, self.slack, self.growths = mean, widest, slack, growth
+        self.p, self.q = corners.shape[1] - 1, 1 if rows is None else corners.shape[1]
 
     def face(self, s: cython.int, c: cython.int) -> cython.double:
         """Look at the facet opposite corner c of simplex s: sets `side` and `level`, returns the least distance."""
@@ -117,37 +140,6 @@ class LinearUpdate(Facet):
             return INFINITY
         return self.level[0] + b * fb + e * fe + far
 
-
-@cython.final
-@cython.cclass
-class SimplexUpdate(LinearUpdate):
-    """Triangles, p = 2, or tetrahedra, p = 3, with a metric on each, or one at each of their corners.
-
-    Parameters
-    ----------
-    corners : (m, p + 1) int32
-        Vertices of each simplex.
-    velocity, inverse : (k, 6) float64 or None
-        The inverse root of metrics, whose entries on and above the diagonal come row by row, and its inverse. None if
-        each simplex has one metric (q = 1).
-    rows : (m, p + 1) int32 or None
-        If not (q = p + 1), the row of these at each corner; velocity is linear in between.
-    mean : (m, pairs) float64
-        Squared distances in one metric for each simplex, in which T is found that is linear; pairs of corners in the
-        order of `np.tril_indices`.
-    widest, slack : (m,) float64
-        The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
-    growth : (m,) float64
-        If q > 1, the length of the gradient of the mean velocity, in the metric of the centre.
-    V : (n, 3) float64
-        Positions.
-    """
-
-    def __init__(self, corners, velocity, inverse, rows, mean, widest, slack, growth, V):
-        self.corners, self.velocity, self.inverses, self.rows, self.V = corners, velocity, inverse, rows, V
-        self.mean, self.widest, self.slack, self.growths = mean, widest, slack, growth
-        self.p, self.q = corners.shape[1] - 1, 1 if rows is None else corners.shape[1]
-
     def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
         """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
 
@@ -165,7 +157,10 @@ class SimplexUpdate(LinearUpdate):
         return self.curved(s, c, best) if linear - nearest < room else INFINITY
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
-        """What `Facet` knows of the metric of s, after `face`."""
+        """What `Facet` knows of s and its metric, after `face`."""
+        for i in range(self.p):
+            for k in range(3):
+                self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
         if self.q == 1:
             sq = cython.address(self.mean[s, 0])
             m = cython.address(self.product[0])
@@ -180,9 +175,6 @@ class SimplexUpdate(LinearUpdate):
             at: cython.int = c if i == 0 or i > self.p else self.side[i - 1]
             self.W[i] = cython.address(self.velocity[self.rows[s, at], 0])
             self.s[i] = mean_velocity(self.W[i])
-        for i in range(self.p):
-            for k in range(3):
-                self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
 
     def curved(self, s: cython.int, c: cython.int, limit: cython.double) -> cython.double:
         """The least value at corner c of simplex s with T of second order, after `linear`; sets `share`.
@@ -202,7 +194,7 @@ class SimplexUpdate(LinearUpdate):
             # T is not linear on an edge to the source, and its square not quadratic.
             return self.along_edges()
         for i in range(self.p):
-            x[i] = self.trust(s, c, i)
+            x[i] = self.trust(s, i)
             for j in range(i):
                 sag: cython.double = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
                 self.sag[i][j] = self.sag[j][i] = self.weight[self.corners[s, c]] * sag
@@ -275,7 +267,7 @@ class SimplexUpdate(LinearUpdate):
         least: cython.double = max(rise - from_i, -from_j - rise) - level
         return max(min(sag, most), least)
 
-    def trust(self, s: cython.int, c: cython.int, i: cython.int) -> cython.double:
+    def trust(self, s: cython.int, i: cython.int) -> cython.double:
         """How far the slope at a corner i of `side` has length 1 in simplex s, as unless metrics jump: from 0 to 1.
 
         With the square of the logarithm, distances have a derivative where metrics begin to differ.
@@ -288,21 +280,17 @@ class SimplexUpdate(LinearUpdate):
             e[j] = self.slope[v, j] if self.q > 1 else 0.0
             if self.q == 1 and j < self.p:
                 for k in range(3):
-                    e[j] += self.slope[v, k] * (
-                        self.V[self.corners[s, self.side[j]], k] - self.V[self.corners[s, c], k]
-                    )
+                    e[j] += self.slope[v, k] * self.E[j][k]
         square: cython.double = self.dual(i + 1 if self.q > 1 else 0, e)
         square = log(square) if square > 0.0 else 1.0
         return max(1.0 - square * square, 0.0)
 
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
-        """The derivative of the length of v - x by the position of v, at the best place x."""
+        """The derivative of the length of v - x by the position of v, at the best place x, after `face`."""
         v: cython.int = self.corners[s, c]
-        E: cython.double[9]
         lean: cython.double[3]
+        self.lay(s, c)
         self.is_sloped[v] = self.length(self.share) > 0.0
         for i in range(self.p):
             lean[i] = self.lean(i)
-            for k in range(3):
-                E[3 * i + k] = self.V[self.corners[s, self.side[i]], k] - self.V[v, k]
-        gradient(E, lean, self.p, cython.address(self.slope[v, 0]))
+        gradient(cython.address(self.E[0][0]), lean, self.p, cython.address(self.slope[v, 0]))
