@@ -117,13 +117,6 @@ def test_signs_are_those_of_the_pieces(name, kind):
         np.testing.assert_array_equal(distance[far] < 0, is_left[: mesh.n_vertices][far])
 
 
-def test_reversed_curves_change_the_sign_alone():
-    mesh, circle, _ = plane(20)
-    solver = SignedHeatSolver(mesh)
-    forward, backward = solver.distance(circle), solver.distance(circle.reversed())
-    np.testing.assert_allclose(backward, -forward, atol=1e-12)
-
-
 def test_size_turn_and_order_of_the_faces_do_not_matter():
     mesh, circle, _ = sphere(20)
     turn, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
@@ -137,9 +130,10 @@ def test_size_turn_and_order_of_the_faces_do_not_matter():
     np.testing.assert_allclose(other, here, atol=1e-9)
 
 
-def test_masks_are_the_boundaries_of_their_regions():
-    mesh, _, truth = plane(20)
+def test_masks_are_the_boundaries_of_their_regions_and_reversed_curves_change_the_sign():
+    mesh, circle, truth = plane(20)
     solver = SignedHeatSolver(mesh)
+    np.testing.assert_allclose(solver.distance(circle.reversed()), -solver.distance(circle), atol=1e-12)
     inside = truth < 0
     of_vertices = solver.distance(inside)
     np.testing.assert_array_equal(of_vertices < 0, inside)
@@ -148,7 +142,7 @@ def test_masks_are_the_boundaries_of_their_regions():
     np.testing.assert_array_equal(solver.distance(faces), solver.distance(region_boundary(mesh, faces=faces)))
 
 
-@pytest.mark.parametrize("removed", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize("removed", [0.1, 0.3, 0.45])
 def test_broken_circles(removed):
     mesh, _, truth = plane(40)
     n_arcs = 5
@@ -158,6 +152,28 @@ def test_broken_circles(removed):
     distance = SignedHeatSolver(mesh).distance(arcs)
     assert mean_error(distance, truth) < 0.04
     np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
+
+
+OPEN = {
+    "arcs": lambda mesh: [ring(mesh, start=angle, end=angle + 0.9) for angle in (0, 2, 4)],
+    "half a level": lambda mesh: curve_on(mesh, [[0.2, 0.31, 0], [0.55, 0.4, 0]]),
+    "edges": lambda mesh: edge_curve(mesh, np.arange(205, 215)),
+    "in one face": lambda _: SurfaceCurve([300], [[0.3, 0.3, 0.4]], [[0.1, 0.5, 0.4]]),
+    "two levels": lambda mesh: isolines(mesh, mesh.V @ [1, 0.3, 0], [0.4, 0.8]),
+    "around a handle": lambda mesh: isolines(mesh, np.arctan2(mesh.V[:, 1], mesh.V[:, 0]), 0.3)[0][0],
+}
+
+
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+@pytest.mark.parametrize("kind", OPEN)
+def test_the_sign_changes_only_at_zero(kind):
+    """Along no edge does the distance change by more than its length, whatever the curves leave open."""
+    mesh = shapes.torus(30, 16) if kind == "around a handle" else plane(24)[0]
+    curves = OPEN[kind](mesh)
+    distance = SignedHeatSolver(mesh).distance(curves)
+    assert (np.ptp(distance[mesh.edges], axis=1) <= mesh.edge_lengths + 1e-9).all()
+    assert (np.abs(distance) <= geodesic_distance(mesh, curves) + 1e-12).all()
+    assert 0 < (distance < 0).mean() < 1
 
 
 def test_a_border_that_is_mostly_gaps_warns():
@@ -201,29 +217,20 @@ def test_points_with_normals():
     assert mean_error(mixed, truth) < 0.03
 
 
-def test_unsigned_sources_among_the_curves():
-    mesh, circle, truth = plane(34)
-    points = [nearest_vertex(mesh, p) for p in ([0.5, 0.5, 0], [0.05, 0.05, 0])]
-    solver = SignedHeatSolver(mesh)
-    distance = solver.distance(circle, unsigned=points)
-    nearest = np.minimum(np.abs(solver.distance(circle)), geodesic_distance(mesh, points))
-    np.testing.assert_allclose(np.abs(distance), nearest, atol=1e-12)
-    np.testing.assert_array_equal(distance[points], 0)
-    far = nearest > 1e-3
-    np.testing.assert_array_equal(distance[far] < 0, truth[far] < 0)
-
-
 @pytest.mark.parametrize("level", [None, "zero", "none"])
-def test_an_unsigned_curve_among_signed_ones(level):
+@pytest.mark.parametrize("kind", ["points", "curve"])
+def test_unsigned_sources_among_signed_curves(kind, level):
     mesh, circle, _ = plane(34)
-    # Through both sides of the circle.
+    # Through both sides of the circle, and in both.
     line = curve_on(mesh, [[0.1, 0.52, 0], [0.9, 0.47, 0]])
+    points = [nearest_vertex(mesh, p) for p in ([0.5, 0.45, 0], [0.05, 0.05, 0])]
+    unsigned = {"points": points, "curve": line}[kind]
     solver = SignedHeatSolver(mesh)
-    alone, both = solver.distance(circle, level=level), solver.distance(circle, unsigned=line, level=level)
-    from_line = geodesic_distance(mesh, line, method="exact")
-    np.testing.assert_array_equal(both < 0, alone < 0)
-    np.testing.assert_allclose(np.abs(both), np.minimum(np.abs(alone), from_line), atol=1e-12)
-    assert 0 < (from_line < np.abs(alone)).sum() < mesh.n_vertices
+    alone, both = solver.distance(circle, level=level), solver.distance(circle, unsigned=unsigned, level=level)
+    nearest = geodesic_distance(mesh, unsigned, method="exact")
+    np.testing.assert_array_equal((both < 0)[both != 0], (alone < 0)[both != 0])
+    np.testing.assert_allclose(np.abs(both), np.minimum(np.abs(alone), nearest), atol=1e-12)
+    assert 0 < (nearest < np.abs(alone)).sum() < mesh.n_vertices
 
 
 def on_curves(mesh: Mesh, curves: list[SurfaceCurve], values: np.ndarray) -> float:
@@ -288,17 +295,18 @@ def test_curves_with_bends_are_near_zero(mesh):
         assert near < on_curves(mesh, curves, solver.distance(curves, level="none")) / 10
 
 
-@pytest.mark.parametrize("kind", ["faces", "half of a boundary"])
+@pytest.mark.parametrize("kind", ["faces", "half of a boundary", "cut"])
 def test_vertices_on_curves_are_zero(kind):
     mesh = shapes.blob(3)
     (boundary,) = region_boundary(mesh, faces=mesh.V[mesh.F].mean(axis=1) @ [0.3, 0.5, 0.8] < 0.1)
     half = SurfaceCurve(*(column[: len(boundary) // 2] for column in (boundary.faces, boundary.start, boundary.end)))
     curve = boundary if kind == "faces" else half
-    is_corner = (np.concatenate([curve.start, curve.end]) == 1).any(axis=1)
-    assert is_corner.all()
-    faces, places = np.tile(curve.faces, 2), np.concatenate([curve.start, curve.end])
-    on_curve = np.unique(mesh.F[faces, places.argmax(axis=1)])
+    if kind == "cut":
+        found = cut(*sphere(20)[:2])
+        mesh, curve = found.mesh, [edge_curve(found.mesh, edge) for edge in found.edges]
+    on_curve = np.unique(cut(mesh, curve).edges)
     solver = SignedHeatSolver(mesh)
+    np.testing.assert_array_equal(solver.distance(curve)[on_curve], 0)
     np.testing.assert_array_equal(solver.distance(curve, level="zero")[on_curve], 0)
     assert (solver.distance(curve, level="none")[on_curve] != 0).any()
 
@@ -325,14 +333,6 @@ def test_the_smooth_part_of_the_level_is_the_least_one(monkeypatch):
         off.append(np.abs(found - truth).max() / np.abs(truth).max())
     assert off[1] < 1e-9
     assert off[0] < 0.2
-
-
-def test_vertices_on_curves_that_were_cut_are_exactly_zero():
-    mesh, circle, _ = sphere(20)
-    found = cut(mesh, circle)
-    curve = [edge_curve(found.mesh, edge) for edge in found.edges]
-    distance = SignedHeatSolver(found.mesh).distance(curve)
-    np.testing.assert_array_equal(distance[np.unique(found.edges)], 0)
 
 
 def test_curves_come_in_lists_of_any_depth():

@@ -12,13 +12,8 @@ from heat_igl.mesh.connectivity import next_in_run
 from heat_igl.sources import OrientedSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-# Ends of curves nearer to each other than this share of the mean edge length meet.
+# Places nearer to each other than this share of the mean edge length are the same.
 _SAME_PLACE = 1e-6
-#: The zero curve of an integrated distance runs within a quarter of an edge of the curves. It counts as the closing of
-#: a gap where it is farther than this from all of them, in mean edge lengths.
-IN_GAP = 1.0
-# Farther than any distance, and not infinite, so that none of it is 0.
-_FAR = 1e300
 # If a vertex sees the nearest place of a segment almost along the segment, rounding decides the side.
 _LEAST_SINE = 1e-6
 # Straight lines in one face are as long as the distance, but for rounding.
@@ -28,16 +23,16 @@ _SAME_DISTANCE = 1e-6
 _AGREED = 0.5
 
 
+def same_place(mesh: Mesh) -> float:
+    """The distance within which ends of curves meet, and vertices are on a curve."""
+    return _SAME_PLACE * float(mesh.edge_lengths.mean())
+
+
 def has_gaps(mesh: Mesh, sources: OrientedSet) -> bool:
     """Whether a curve ends, inside the mesh, at no place at which one begins; points always have gaps."""
     if len(sources.point_faces):
         return True
-    begin, end = _ends(mesh, sources)
-    tolerance = _SAME_PLACE * float(mesh.edge_lengths.mean())
-    # Most segments are followed by the next of their curve, and the last by the first.
-    following = next_in_run(np.arange(len(begin)), np.unique(sources.label, return_counts=True)[1])
-    apart = np.linalg.norm(begin[following] - end, axis=1) > tolerance
-    ends, begins = np.flatnonzero(apart), following[apart]
+    ends, begins = _loose(mesh, sources)
     loose_ends = ends[~_on_boundary(mesh, sources.faces[ends], sources.end[ends])]
     loose_begins = begins[~_on_boundary(mesh, sources.faces[begins], sources.start[begins])]
     if len(loose_ends) != len(loose_begins):
@@ -46,9 +41,19 @@ def has_gaps(mesh: Mesh, sources: OrientedSet) -> bool:
         return False
     from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
 
+    begin, end = _ends(mesh, sources)
     to_begin = cKDTree(begin[loose_begins]).query(end[loose_ends])[0]
     to_end = cKDTree(end[loose_ends]).query(begin[loose_begins])[0]
-    return bool(max(to_begin.max(), to_end.max()) > tolerance)
+    return bool(max(to_begin.max(), to_end.max()) > same_place(mesh))
+
+
+def _loose(mesh: Mesh, sources: OrientedSet) -> tuple[IntArray, IntArray]:
+    """The segments at whose end, and those at whose start, no neighbour of the same curve goes on."""
+    begin, end = _ends(mesh, sources)
+    # Most segments are followed by the next of their curve, and the last by the first.
+    following = next_in_run(np.arange(len(begin)), np.unique(sources.label, return_counts=True)[1])
+    apart = np.linalg.norm(begin[following] - end, axis=1) > same_place(mesh)
+    return np.flatnonzero(apart), following[apart]
 
 
 def total_length(mesh: Mesh, curves: OrientedSet | SurfaceCurve) -> float:
@@ -69,16 +74,43 @@ def _on_boundary(mesh: Mesh, faces: IntArray, barycentric: FloatArray) -> BoolAr
     return np.asarray((on_side | in_corner).any(axis=1))
 
 
-def zero_curve_in_gaps(mesh: Mesh, phi: FloatArray, distance: FloatArray, h: float) -> SurfaceCurve | None:
-    """The zero curve of `phi` (n,) where it is far from the curves that `distance` (n,) is from; None if nowhere.
+def closing_of_gaps(
+    mesh: Mesh, sources: OrientedSet, phi: FloatArray, left: BoolArray, on_curve: BoolArray
+) -> SurfaceCurve | None:
+    """A curve across every edge at which the side changes, but no source meets the edge; None if there is no such edge.
 
-    Distances may be ``inf`` beyond `IN_GAP` edges and the longest edge: no corner of a face near the curves is farther.
+    It runs along the zero curve of `phi` (n,), a signed distance, with the signs of `left` (n,), to the loose ends of
+    sources in its faces and to where sources meet edges. They meet the edges of the vertices `on_curve` (n,) there.
     """
-    faces, start, end, _ = level_segments(mesh, phi, 0.0)
-    # Where no distance is known, it is large.
-    middle = np.einsum("sc,sc->s", (start + end) / 2, np.minimum(distance, _FAR)[mesh.F[faces]])
-    kept = (middle > IN_GAP * h) & (start != end).any(axis=1)
+    size = np.maximum(np.where(on_curve, 0.0, np.abs(phi)), np.finfo(float).tiny)
+    faces, start, end, edges = level_segments(mesh, np.where(left, -size, size), 0.0)
+    share = _crossed(mesh, sources)
+    is_met = (share >= 0) | on_curve[mesh.edges].any(axis=1)
+    kept = ~is_met[edges].all(axis=1)
+    ends, begins = _loose(mesh, sources)
+    # The last row is for faces without one.
+    loose = np.concatenate([sources.end[ends], sources.start[begins], np.zeros((1, 3))])
+    of_face = np.full(mesh.n_faces, -1)
+    of_face[np.concatenate([sources.faces[ends], sources.faces[begins]])] = np.arange(len(loose) - 1)
+    in_face = loose[of_face[faces]]
+    for point, edge in zip((start, end), edges.T, strict=True):
+        first, last = (mesh.F[faces] == mesh.edges[edge, i : i + 1] for i in (0, 1))
+        crossed = first * share[edge, None] + last * (1 - share[edge, None])
+        there = np.where((in_face > 0).all(axis=1, keepdims=True), in_face, crossed)
+        np.copyto(point, there, where=share[edge, None] >= 0)
+    kept &= (start != end).any(axis=1)
     return SurfaceCurve(faces[kept], start[kept], end[kept]) if kept.any() else None
+
+
+def _crossed(mesh: Mesh, sources: OrientedSet) -> FloatArray:
+    """Where segments end on each edge, as the share of its first vertex; -1 if none ends between its own ends."""
+    share = np.full(len(mesh.edges), -1.0)
+    for barycentric in (sources.start, sources.end):
+        on_edge = (barycentric == 0).sum(axis=1) == 1
+        faces, at = sources.faces[on_edge], barycentric[on_edge]
+        edge = mesh.facets.of_face[faces, at.argmin(axis=1)]
+        share[edge] = at[mesh.F[faces] == mesh.edges[edge, :1]]
+    return share
 
 
 def vertices_on(mesh: Mesh, sources: OrientedSet) -> BoolArray:
@@ -100,12 +132,8 @@ def left_of_closed(
     between them. A region is on the side of the segments that are seen from inside. Nothing is known of vertices on
     curves, of regions that see both sides, and of components without a curve. `triangulation` is the faces of the mesh.
     """
-    n, m, twin = mesh.n_vertices, mesh.n_faces, triangulation.twin
-    edge = mesh.facets.of_face
-    is_met, is_divided = np.zeros((2, len(mesh.edges)), bool)
-    for barycentric in (sources.start, sources.end):
-        on_edge = (barycentric == 0).sum(axis=1) == 1
-        is_met[edge[sources.faces[on_edge], barycentric[on_edge].argmin(axis=1)]] = True
+    n, m, twin, edge = mesh.n_vertices, mesh.n_faces, triangulation.twin, mesh.facets.of_face
+    is_met, is_divided = _crossed(mesh, sources) >= 0, np.zeros(len(mesh.edges), bool)
     along = (sources.start == 0) & (sources.end == 0)
     is_along, opposite = along.any(axis=1), along.argmax(axis=1)
     is_divided[edge[sources.faces[is_along], opposite[is_along]]] = True
@@ -158,25 +186,24 @@ def left_of_closed(
     return total[region[:n]] > 0, decided[region[:n]] & free
 
 
-def left_of_nearest(
-    triangulation: IntrinsicTriangulation, sources: OrientedSet, distance: FloatArray
-) -> tuple[BoolArray, BoolArray]:
-    """Which vertices (n,) are on the left of the nearest segment, and which (n,) have that in one of their faces.
+def left_beside(triangulation: IntrinsicTriangulation, sources: OrientedSet) -> tuple[BoolArray, FloatArray]:
+    """Which vertices (n,) are on the left of the nearest segment in their faces, and how far (n,) that is at least.
 
-    Nothing is known of vertices that see the segment almost along it, nor of vertices on it. `triangulation` is the
-    faces of the mesh, and `distance` (n,) that from the curves.
+    The distance is ``inf`` for vertices without a segment in their faces, those that see it almost along it, and those
+    on it. `triangulation` is the faces of the mesh.
     """
     seen = _seen(triangulation, sources)
     face, place = np.divmod(seen.place, 6)
-    vertex = triangulation.F[face, place % 3]
-    nearest = np.flatnonzero(
-        (place < 3) & (seen.away <= distance[vertex] * (1 + _SAME_DISTANCE)) & (np.abs(seen.sine) > _LEAST_SINE)
-    )
+    corner = np.flatnonzero(place < 3)
+    vertex, away, angle = triangulation.F[face, place % 3][corner], seen.away[corner], np.abs(seen.sine[corner])
+    nearest = np.full(triangulation.n, np.inf)
+    np.minimum.at(nearest, vertex, away)
+    told = np.flatnonzero((away <= nearest[vertex] * (1 + _SAME_DISTANCE)) & (angle > _LEAST_SINE))
     # Of segments that meet in the nearest place, the one seen under the largest angle is written last.
-    nearest = nearest[np.argsort(np.abs(seen.sine[nearest]), kind="stable")]
-    left, is_known = np.zeros((2, len(distance)), bool)
-    left[vertex[nearest]], is_known[vertex[nearest]] = seen.sine[nearest] > 0, True
-    return left, is_known
+    told = told[np.argsort(angle[told], kind="stable")]
+    left, distance = np.zeros(len(nearest), bool), np.full(len(nearest), np.inf)
+    left[vertex[told]], distance[vertex[told]] = seen.sine[corner[told]] > 0, away[told] * (1 - _SAME_DISTANCE)
+    return left, distance
 
 
 class _Seen(NamedTuple):

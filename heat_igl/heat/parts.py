@@ -240,8 +240,7 @@ def check_large_step(options: SolverOptions, domain: Operators) -> None:
     if step is not None and np.sqrt(step) > FARTHEST_SPREAD * domain.longest_distance:
         raise ValueError(
             f"{name} = {value:.4g} is too large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, and the longest "
-            f"distance on the mesh is {domain.longest_distance:.4g}, so heat is level; t is a squared "
-            "length"
+            f"distance on the mesh is {domain.longest_distance:.4g}, so heat is level; t is a squared length"
         )
     if step is not None and np.sqrt(step) > domain.longest_distance:
         warn_caller(
@@ -296,20 +295,14 @@ def prepare_mesh(
         on_laplacian = analyse if known is None and n_threads() > 1 else None
         usual = None
         if isinstance(mesh, PointCloud):
-            domain, usual = (
-                point_cloud_operators(mesh, options.laplacian, on_laplacian),
-                _t_coef_of_points(mesh.triangles),
-            )
+            domain = point_cloud_operators(mesh, options.laplacian, on_laplacian)
+            sides = np.sort(igl.edge_lengths(mesh.triangles.V, mesh.triangles.F), axis=1)
+            ratio = np.median(sides[:, 2] / np.maximum(sides[:, 0], np.finfo(float).tiny))
+            usual = T_COEF_RANDOM_POINTS if ratio > RANDOM_SIDES else T_COEF_EVEN_POINTS
         else:
             domain = operators(mesh, options.laplacian, on_laplacian)
         seconds = time.perf_counter() - start
         return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V, usual)
-
-
-def _t_coef_of_points(triangles: Mesh) -> float:
-    sides = np.sort(igl.edge_lengths(triangles.V, triangles.F), axis=1)
-    ratio = np.median(sides[:, 2] / np.maximum(sides[:, 0], np.finfo(float).tiny))
-    return T_COEF_RANDOM_POINTS if ratio > RANDOM_SIDES else T_COEF_EVEN_POINTS
 
 
 def prepare(

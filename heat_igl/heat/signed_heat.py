@@ -15,13 +15,13 @@ import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, require_choice
 from heat_igl.heat.curve_sides import (
-    IN_GAP,
+    closing_of_gaps,
     has_gaps,
+    left_beside,
     left_of_closed,
-    left_of_nearest,
+    same_place,
     total_length,
     vertices_on,
-    zero_curve_in_gaps,
 )
 from heat_igl.heat.parts import SolverOptions, SolverParts, prepare
 from heat_igl.heat.solver import HeatMethodSolver
@@ -189,8 +189,8 @@ class SignedHeatSolver:
         Notes
         -----
         If no curve has a gap, the regions between curves have one sign each, that of the side on which the curves lie.
-        The levels "constant" and "none" keep the sign of the integrated value instead. The diffused normals of all
-        curves are added: if curves contradict each other, the longer pieces decide.
+        A region on both sides, as around a handle, is closed like gaps. The levels "constant" and "none" keep the sign
+        of the integrated value. The diffused normals of all curves are added: where they differ, longer ones decide.
         """
         if level is not None:
             require_choice("level", level, get_args(Level))
@@ -208,7 +208,7 @@ class SignedHeatSolver:
 
     def _from_heat(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) by integration, and which vertices (n,) are on the left."""
-        phi = self._integration.distance(chosen, level)
+        _, phi = self._integration.distance_beside(lambda: None, chosen, level)
         if level == "zero":
             phi[vertices_on(self._mesh, chosen)] = 0.0
         if level == "zero" and not has_gaps(self._mesh, chosen):
@@ -218,22 +218,22 @@ class SignedHeatSolver:
 
     def _measured(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) from the curves, with their gaps closed, and which vertices (n,) are on the left."""
-        sources = chosen.unoriented()
+        sources, on_curve = chosen.unoriented(), same_place(self._mesh)
+        left, is_known = np.zeros((2, self.n_vertices), bool)
         if not has_gaps(self._mesh, chosen):
             size, (left, is_known) = both(
                 lambda: self._from(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
             )
-            if (is_known | (size == 0) | np.isinf(size)).all():
+            if (is_known | (size <= on_curve) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
-            return size, np.where(is_known, left, self._integration.distance(chosen, level) < 0)
-        h = self._domain.mean_edge_length
-        # Beside the curves, sides and gaps are told by the distance; all of it is found once, from the closing as well.
-        reach = IN_GAP * h + float(self._mesh.edge_lengths.max())
+        # The nearest segment in the faces of a vertex may not be the nearest of all.
+        left_of_nearest, away = left_beside(self._faces, chosen)
+        reach = float(away.max(where=np.isfinite(away), initial=on_curve))
         near, phi = self._integration.distance_beside(lambda: self._from(sources, reach), chosen, level)
-        left, is_known = left_of_nearest(self._faces, chosen, near)
-        closing = zero_curve_in_gaps(self._mesh, phi, near, h)
-        self._warn_if_unsure(chosen, closing, np.flatnonzero(is_known & (left != (phi < 0))), int(is_known.sum()))
-        left = np.where(is_known, left, phi < 0)
+        is_beside = np.isfinite(away) & (away <= near)
+        left = np.where(is_known, left, np.where(is_beside, left_of_nearest, phi < 0))
+        closing = closing_of_gaps(self._mesh, chosen, phi, left, near <= on_curve)
+        self._warn_if_unsure(chosen, closing, np.flatnonzero(is_beside & (left != (phi < 0))), int(is_beside.sum()))
         return self._from(sources if closing is None else [sources, closing]), left
 
     def _warn_if_unsure(
@@ -260,8 +260,7 @@ class SignedHeatSolver:
     def _from(self, sources: Sources, cutoff: float = np.inf) -> FloatArray:
         """Exact distance (n,) from sources without a side, ``inf`` beyond a cutoff."""
         places = source_set(sources, self.n_vertices, self._mesh.F, originals=self._mesh.originals)
-        require_resolved(places, self._domain.mean_edge_length)
-        return self._exact.distance(places, cutoff, n_threads())
+        return self._exact.distance(require_resolved(places, self._domain.mean_edge_length), cutoff, n_threads())
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:
@@ -271,7 +270,15 @@ def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, Int
     domain = operators(mesh, "intrinsic-delaunay")
     surface = domain.surface
     if surface is None or surface.faces is None or surface.uncovered is not None:
-        raise MeshError(_shared_edge(mesh))
+        facets = mesh.facets
+        crowded = np.flatnonzero(facets.n_faces > 2)
+        edge = "" if not len(crowded) else " {} - {}".format(*facets.vertices[crowded[0]].tolist())
+        count = f" ({len(crowded)} edges are like that)" if len(crowded) > 1 else ""
+        raise MeshError(
+            f"more than two faces meet at the edge{edge}{count}: a curve that crosses it has no one left and right, "
+            "and a sign no meaning beyond; separate the sheets, or take the sides of closed curves from "
+            "cut(mesh, curves).sides"
+        )
     faces = surface.faces
     if isinstance(copies := next(iter(faces.history), None), Merged):
         first = int(np.argmin(np.diff(copies.face) > 0)) + 1
@@ -293,18 +300,6 @@ def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, Int
     return domain, faces, surface.triangulation
 
 
-def _shared_edge(mesh: Mesh) -> str:
-    """What is wrong with a mesh that has an edge of more than two faces."""
-    facets = mesh.facets
-    crowded = np.flatnonzero(facets.n_faces > 2)
-    first = "" if not len(crowded) else " {} - {}".format(*facets.vertices[crowded[0]].tolist())
-    count = f" ({len(crowded)} edges are like that)" if len(crowded) > 1 else ""
-    return (
-        f"more than two faces meet at the edge{first}{count}: a curve that crosses it has no one left and right, and a "
-        "sign no meaning beyond; separate the sheets, or take the sides of closed curves from cut(mesh, curves).sides"
-    )
-
-
 class NormalIntegration:
     """Diffuses the normals of oriented sources, and integrates the field of unit vectors (Feng and Crane 2024).
 
@@ -324,17 +319,14 @@ class NormalIntegration:
         self._D = divergence_matrix(gradient, triangulation.areas)
         self._domain, self._heat_flow, self._poisson = domain, parts.heat_flow, parts.poisson
 
-    def distance(self, chosen: OrientedSet, level: Level) -> FloatArray:
-        """The signed distance (n,): steps 1 to 3 of the method, less the level.
-
-        A `SourceError` if the normals of all curves cancel, or one of a point is that of the face.
-        """
-        return self.distance_beside(lambda: None, chosen, level)[1]
-
     def distance_beside(
         self, other: Callable[[], Other], chosen: OrientedSet, level: Level
     ) -> tuple[Other, FloatArray]:
-        """The result of a shorter computation, which runs on a thread of its own, and `distance`."""
+        """The result of a shorter computation, which runs on a thread of its own, and the signed distance (n,).
+
+        It takes steps 1 to 3 of the method, less the level. A `SourceError` if the normals of all curves cancel, or one
+        of a point is that of the face.
+        """
         pieces = self._pieces(chosen)
 
         def integrated() -> tuple[FloatArray, FloatArray]:

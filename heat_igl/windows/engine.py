@@ -110,7 +110,12 @@ class OperatorTriangles(Triangles):
         if surface is None:
             raise ValueError("distance is unfolded along triangles, and this domain has none")
         self.components = domain.components[: surface.unfolding.n]
-        self._surface = _as_thin_as_given(surface)
+        self._surface, given, faces = surface, surface.given_faces, surface.faces
+        # The margin of the heat method would lengthen paths. Lengths without positions are those of another metric.
+        if surface.V is not None and given is not None and faces is not None and faces.lengthening != 0:
+            from heat_igl.operators import unfolding_surface
+
+            self._surface = unfolding_surface(Mesh(surface.V, given), MARGIN)
 
     @property
     def surface(self) -> Surface:
@@ -236,16 +241,3 @@ class WindowEngine(TriangleEngine):
         found = self._surface(query.sources, locates=True).solve(query.sources, directed=True)
         distance, labels = query.with_begin(found.distance), sources.labels[found.origin.label]
         return distance, labels, *directions.of_windows(found, sources)
-
-
-def _as_thin_as_given(surface: Surface) -> Surface:
-    """The surface mollified by the small margin of windows: the larger margin of the heat method would lengthen paths.
-
-    A surface without positions, whose edge lengths are those of another metric, is returned unchanged.
-    """
-    given, faces = surface.given_faces, surface.faces
-    if given is None or faces is None or surface.V is None or faces.lengthening == 0:
-        return surface
-    from heat_igl.operators import unfolding_surface
-
-    return unfolding_surface(Mesh(surface.V, given), MARGIN)

@@ -107,12 +107,6 @@ class Found(NamedTuple):
         nothing = np.full((2, k), -1, np.int32)
         return cls(np.full(k, np.inf), nothing[0], np.full(n_labels, -1, np.int32), nothing[1], np.zeros(k))
 
-    def take_nearer(self, other: Found) -> None:
-        """Take over the results of another search that are nearer."""
-        is_nearer = np.flatnonzero(other.distance < self.distance)
-        for mine, theirs in zip(self, other, strict=True):
-            mine[is_nearer] = theirs[is_nearer]
-
 
 class Targets(NamedTuple):
     """Target points: t copies of points in the triangles, and the results there.
@@ -390,7 +384,9 @@ def _beside(tables: Tables, starts: Starts, found: Found, upper: FloatArray | No
     finally:
         is_same = windows.part(first, second)
     require_memory(all(done))
-    found.take_nearer(also)
+    is_nearer = np.flatnonzero(also.distance < found.distance)
+    for mine, theirs in zip(found, also, strict=True):
+        mine[is_nearer] = theirs[is_nearer]
     return np.asarray(statistics.sum(axis=0)) if is_same else None
 
 
