@@ -5,7 +5,7 @@ cdef struct Spoke:
     double length, along, height, base, beyond_along, beyond_depth
     int neighbour, next_neighbour, beyond, next
 
-# A corner: the place of its vertex over the opposite side, in units of that side, and its angle.
+# A corner: the place of its vertex over the opposite side, in units of that side, and cosine and sine of half its angle.
 cdef struct Corner:
-    double x, y, angle
+    double x, y, cosine, sine
 

@@ -8,7 +8,7 @@ from cython.cimports.libc.math import M_PI, NAN, atan2, fabs, sqrt
 
 from heat_igl.kernels.signals import raise_caught
 
-_CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("angle", "f8")])
+_CORNER = np.dtype([("x", "f8"), ("y", "f8"), ("cosine", "f8"), ("sine", "f8")])
 
 
 def first_spokes(edges, n: cython.int):
@@ -60,17 +60,23 @@ def fill(edges, first: cython.const[cython.int][::1], spoke: Spoke[::1]):
 @cython.nogil
 def _shapes(length: cython.const[cython.double][::1], corner: Corner[::1]) -> cython.void:
     """Place and angle of each corner."""
-    for h in range(length.shape[0]):
-        base: cython.double = length[h]
-        right: cython.double = length[previous_half_edge(h)]
-        left: cython.double = length[next_half_edge(h)]
+    room: cython.double[3]
+    for first in range(0, length.shape[0], 3):
+        half: cython.double = 0.5 * (length[first] + length[first + 1] + length[first + 2])
+        root: cython.double = sqrt(half)
+        for c in range(3):
+            room[c] = sqrt(max(half - length[first + c], 0.0))
         # Heron's formula as a product of differences: a height from right^2 - x^2 loses the digits of slivers.
-        half: cython.double = 0.5 * (base + right + left)
-        product: cython.double = max(half * (half - base) * (half - right) * (half - left), 0.0)
-        here = cython.address(corner[h])
-        here.x = 0.5 * ((right - left) * (right + left) / (base * base) + 1.0)
-        here.y = 2.0 * sqrt(product) / (base * base)
-        here.angle = 2.0 * atan2(sqrt(max((half - right) * (half - left), 0.0)), sqrt(max(half * (half - base), 0.0)))
+        twice: cython.double = 2.0 * root * room[0] * room[1] * room[2]
+        for c in range(3):
+            base: cython.double = length[first + c]
+            right: cython.double = length[first + (c + 2) % 3]
+            left: cython.double = length[first + (c + 1) % 3]
+            here = cython.address(corner[first + c])
+            here.x = 0.5 * ((right - left) * (right + left) / (base * base) + 1.0)
+            here.y = twice / (base * base)
+            beside: cython.double = 1.0 / sqrt(right * left)
+            here.cosine, here.sine = root * room[c] * beside, room[(c + 1) % 3] * room[(c + 2) % 3] * beside
 
 
 @cython.cfunc
@@ -121,35 +127,43 @@ def _fans(
     for h in range(twin.shape[0]):
         if is_done[h]:
             continue
-        start: cython.int = 2 * h
-        while True:  # clockwise, to the boundary or once around
-            k = _beyond(twin, aligned, start, False)
-            if k < 0:
-                break
-            start = k
-            if k == 2 * h:
-                break
-        is_open: cython.bint = k < 0
         v: cython.int = vertex[h]
-        row: cython.int = end[v]
-        begin: cython.int = row
-        angle: cython.double = 0.0
-        k = start
-        while True:  # counter-clockwise
-            is_done[k // 2] = True
-            left[row] = k
-            spoke[row].next = row + 1
-            row += 1
-            angle += corner[k // 2].angle
-            k = _beyond(twin, aligned, k, True)
-            if k < 0 or k == start:
+        begin: cython.int = end[v]
+        start: cython.int = 2 * h
+        is_open: cython.bint = False
+        while True:
+            row: cython.int = begin
+            # Half the angles are added up as products of complex numbers, in turns and an arctangent for each fan.
+            x: cython.double = 1.0
+            y: cython.double = 0.0
+            turns: cython.int = 0
+            k = start
+            while True:  # counter-clockwise
+                is_done[k // 2] = True
+                left[row] = k
+                spoke[row].next = row + 1
+                row += 1
+                here = cython.address(corner[k // 2])
+                before: cython.double = y
+                x, y = x * here.cosine - y * here.sine, x * here.sine + y * here.cosine
+                turns += before < 0.0 and y >= 0.0
+                k = _beyond(twin, aligned, k, True)
+                if k < 0 or k == start:
+                    break
+            if k >= 0 or is_open:
                 break
+            is_open = True
+            k = _beyond(twin, aligned, start, False)
+            while k >= 0:  # clockwise, to the boundary where the fan begins
+                start = k
+                k = _beyond(twin, aligned, start, False)
         if is_open:  # the last side, which has no triangle to its left
             left[row] = -1
             spoke[row].next = row
             row += 1
         else:
             spoke[row - 1].next = begin
+        angle: cython.double = 2.0 * (atan2(y, x) + 2.0 * M_PI * (turns + (y < 0.0)))
         if begin == first[v]:
             is_flat[v] = is_open or fabs(angle - 2.0 * M_PI) < 1e-9
         end[v] = row
