@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
+from heat_igl.kernels.cloud.joining_groups import turned_groups
 from heat_igl.kernels.mesh.incidence import components
-from heat_igl.mesh.cloud_orientation import turned_groups
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
@@ -59,8 +59,9 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[Float
     count, total = np.bincount(which), np.abs(np.bincount(which, side))
     contradicts = (total < _NEARLY_ALL * count) & (ends[begin, 0] != ends[begin, 1])
     joins = ends[begin[contradicts]]
-    is_turned = turned_groups(joins, -count[contradicts].astype(float), np.arange(int(group.max()) + 1))[group]
-    part = components(joins, int(group.max()) + 1)[group]
+    alone = np.ones(int(group.max()) + 1, np.int64)
+    part = components(joins, len(alone))[group]
+    is_turned = turned_groups(joins.astype(np.int32), -count[contradicts].astype(float), alone)[group]
     is_turned ^= (np.bincount(part, is_turned) > np.bincount(part) / 2)[part]
     # Those of a single point are on one side of it, too. In groups of which one was turned they are opposite no more.
     stays = ~contradicts[which] | (is_turned[a] == is_turned[b])

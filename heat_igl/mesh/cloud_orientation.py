@@ -5,6 +5,7 @@ from __future__ import annotations
 import igl
 import numpy as np
 
+from heat_igl.kernels.cloud.joining_groups import turned_groups
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.cloud_triangles import FOLDED_BACK, corner, glued_sides
 from heat_igl.mesh.connectivity import pinched_vertices
@@ -69,7 +70,8 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
         group = (np.cumsum(np.bincount(group) > 0) - 1)[group]
         is_turned &= sheet[0] != sheet[1]
         wants_one = runs_alike != (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]])
-        is_turned ^= turned_groups(pairs, np.where(wants_one, -weight, weight), group)
+        ends = group[pairs].astype(np.int32)
+        is_turned ^= turned_groups(ends, np.where(wants_one, -weight, weight), np.bincount(group))[group]
         contradicts = (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]]) != runs_alike
     return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts]
 
@@ -91,40 +93,6 @@ def _folds(P: FloatArray, F: IntArray, pairs: IntArray, runs_alike: BoolArray) -
     """Cosine (k,) of the angle between neighbours around their edge: -1 where they are flat, 1 where they fold back."""
     normal = igl.per_face_normals(P, F, np.zeros(3))
     return np.asarray(np.einsum("kx,kx->k", normal[pairs[:, 0]], normal[pairs[:, 1]]) * np.where(runs_alike, 1, -1))
-
-
-def turned_groups(pairs: IntArray, weight: FloatArray, group: IntArray) -> BoolArray:
-    """Which elements (m,) to turn, for pairs (k, 2) with weights that are negative if just one of them should be.
-
-    Elements of one of the groups (m,), counted from 0, are turned alike. Groups are joined as in `oriented`.
-    """
-    is_turned, size, (a, b) = np.zeros(len(group), bool), np.bincount(group), group[pairs].T
-    # Of equal shares, an arbitrary order: with that of the numbers, groups would be joined one after the other.
-    order = 1 + 1e-6 * (np.arange(len(pairs)) * 7919 % 1009)
-    while True:
-        n, between = len(size), a != b
-        # All pairs between the same two groups are one, with the sum of their weights.
-        ends, which = np.unique((np.minimum(a, b) * n + np.maximum(a, b))[between], return_inverse=True)
-        a, b, weight = ends // n, ends % n, np.bincount(which, weight[between]).astype(np.float64)
-        share = np.abs(weight) / (size[a] + size[b]) * order[: len(a)]
-        most, to, turns = np.zeros(n), np.arange(n), np.zeros(n, bool)
-        for end in (a, b):
-            np.maximum.at(most, end, share)
-        # The strongest join of each group, if it is to a larger one, or with equal sizes to one of a lower number.
-        b_joins = size[a] >= size[b]
-        smaller, larger = np.where(b_joins, b, a), np.where(b_joins, a, b)
-        joins = (share > 0) & (share == most[smaller])
-        if not joins.any():
-            return is_turned
-        to[smaller[joins]] = larger[joins]
-        turns[smaller[joins]] = (weight < 0)[joins]
-        while (to[to] != to).any():
-            to, turns = to[to], turns ^ turns[to]
-        is_turned ^= turns[group]
-        weight = np.where(turns[a] != turns[b], -weight, weight)
-        to = (np.cumsum(to == np.arange(n)) - 1)[to]
-        group, size = to[group], np.bincount(to, size).astype(np.int64)
-        a, b = to[a], to[b]
 
 
 def is_oriented_manifold(surface: Mesh) -> bool:

@@ -1,0 +1,100 @@
+"""Groups of triangles or points, joined two at a time in the relative orientation that their pairs want."""
+
+import cython
+import numpy as np
+from cython.cimports.libc.math import fabs
+
+
+def turned_groups(
+    pairs: cython.const[cython.int][:, ::1],
+    weights: cython.const[cython.double][::1],
+    sizes: cython.const[cython.longlong][::1],
+):
+    """Which of n groups to turn, for pairs of groups with weights that are negative if just one of both should be.
+
+    The weights of all pairs between two groups add up. In a round each group is joined to the one to which its join is
+    strongest for the sizes of both, if that is larger, or of the same size and a lower number, until nothing is joined.
+
+    Parameters
+    ----------
+    pairs : (k, 2) int32
+    weights : (k,) float64
+    sizes : (n,) int64
+
+    Returns
+    -------
+    (n,) bool
+    """
+    n: cython.Py_ssize_t = sizes.shape[0]
+    k: cython.Py_ssize_t = pairs.shape[0]
+    turned = np.zeros(n, np.bool_)
+    turns: cython.uchar[::1] = turned.view(np.uint8)
+    # The group to which each was joined, itself at first, and whether one of the two is turned in `turns`.
+    root: cython.int[::1] = np.arange(n, dtype=np.int32)
+    ends: cython.int[:, ::1] = np.array(pairs)
+    weight: cython.double[::1] = np.array(weights)
+    size: cython.longlong[::1] = np.array(sizes)
+    # Linked lists of the ends 2 e + d of the pairs of each group.
+    head: cython.int[::1] = np.empty(n, np.int32)
+    link: cython.int[::1] = np.empty(2 * k, np.int32)
+    total: cython.double[::1] = np.zeros(n)
+    is_joined: cython.bint = True
+    with cython.nogil:
+        while is_joined:
+            kept: cython.Py_ssize_t = 0
+            head[:] = -1
+            for e in range(k):
+                a: cython.int = ends[e, 0]
+                b: cython.int = ends[e, 1]
+                if root[a] != root[b]:
+                    weight[kept] = -weight[e] if turns[a] != turns[b] else weight[e]
+                    ends[kept, 0], ends[kept, 1] = root[a], root[b]
+                    for d in range(2):
+                        link[2 * kept + d], head[ends[kept, d]] = head[ends[kept, d]], 2 * kept + d
+                    kept += 1
+            k, is_joined = kept, False
+            for g in range(n):
+                if head[g] >= 0:
+                    is_joined |= _join(g, ends, weight, size, head, link, total, root, turns)
+            for g in range(n):
+                while root[root[g]] != root[g]:
+                    turns[g], root[g] = turns[g] ^ turns[root[g]], root[root[g]]
+                if root[g] != g:
+                    size[root[g]], size[g] = size[root[g]] + size[g], 0
+    return turned
+
+
+@cython.cfunc
+@cython.nogil
+def _join(
+    g: cython.Py_ssize_t,
+    ends: cython.int[:, ::1],
+    weight: cython.double[::1],
+    size: cython.longlong[::1],
+    head: cython.int[::1],
+    link: cython.int[::1],
+    total: cython.double[::1],
+    root: cython.int[::1],
+    turns: cython.uchar[::1],
+) -> cython.bint:
+    """Join group g to the one to which its join is strongest, if that is larger; whether it is. `total` stays 0."""
+    strongest: cython.double = 0.0
+    to: cython.int = -1
+    at: cython.int = head[g]
+    while at >= 0:
+        total[ends[at // 2, 1 - at % 2]] += weight[at // 2]
+        at = link[at]
+    at = head[g]
+    while at >= 0:
+        other: cython.int = ends[at // 2, 1 - at % 2]
+        # Of equal joins, an arbitrary order: with that of the numbers, groups would be joined one after the other.
+        share: cython.double = fabs(total[other]) / (size[g] + size[other]) * (1.0 + 1e-6 * ((g + other) * 7919 % 1009))
+        if share > strongest:
+            strongest, to, turns[g] = share, other, total[other] < 0.0
+        total[other] = 0.0
+        at = link[at]
+    if to >= 0 and (size[to] > size[g] or (size[to] == size[g] and to < g)):
+        root[g] = to
+        return True
+    turns[g] = 0
+    return False
