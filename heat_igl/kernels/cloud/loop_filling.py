@@ -9,26 +9,24 @@ from cython.cimports.libc.math import INFINITY, sqrt
 
 def torn_points(
     F: cython.const[cython.int][:, ::1],
+    first: cython.const[cython.int][::1],
+    incident: cython.const[cython.int][::1],
     nearest: cython.const[cython.int][:, ::1],
     is_part: cython.const[cython.uchar][::1],
     edges_away: cython.Py_ssize_t,
 ):
     """The first points of those rows of `nearest` (k, j) of which another point is more than `edges_away` edges away.
 
-    Next to another sheet, thin parts are torn there. Other points outside all parts (`is_part` (n,)) are ignored.
+    Next to another sheet, thin parts are torn there. Other points outside all parts (`is_part` (n,)) are ignored. The
+    corners of triangles F (m, 3) at each point are those that `corners_by_vertex` has.
     """
     n: cython.Py_ssize_t = is_part.shape[0]
     torn = np.zeros(nearest.shape[0], np.bool_)
     is_torn: cython.uchar[::1] = torn.view(np.uint8)
-    # Linked lists of the corners at each point, and the last row whose search reached the point.
-    head: cython.int[::1] = np.full(n, -1, np.int32)
-    following: cython.int[:, ::1] = np.empty((F.shape[0], 3), np.int32)
+    # The last row whose search reached each point, and the points that the search of this row reached.
     row_of: cython.int[::1] = np.full(n, -1, np.int32)
-    reached: cython.int[::1] = np.empty(n, np.int32)
+    reached: cython.int[::1] = np.empty(n + 1, np.int32)
     with cython.nogil:
-        for f in range(F.shape[0]):
-            for c in range(3):
-                following[f, c], head[F[f, c]] = head[F[f, c]], 3 * f + c
         for row in range(nearest.shape[0]):
             reached[0], row_of[nearest[row, 0]] = nearest[row, 0], row
             begin: cython.Py_ssize_t = 0
@@ -41,14 +39,13 @@ def torn_points(
                     break
                 last: cython.Py_ssize_t = end
                 for at in range(begin, last):
-                    corner: cython.int = head[reached[at]]
-                    while corner >= 0:
+                    for place in range(first[reached[at]], first[reached[at] + 1]):
                         for c in range(3):
-                            v: cython.int = F[corner // 3, c]
-                            if row_of[v] != row:
-                                reached[end], row_of[v] = v, row
-                                end += 1
-                        corner = following[corner // 3, corner % 3]
+                            v: cython.int = F[incident[place] // 3, c]
+                            # Without a branch: either is true at random.
+                            reached[end] = v
+                            end += row_of[v] != row
+                            row_of[v] = row
                 begin = last
     return np.asarray(nearest)[torn, 0]
 
