@@ -18,7 +18,7 @@ from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles, torn_points
 from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import corners_by_vertex
-from heat_igl.mesh.connectivity import Groups, ascending_rows, connected_components, fans
+from heat_igl.mesh.connectivity import Groups, connected_components, fans
 from heat_igl.mesh.neighbourhoods import K, Neighbourhoods, PointTree, by_rows
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -54,14 +54,11 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) ->
 
     Neighbours with opposite normals are left out where the normals tell sheets apart, which `has_side` (n,) says.
     """
-    agreed, others, is_settled = _triangles_of_stars(P, near, np.where(has_side, _OTHER_SHEET, -2.0))
-    # Around a settled point nothing is left to do.
-    is_open = ~at_all_corners(is_settled, agreed)
-    F, candidates = agreed[is_open], others[~at_some_corner(is_settled, others)]
+    settled, agreed, others = _triangles_of_stars(P, near, np.where(has_side, _OTHER_SHEET, -2.0))
     # The angle of a corner is the same number in every star that has the triangle.
-    both = np.concatenate([F, candidates])
-    F = both[fitting_triangles(P, near.axes, both, len(F))]
-    return np.concatenate([agreed[~is_open], F])
+    both = np.concatenate([agreed, others])
+    fits = fitting_triangles(P, near.axes, both, len(agreed))
+    return np.concatenate([settled, both.compress(fits, axis=0)])
 
 
 def with_gaps_closed(
@@ -86,7 +83,7 @@ def with_gaps_closed(
     size = np.bincount(part)
     is_apart, is_part = part != np.argmax(size), (size > K)[part]
     # Stars are flat: there is more only where triangles came after them.
-    is_doubtful = is_gap & (_angles(P, F[at_some_corner(is_gap, F)]) > _CROWDED)
+    is_doubtful = is_gap & (_angles(P, F.compress(at_some_corner(is_gap, F), axis=0)) > _CROWDED)
     at_gap = np.flatnonzero(is_gap & is_part & (near.index[:, -1] < 0))
     nearest = tree.neighbours[0][at_gap, : _NEAREST + 1]
     is_doubtful[torn_points(F, *corners_by_vertex(F, len(P)), nearest, is_part, _EDGES_AWAY)] = True
@@ -110,10 +107,11 @@ def _angles(P: FloatArray, F: IntArray) -> FloatArray:
 
 def _triangles_of_stars(
     P: FloatArray, near: Neighbourhoods, least_cosine: FloatArray
-) -> tuple[IntArray, IntArray, BoolArray]:
+) -> tuple[IntArray, IntArray, IntArray]:
     """The triangles (m, 3) int32 in three Delaunay stars, and those in two or one, in the order that they are taken.
 
-    Also returns which points (n,) are settled: all around them there are triangles in three stars.
+    Of a settled point, around which all triangles are in three stars, nothing is left to do: first come the triangles
+    that have settled corners alone, then others in three stars. Those in fewer stars have no settled corner.
     """
     largest = _LARGEST_RADIUS * _to_full(near) * near.radius
     corners, sizes, is_closed = by_rows(
@@ -123,11 +121,16 @@ def _triangles_of_stars(
     count, radius, is_settled = by_rows(
         lambda rows: agreement(P, first, corners, is_closed, rows.start, rows.stop), len(P)
     )
-    others = np.flatnonzero((count == 1) | (count == 2))
-    rows = ascending_rows(corners[others])
+    is_settled = is_settled.astype(bool)
+    agreed = corners.compress(count == 3, axis=0)
+    is_done = at_all_corners(is_settled, agreed)
+    others = []
     # Those in more stars first, then those with smaller circles.
-    order = np.lexsort((*rows.T[::-1], radius[others], 3 - count[others]))
-    return corners[count == 3], rows[order], is_settled.astype(bool)
+    for n_stars in (2, 1):
+        rows = np.flatnonzero(count == n_stars)
+        rows = rows[at_all_corners(~is_settled, corners.take(rows, axis=0))]
+        others.append(corners.take(rows[np.argsort(radius[rows], kind="stable")], axis=0))
+    return agreed.compress(is_done, axis=0), agreed.compress(~is_done, axis=0), np.concatenate(others)
 
 
 def _with_small_parts(tree: PointTree, F: IntArray, part: IntArray, size: IntArray) -> IntArray:
@@ -141,10 +144,12 @@ def _with_small_parts(tree: PointTree, F: IntArray, part: IntArray, size: IntArr
     is_small = size <= K
     is_small[np.argmax(size)] = False
     is_other, is_inserted = is_small[part], np.zeros(len(size), bool)
+    if not is_other.any():
+        return F
     is_near = np.zeros(len(P), bool)
     is_near[index[is_other]] = True
     is_around = at_some_corner(is_near, F)
-    inside, F = F[~is_around], F[is_around]
+    inside, F = F.compress(~is_around, axis=0), F.compress(is_around, axis=0)
     while is_other.any():
         points = np.flatnonzero(is_other)
         beside, distance = _nearest_of(tree, points, ~is_other)
@@ -183,7 +188,7 @@ def _nearest_of(tree: PointTree, points: IntArray, is_kept: BoolArray) -> tuple[
 def at_all_corners(is_chosen: BoolArray, F: IntArray) -> BoolArray:
     """Which of the triangles F (m, 3) have chosen corners alone; by columns, in a fifth of the time of rows."""
     a, b, c = F.T
-    return np.asarray(is_chosen[a] & is_chosen[b] & is_chosen[c])
+    return np.asarray(is_chosen.take(a) & is_chosen.take(b) & is_chosen.take(c))
 
 
 def at_some_corner(is_chosen: BoolArray, F: IntArray) -> BoolArray:
@@ -235,11 +240,12 @@ def _with_largest_fans(F: IntArray, is_gap: BoolArray) -> IntArray:
     n, inside = len(is_gap), F[:0]
     while True:
         is_around = at_some_corner(is_gap, F)
-        inside, around = np.concatenate([inside, F[~is_around]]), F[is_around]
+        inside, around = np.concatenate([inside, F.compress(~is_around, axis=0)]), F.compress(is_around, axis=0)
         fan, vertex = fans(around, n)
-        size, largest = np.bincount(fan), np.empty(n, np.int64)
+        size, most, largest = np.bincount(fan), np.zeros(n, np.int64), np.empty(n, np.int64)
+        np.maximum.at(most, vertex, size)
         # Of several values written to one place, the last stays.
-        order = np.lexsort((-np.arange(len(size)), size))
+        order = np.flatnonzero(size == most[vertex])[::-1]
         largest[vertex[order]] = order
         stays = ((fan == largest[around.ravel()]) | ~is_gap[around.ravel()]).reshape(-1, 3).all(axis=1)
         if not stays.all():

@@ -121,7 +121,8 @@ def _average(
     share: cython.float[:, ::1],
     normal: cython.double[::1],
 ) -> cython.void:
-    """The mean direction on the side of the largest ball."""
+    """The mean direction on the side of the largest ball; `share` gets the fourth powers."""
+    mean: cython.float[12]
     best: cython.Py_ssize_t = 0
     of_best: cython.Py_ssize_t = 0
     for side in range(2):
@@ -134,16 +135,29 @@ def _average(
         for a in range(share.shape[1]):
             share[side, a] = share[side, a] * share[side, a] * share[side, a] * share[side, a]
     for _ in range(ROUNDS):
-        mx: cython.double = 0.0
-        my: cython.double = 0.0
-        mz: cython.double = 0.0
-        for a in range(share.shape[1]):
-            weight: cython.double = directions[0, a] * normal[0] + directions[1, a] * normal[1]
-            weight += directions[2, a] * normal[2]
-            weight *= share[weight <= 0.0, a]
-            mx, my, mz = mx + weight * directions[0, a], my + weight * directions[1, a], mz + weight * directions[2, a]
-        size: cython.double = sqrt(mx * mx + my * my + mz * mz)
-        normal[0], normal[1], normal[2] = mx / size, my / size, mz / size
+        nx: cython.float = cython.cast(cython.float, normal[0])
+        ny: cython.float = cython.cast(cython.float, normal[1])
+        nz: cython.float = cython.cast(cython.float, normal[2])
+        for a in range(3 * LANES):
+            mean[a] = 0.0
+        for block in range(share.shape[1] // LANES):
+            for lane in range(LANES):
+                at: cython.Py_ssize_t = LANES * block + lane
+                weight: cython.float = directions[0, at] * nx + directions[1, at] * ny + directions[2, at] * nz
+                ahead: cython.float = share[0, at]
+                behind: cython.float = share[1, at]
+                weight *= ahead if weight > 0.0 else behind
+                mean[lane] += weight * directions[0, at]
+                mean[LANES + lane] += weight * directions[1, at]
+                mean[2 * LANES + lane] += weight * directions[2, at]
+        square: cython.double = 0.0
+        for x in range(3):
+            normal[x] = 0.0
+            for lane in range(LANES):
+                normal[x] += mean[LANES * x + lane]
+            square += normal[x] * normal[x]
+        for x in range(3):
+            normal[x] /= sqrt(square)
 
 
 def on_one_side(
@@ -180,17 +194,19 @@ def on_one_side(
     found, distances = np.full((index.shape[0], index.shape[1]), -1, np.int32), np.empty(index.shape[0])
     kept: cython.int[:, ::1] = found
     radius: cython.double[::1] = distances
+    centre: cython.double[:, :, ::1] = np.empty((normals.shape[0], 2, 3))
     with cython.nogil:
+        for i in range(number.shape[0]):
+            if number[i] >= 0:
+                for x in range(3):
+                    centre[number[i], 0, x] = P[i, x] + radii[number[i], 0] * normals[number[i], x]
+                    centre[number[i], 1, x] = P[i, x] - radii[number[i], 1] * normals[number[i], x]
         for row in range(index.shape[0]):
             at: cython.int = index[row, 0]
             size: cython.Py_ssize_t = 0
             for j in range(index.shape[1]):
                 other: cython.int = index[row, j]
-                if (
-                    j == 0
-                    or number[other] < 0
-                    or _sees_the_same(P, at, other, number[at], number[other], normals, radii)
-                ):
+                if j == 0 or number[other] < 0 or _sees_the_same(number[at], number[other], normals, radii, centre):
                     kept[row, size] = other
                     size += 1
             if size < 4:
@@ -207,28 +223,20 @@ def on_one_side(
 @cython.inline
 @cython.nogil
 def _sees_the_same(
-    P: cython.const[cython.double][:, ::1],
     i: cython.Py_ssize_t,
     j: cython.Py_ssize_t,
-    of_i: cython.Py_ssize_t,
-    of_j: cython.Py_ssize_t,
     normals: cython.const[cython.double][:, ::1],
     radii: cython.const[cython.double][:, ::1],
+    centre: cython.double[:, :, ::1],
 ) -> cython.bint:
-    alike: cython.double = 0.0
-    for x in range(3):
-        alike += normals[of_i, x] * normals[of_j, x]
-    # The side of j that is on the side of i towards which the normal of i points.
-    other: cython.Py_ssize_t = 0 if alike >= 0.0 else 1
+    alike: cython.double = normals[i, 0] * normals[j, 0] + normals[i, 1] * normals[j, 1] + normals[i, 2] * normals[j, 2]
     for side in range(2):
-        a: cython.double = radii[of_i, side] if side == 0 else -radii[of_i, side]
-        of_side: cython.Py_ssize_t = side if other == 0 else 1 - side
-        b: cython.double = radii[of_j, of_side] if of_side == 0 else -radii[of_j, of_side]
-        apart: cython.double = 0.0
-        for x in range(3):
-            between: cython.double = (P[j, x] + b * normals[of_j, x]) - (P[i, x] + a * normals[of_i, x])
-            apart += between * between
+        # The side of j that is on the side of i towards which the normal of i points, or the other.
+        other: cython.Py_ssize_t = side if alike >= 0.0 else 1 - side
+        x: cython.double = centre[j, other, 0] - centre[i, side, 0]
+        y: cython.double = centre[j, other, 1] - centre[i, side, 1]
+        z: cython.double = centre[j, other, 2] - centre[i, side, 2]
         # The angle between two spheres, by the law of cosines.
-        if apart < a * a + b * b:
+        if x * x + y * y + z * z < radii[i, side] * radii[i, side] + radii[j, other] * radii[j, other]:
             return True
     return False
