@@ -129,16 +129,18 @@ class PointCloud:
     @cached_property
     def _distinct(self) -> tuple[IntArray, IntArray]:
         """The points (k,) that are no copy of an earlier one, and which of them each of the n points equals."""
-        P = self.P
+        P, original = self.P, np.arange(len(self.P))
         # Copies have the same sum, whatever the factors.
-        total = np.sort(P[:, 0] + np.sqrt(2) * P[:, 1] + np.sqrt(3) * P[:, 2])
-        if (total[1:] > total[:-1]).all():
-            return np.arange(len(P)), np.arange(len(P))
-        order = np.lexsort(P.T)
-        is_new = np.ones(len(P), bool)
-        is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
+        total = P[:, 0] + np.sqrt(2) * P[:, 1] + np.sqrt(3) * P[:, 2]
+        ascending = np.sort(total)
+        again = ascending[1:][ascending[1:] == ascending[:-1]]
+        if not len(again):
+            return original, original
+        order = np.flatnonzero(np.isin(total, again))
         # The sort is stable: the first of equal points has the smallest index.
-        original = np.empty(len(P), np.int64)
+        order = order[np.lexsort(P[order].T)]
+        is_new = np.ones(len(order), bool)
+        is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
         original[order] = order[is_new][np.cumsum(is_new) - 1]
         return np.unique(original, return_inverse=True)
 
