@@ -85,8 +85,7 @@ def with_gaps_closed(
     # Stars are flat: there is more only where triangles came after them.
     is_doubtful = is_gap & (_angles(P, F.compress(at_some_corner(is_gap, F), axis=0)) > _CROWDED)
     at_gap = np.flatnonzero(is_gap & is_part & (near.index[:, -1] < 0))
-    nearest = tree.neighbours[0][at_gap, : _NEAREST + 1]
-    is_doubtful[torn_points(F, *corners_by_vertex(F, len(P)), nearest, is_part, _EDGES_AWAY)] = True
+    is_doubtful[torn_points(F, tree.neighbours[0][at_gap, : _NEAREST + 1], is_part, _EDGES_AWAY)] = True
     others = np.flatnonzero(is_apart & is_part)
     beside, distance = _nearest_of(tree, others, ~is_apart)
     is_other_sheet = np.einsum("kx,kx->k", *near.axes[[others, beside], 2]) < _OTHER_SHEET

@@ -6,23 +6,25 @@ from cython.cimports.heat_igl.kernels.cloud.agreeing import circumradius
 from cython.cimports.heat_igl.kernels.cloud.loop_filling import BEYOND, POINT
 from cython.cimports.libc.math import INFINITY, sqrt
 
+from heat_igl.kernels.mesh.incidence import corners_by_vertex
+
 
 def torn_points(
     F: cython.const[cython.int][:, ::1],
-    first: cython.const[cython.int][::1],
-    incident: cython.const[cython.int][::1],
     nearest: cython.const[cython.int][:, ::1],
     is_part: cython.const[cython.uchar][::1],
     edges_away: cython.Py_ssize_t,
 ):
     """The first points of those rows of `nearest` (k, j) of which another point is more than `edges_away` edges away.
 
-    Next to another sheet, thin parts are torn there. Other points outside all parts (`is_part` (n,)) are ignored. The
-    corners of triangles F (m, 3) at each point are those that `corners_by_vertex` has.
+    Next to another sheet, thin parts are torn there. Other points outside all parts (`is_part` (n,)) are ignored.
     """
     n: cython.Py_ssize_t = is_part.shape[0]
     torn = np.zeros(nearest.shape[0], np.bool_)
     is_torn: cython.uchar[::1] = torn.view(np.uint8)
+    corners_at = corners_by_vertex(F, n)
+    first: cython.const[cython.int][::1] = corners_at[0]
+    incident: cython.const[cython.int][::1] = corners_at[1]
     # The last row whose search reached each point, and the points that the search of this row reached.
     row_of: cython.int[::1] = np.full(n, -1, np.int32)
     reached: cython.int[::1] = np.empty(n + 1, np.int32)
