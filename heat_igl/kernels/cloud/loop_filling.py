@@ -90,318 +90,293 @@ def filling_triangles(
     is_whole : (t,) bool
         Whether the triangle is in a loop that was filled completely, and joins no fans.
     """
+    gaps = _Gaps()
+    gaps.P, gaps.F, gaps.twin, gaps.is_gap, gaps.largest = P, F, twin, is_gap, largest
+    gaps.most_bent, gaps.most_folded = most_bent, most_folded
     n_sides: cython.Py_ssize_t = twin.shape[0]
     k: cython.Py_ssize_t = np.count_nonzero(np.asarray(twin) < 0)
     found, whole = np.empty((k, 3), np.int32), np.empty(k, np.bool_)
-    is_whole: cython.uchar[::1] = whole.view(np.uint8)
-    triangles: cython.int[:, ::1] = found
-    # The end at which a loop continues after end 2 h + d of the boundary side h (d = 0 at its tail); -1 if nowhere.
-    partner: cython.int[::1] = np.full(2 * n_sides, -1, np.int32)
-    # The number of fans at each point minus one, decreased by each triangle between two fans.
-    joints: cython.int[::1] = np.zeros(P.shape[0], np.int32)
-    seen: cython.uchar[::1] = np.zeros(n_sides, np.uint8)
-    ring: cython.int[:, ::1] = np.empty((2, k), np.int32)
-    fans: cython.int[:, ::1] = np.empty((3, k), np.int32)
-    cost: cython.double[::1] = np.empty(k)
-    # Linked lists of the edges, each at the end with the lower index.
-    head: cython.int[::1] = np.full(P.shape[0], -1, np.int32)
-    link: cython.int[:, ::1] = np.empty((n_sides + k, 2), np.int32)
-    count: cython.Py_ssize_t = 0
+    gaps.triangles, gaps.is_whole, gaps.count = found, whole.view(np.uint8), 0
+    gaps.partner, gaps.seen = np.full(2 * n_sides, -1, np.int32), np.zeros(n_sides, np.uint8)
+    gaps.joints, gaps.head = np.zeros(P.shape[0], np.int32), np.full(P.shape[0], -1, np.int32)
+    gaps.ring, gaps.fans, gaps.cost = np.empty((2, k), np.int32), np.empty((3, k), np.int32), np.empty(k)
+    gaps.link = np.empty((n_sides + k, 2), np.int32)
     with cython.nogil:
-        _find_loops(P, F, twin, is_gap, partner, joints, head, link, fans)
-        for h in range(n_sides):
-            if twin[h] < h and is_gap[_at_end(F, 2 * h)] and is_gap[_at_end(F, 2 * h + 1)]:
-                _enter(head, link, h, _at_end(F, 2 * h), _at_end(F, 2 * h + 1))
-        for h in range(n_sides):
-            if partner[2 * h] >= 0 and not seen[h]:
-                size: cython.Py_ssize_t = _loop(h, F, partner, seen, ring)
+        gaps.find_loops()
+        gaps.fill_all()
+    return found[: gaps.count], whole[: gaps.count]
+
+
+@cython.final
+@cython.cclass
+class _Gaps:
+    """Arrays that `filling_triangles` reads and writes; the first `count` of its `triangles` are found.
+
+    `partner` (2 s,) is the end at which a loop continues after end 2 h + d of the boundary side h (d = 0 at its tail);
+    -1 if nowhere. `joints` (n,) is the number of fans at each point minus one, decreased by each triangle between two
+    fans. Edges are in linked lists from `head` (n,) on, each at the end with the lower index.
+    """
+
+    P: cython.const[cython.double][:, ::1]
+    F: cython.const[cython.int][:, ::1]
+    twin: cython.const[cython.int][::1]
+    is_gap: cython.const[cython.uchar][::1]
+    largest: cython.const[cython.double][::1]
+    most_bent: cython.double
+    most_folded: cython.double
+    triangles: cython.int[:, ::1]
+    is_whole: cython.uchar[::1]
+    count: cython.Py_ssize_t
+    partner: cython.int[::1]
+    joints: cython.int[::1]
+    seen: cython.uchar[::1]
+    ring: cython.int[:, ::1]
+    fans: cython.int[:, ::1]
+    cost: cython.double[::1]
+    head: cython.int[::1]
+    link: cython.int[:, ::1]
+
+    @cython.cfunc
+    @cython.nogil
+    def fill_all(self) -> cython.void:
+        """Fill all loops."""
+        for h in range(self.twin.shape[0]):
+            tail: cython.int = self.at_end(2 * h)
+            end: cython.int = self.at_end(2 * h + 1)
+            if self.twin[h] < h and self.is_gap[tail] and self.is_gap[end]:
+                self.enter(h, tail, end)
+        for h in range(self.twin.shape[0]):
+            if self.partner[2 * h] >= 0 and not self.seen[h]:
+                size: cython.Py_ssize_t = self.loop(h)
                 if size >= 3:
-                    cut: cython.Py_ssize_t = _fill(
-                        P,
-                        ring,
-                        cost,
-                        size,
-                        joints,
-                        largest,
-                        head,
-                        link,
-                        n_sides + count,
-                        most_bent,
-                        most_folded,
-                        triangles[count:],
-                        is_whole[count:],
-                    )
-                    if cut < size - 2:
-                        is_whole[count : count + cut] = 0
-                    count += cut
-    return found[:count], whole[:count]
+                    begin: cython.Py_ssize_t = self.count
+                    self.fill(size)
+                    if self.count - begin < size - 2:
+                        self.is_whole[begin : self.count] = 0
 
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    def at_end(self, end: cython.Py_ssize_t) -> cython.int:
+        """The point at end 2 h + d of side h."""
+        h: cython.Py_ssize_t = end // 2
+        return self.F[h // 3, (h % 3 + 1 + end % 2) % 3]
 
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _at_end(F: cython.const[cython.int][:, ::1], end: cython.Py_ssize_t) -> cython.int:
-    """The point at end 2 h + d of side h."""
-    h: cython.Py_ssize_t = end // 2
-    return F[h // 3, (h % 3 + 1 + end % 2) % 3]
+    @cython.cfunc
+    @cython.nogil
+    def find_loops(self) -> cython.void:
+        """Find the partner of each end of a boundary side: in the same fan if its point has one fan, else in the next fan.
 
+        `joints` takes the number of further fans. `head` is restored.
+        """
+        for end in range(self.partner.shape[0]):
+            v: cython.int = self.at_end(end)
+            side: cython.int = end // 2
+            if self.twin[side] >= 0 or not (self.is_gap[v] and self.is_gap[self.at_end(end ^ 1)]):
+                continue
+            at: cython.int = end
+            while True:
+                # Go to the other side of the triangle at the same point, and to the same edge in the neighbour.
+                side = 3 * (at // 6) + (at // 2 % 3 + 2 - at % 2) % 3
+                at = 2 * side + 1 - at % 2
+                if self.twin[side] < 0:
+                    break
+                at = 2 * self.twin[side]
+                at += self.at_end(at) != v
+            self.partner[end] = at
+            if end % 2 == 0 and at % 2 == 1:
+                # An open fan, whose boundary runs through the point. The fans of a point are linked.
+                self.joints[v] += self.head[v] >= 0
+                self.link[end // 2, 0], self.head[v] = self.head[v], end
+        for v in range(self.head.shape[0]):
+            k: cython.Py_ssize_t = 0
+            while self.head[v] >= 0:
+                self.fans[0, k], self.fans[1, k], self.fans[2, k] = self.head[v], self.partner[self.head[v]], k
+                self.head[v] = self.link[self.head[v] // 2, 0]
+                k += 1
+            if k > 1:
+                self.in_one_round(k)
 
-@cython.cfunc
-@cython.nogil
-def _find_loops(
-    P: cython.const[cython.double][:, ::1],
-    F: cython.const[cython.int][:, ::1],
-    twin: cython.const[cython.int][::1],
-    is_gap: cython.const[cython.uchar][::1],
-    partner: cython.int[::1],
-    joints: cython.int[::1],
-    head: cython.int[::1],
-    link: cython.int[:, ::1],
-    fans: cython.int[:, ::1],
-) -> cython.void:
-    """Find the partner of each end of a boundary side: in the same fan if its point has one fan, else in the next fan.
+    @cython.cfunc
+    @cython.nogil
+    def in_one_round(self, k: cython.Py_ssize_t) -> cython.void:
+        """Join k fans of a point into one cycle by setting `partner`, the nearest ends first.
 
-    `joints` takes the number of further fans. `head` is restored.
-    """
-    for end in range(partner.shape[0]):
-        v: cython.int = _at_end(F, end)
-        side: cython.int = end // 2
-        if twin[side] >= 0 or not (is_gap[v] and is_gap[_at_end(F, end ^ 1)]):
-            continue
-        at: cython.int = end
-        while True:
-            # Go to the other side of the triangle at the same point, and to the same edge in the neighbour.
-            side = 3 * (at // 6) + (at // 2 % 3 + 2 - at % 2) % 3
-            at = 2 * side + 1 - at % 2
-            if twin[side] < 0:
-                break
-            at = 2 * twin[side]
-            at += _at_end(F, at) != v
-        partner[end] = at
-        if end % 2 == 0 and at % 2 == 1:
-            # An open fan, whose boundary runs through the point. The fans of a point are linked.
-            joints[v] += head[v] >= 0
-            link[end // 2, 0], head[v] = head[v], end
-    for v in range(head.shape[0]):
-        k: cython.Py_ssize_t = 0
-        while head[v] >= 0:
-            fans[0, k], fans[1, k], fans[2, k] = head[v], partner[head[v]], k
-            head[v] = link[head[v] // 2, 0]
-            k += 1
-        if k > 1:
-            _in_one_round(P, F, partner, fans, k)
+        Rows of `fans` are the two ends of each fan and the chain to which the fan belongs.
+        """
+        first: cython.Py_ssize_t = 0
+        second: cython.Py_ssize_t = 0
+        for left in range(k, 0, -1):
+            shortest: cython.double = INFINITY
+            for i in range(k):
+                for j in range(k):
+                    is_free: cython.bint = self.fans[0, i] >= 0 and self.fans[1, j] >= 0
+                    if is_free and (left == 1 or self.fans[2, i] != self.fans[2, j]):
+                        square: cython.double = self.square(
+                            self.at_end(self.fans[0, i] ^ 1), self.at_end(self.fans[1, j] ^ 1)
+                        )
+                        if square < shortest:
+                            shortest, first, second = square, i, j
+            self.partner[self.fans[0, first]] = self.fans[1, second]
+            self.partner[self.fans[1, second]] = self.fans[0, first]
+            self.fans[0, first] = self.fans[1, second] = -1
+            chain: cython.int = self.fans[2, second]
+            for i in range(k):
+                if self.fans[2, i] == chain:
+                    self.fans[2, i] = self.fans[2, first]
 
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    def square(self, a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.double:
+        """Squared distance of two points."""
+        x: cython.double = self.P[b, 0] - self.P[a, 0]
+        y: cython.double = self.P[b, 1] - self.P[a, 1]
+        z: cython.double = self.P[b, 2] - self.P[a, 2]
+        return x * x + y * y + z * z
 
-@cython.cfunc
-@cython.nogil
-def _in_one_round(
-    P: cython.const[cython.double][:, ::1],
-    F: cython.const[cython.int][:, ::1],
-    partner: cython.int[::1],
-    fans: cython.int[:, ::1],
-    k: cython.Py_ssize_t,
-) -> cython.void:
-    """Join k fans of a point into one cycle by setting `partner`, the nearest ends first.
+    @cython.cfunc
+    @cython.nogil
+    def loop(self, start: cython.Py_ssize_t) -> cython.Py_ssize_t:
+        """Collect the points of the loop from a boundary side on, and the opposite corners; how many, 0 if not closed.
 
-    Rows of `fans` are the two ends of each fan and the chain to which the fan belongs.
-    """
-    first: cython.Py_ssize_t = 0
-    second: cython.Py_ssize_t = 0
-    for left in range(k, 0, -1):
-        shortest: cython.double = INFINITY
-        for i in range(k):
-            for j in range(k):
-                is_free: cython.bint = fans[0, i] >= 0 and fans[1, j] >= 0
-                if is_free and (left == 1 or fans[2, i] != fans[2, j]):
-                    a: cython.int = _at_end(F, fans[0, i] ^ 1)
-                    b: cython.int = _at_end(F, fans[1, j] ^ 1)
-                    square: cython.double = 0.0
-                    for x in range(3):
-                        square += (P[a, x] - P[b, x]) * (P[a, x] - P[b, x])
-                    if square < shortest:
-                        shortest, first, second = square, i, j
-        partner[fans[0, first]], partner[fans[1, second]] = fans[1, second], fans[0, first]
-        fans[0, first] = fans[1, second] = -1
-        chain: cython.int = fans[2, second]
-        for i in range(k):
-            if fans[2, i] == chain:
-                fans[2, i] = fans[2, first]
+        The loop runs against the orientation of the first side's triangle, so new triangles are oriented like those
+        around.
+        """
+        size: cython.Py_ssize_t = 0
+        at: cython.Py_ssize_t = 2 * start + 1
+        while not self.seen[at // 2]:
+            h: cython.Py_ssize_t = at // 2
+            self.seen[h] = 1
+            self.ring[POINT, size], self.ring[BEYOND, size] = self.at_end(at), self.F[h // 3, h % 3]
+            size += 1
+            at = self.partner[at ^ 1]
+        return size if at == 2 * start + 1 else 0
 
+    @cython.cfunc
+    @cython.nogil
+    def fill(self, size: cython.Py_ssize_t) -> cython.void:
+        """Clip admissible ears from a ring of points. The third side of each is added as an edge."""
+        flat: cython.Py_ssize_t = -1
+        self.measure(size, flat)
+        while size > 2:
+            best: cython.Py_ssize_t = 0
+            for i in range(1, size):
+                if self.cost[i] < self.cost[best]:
+                    best = i
+            if self.cost[best] == INFINITY:
+                if flat >= 0:
+                    # The folded ears do not close the loop: remove them and their edges.
+                    while self.count > flat:
+                        self.count -= 1
+                        a: cython.int = min(self.triangles[self.count, 0], self.triangles[self.count, 2])
+                        self.head[a] = self.link[self.twin.shape[0] + self.count, 1]
+                    return
+                flat = self.count
+                self.measure(size, flat)
+                continue
+            before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
+            after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
+            point: cython.int = self.ring[POINT, best]
+            # Since its cost was computed, its third side may have become an edge, or all fans there may have been
+            # joined.
+            is_edge: cython.bint = size > 3 and self.is_edge(self.ring[POINT, before], self.ring[POINT, after])
+            if is_edge or (self.cost[best] < 0.0 and self.joints[point] == 0):
+                self.cost[best] = self.ear(size, best, flat)
+                continue
+            self.is_whole[self.count] = self.cost[best] >= 0.0
+            self.joints[point] -= self.joints[point] > 0
+            self.triangles[self.count, 0], self.triangles[self.count, 1] = self.ring[POINT, before], point
+            self.triangles[self.count, 2] = self.ring[POINT, after]
+            self.enter(self.twin.shape[0] + self.count, self.ring[POINT, before], self.ring[POINT, after])
+            self.count += 1
+            self.ring[BEYOND, before] = point
+            size -= 1
+            for i in range(best, size):
+                self.ring[POINT, i], self.ring[BEYOND, i] = self.ring[POINT, i + 1], self.ring[BEYOND, i + 1]
+                self.cost[i] = self.cost[i + 1]
+            # The ears of the two neighbours have changed.
+            for i in range(best - 1, best + 1):
+                j: cython.Py_ssize_t = (i + size) % size
+                self.cost[j] = self.ear(size, j, flat)
+            if size == 3:  # one triangle is left
+                self.cost[0] = self.cost[1] = self.cost[2] = self.ear(size, 0, flat)
 
-@cython.cfunc
-@cython.nogil
-def _loop(
-    start: cython.Py_ssize_t,
-    F: cython.const[cython.int][:, ::1],
-    partner: cython.int[::1],
-    seen: cython.uchar[::1],
-    ring: cython.int[:, ::1],
-) -> cython.Py_ssize_t:
-    """Collect the points of the loop from a boundary side on, and the opposite corners; their number, 0 if not closed.
+    @cython.cfunc
+    @cython.nogil
+    def measure(self, size: cython.Py_ssize_t, flat: cython.Py_ssize_t) -> cython.void:
+        """The cost of all ears of a ring."""
+        for i in range(size):
+            self.cost[i] = self.ear(size, i, flat)
 
-    The loop runs against the orientation of the first side's triangle, so new triangles are oriented like those around.
-    """
-    size: cython.Py_ssize_t = 0
-    at: cython.Py_ssize_t = 2 * start + 1
-    while not seen[at // 2]:
-        h: cython.Py_ssize_t = at // 2
-        seen[h] = 1
-        ring[POINT, size], ring[BEYOND, size] = _at_end(F, at), F[h // 3, h % 3]
-        size += 1
-        at = partner[at ^ 1]
-    return size if at == 2 * start + 1 else 0
+    @cython.cfunc
+    @cython.nogil
+    def ear(self, size: cython.Py_ssize_t, i: cython.Py_ssize_t, flat: cython.Py_ssize_t) -> cython.double:
+        """Circumradius of the ear at point i of a ring; infinite if the ear is not admissible.
 
+        Negative if the ear joins two fans: minus the inverse square of the third side, so shorter sides come first. As
+        long as `flat` is negative, the loop may stay open.
+        """
+        before: cython.Py_ssize_t = size - 1 if i == 0 else i - 1
+        after: cython.Py_ssize_t = 0 if i == size - 1 else i + 1
+        a: cython.int = self.ring[POINT, before]
+        b: cython.int = self.ring[POINT, i]
+        c: cython.int = self.ring[POINT, after]
+        if a in (b, c) or b == c or (size > 3 and self.is_edge(a, c)):
+            return INFINITY
+        square: cython.double = self.square(a, c)
+        if self.joints[b] > 0:
+            return -1.0 / square if square > 0.0 else -INFINITY
+        radius: cython.double = circumradius(self.P, a, b, c)
+        most: cython.double = min(self.largest[a], min(self.largest[b], self.largest[c]))
+        # The last triangle adds no edge, and closes the gap even if its corners are collinear.
+        if size > 3 and (radius >= most or (flat < 0 and square > most * most)):
+            return INFINITY
+        folded: cython.double = max(
+            self.fold(a, b, c, self.ring[BEYOND, before]), self.fold(b, c, a, self.ring[BEYOND, i])
+        )
+        if size == 3:
+            folded = max(folded, self.fold(c, a, b, self.ring[BEYOND, after]))
+        return INFINITY if folded > (self.most_bent if flat < 0 else self.most_folded) else radius
 
-@cython.cfunc
-@cython.nogil
-def _fill(
-    P: cython.const[cython.double][:, ::1],
-    ring: cython.int[:, ::1],
-    cost: cython.double[::1],
-    size: cython.Py_ssize_t,
-    joints: cython.int[::1],
-    largest: cython.const[cython.double][::1],
-    head: cython.int[::1],
-    link: cython.int[:, ::1],
-    n_edges: cython.Py_ssize_t,
-    most_bent: cython.double,
-    most_folded: cython.double,
-    triangles: cython.int[:, ::1],
-    is_whole: cython.uchar[::1],
-) -> cython.Py_ssize_t:
-    """Clip admissible ears from a ring of points; returns their number. The third side of each is added as an edge."""
-    count: cython.Py_ssize_t = 0
-    flat: cython.Py_ssize_t = -1
-    limit: cython.double = most_bent
-    for i in range(size):
-        cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit, flat)
-    while size > 2:
-        best: cython.Py_ssize_t = 0
-        for i in range(1, size):
-            if cost[i] < cost[best]:
-                best = i
-        if cost[best] == INFINITY:
-            if flat >= 0:
-                # The folded ears do not close the loop: remove them and their edges.
-                for i in range(count - 1, flat - 1, -1):
-                    head[min(triangles[i, 0], triangles[i, 2])] = link[n_edges + i, 1]
-                return flat
-            flat, limit = count, most_folded
-            for i in range(size):
-                cost[i] = _ear(P, ring, size, i, joints, largest, head, link, limit, flat)
-            continue
-        before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
-        after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
-        # Since its cost was computed, its third side may have become an edge, or all fans there may have been joined.
-        is_edge: cython.bint = size > 3 and _is_edge(head, link, ring[POINT, before], ring[POINT, after])
-        if is_edge or (cost[best] < 0.0 and joints[ring[POINT, best]] == 0):
-            cost[best] = _ear(P, ring, size, best, joints, largest, head, link, limit, flat)
-            continue
-        is_whole[count] = cost[best] >= 0.0
-        joints[ring[POINT, best]] -= joints[ring[POINT, best]] > 0
-        triangles[count, 0], triangles[count, 1] = ring[POINT, before], ring[POINT, best]
-        triangles[count, 2] = ring[POINT, after]
-        _enter(head, link, n_edges + count, ring[POINT, before], ring[POINT, after])
-        count += 1
-        ring[BEYOND, before] = ring[POINT, best]
-        size -= 1
-        for i in range(best, size):
-            ring[POINT, i], ring[BEYOND, i], cost[i] = ring[POINT, i + 1], ring[BEYOND, i + 1], cost[i + 1]
-        # The ears of the two neighbours have changed.
-        for i in range(best - 1, best + 1):
-            j: cython.Py_ssize_t = (i + size) % size
-            cost[j] = _ear(P, ring, size, j, joints, largest, head, link, limit, flat)
-        if size == 3:  # one triangle is left
-            cost[0] = cost[1] = cost[2] = _ear(P, ring, size, 0, joints, largest, head, link, limit, flat)
-    return count
+    @cython.cfunc
+    @cython.nogil
+    def enter(self, e: cython.Py_ssize_t, a: cython.int, b: cython.int) -> cython.void:
+        """Add edge e to the lists."""
+        self.link[e, 0], self.link[e, 1] = max(a, b), self.head[min(a, b)]
+        self.head[min(a, b)] = cython.cast(cython.int, e)
 
+    @cython.cfunc
+    @cython.nogil
+    def is_edge(self, a: cython.int, b: cython.int) -> cython.bint:
+        """Whether two points are the ends of an edge."""
+        e: cython.int = self.head[min(a, b)]
+        while e >= 0 and self.link[e, 0] != max(a, b):
+            e = self.link[e, 1]
+        return e >= 0
 
-@cython.cfunc
-@cython.nogil
-def _ear(
-    P: cython.const[cython.double][:, ::1],
-    ring: cython.int[:, ::1],
-    size: cython.Py_ssize_t,
-    i: cython.Py_ssize_t,
-    joints: cython.int[::1],
-    largest: cython.const[cython.double][::1],
-    head: cython.int[::1],
-    link: cython.int[:, ::1],
-    most_folded: cython.double,
-    flat: cython.Py_ssize_t,
-) -> cython.double:
-    """Circumradius of the ear at point i of a ring; infinite if the ear is not admissible.
-
-    Negative if the ear joins two fans: minus the inverse square of the third side, so shorter sides come first. As long
-    as `flat` is negative, the loop may stay open.
-    """
-    before: cython.Py_ssize_t = size - 1 if i == 0 else i - 1
-    after: cython.Py_ssize_t = 0 if i == size - 1 else i + 1
-    a: cython.int = ring[POINT, before]
-    b: cython.int = ring[POINT, i]
-    c: cython.int = ring[POINT, after]
-    if a in (b, c) or b == c or (size > 3 and _is_edge(head, link, a, c)):
-        return INFINITY
-    square: cython.double = 0.0
-    for x in range(3):
-        square += (P[c, x] - P[a, x]) * (P[c, x] - P[a, x])
-    if joints[b] > 0:
-        return -1.0 / square if square > 0.0 else -INFINITY
-    radius: cython.double = circumradius(P, a, b, c)
-    most: cython.double = min(largest[a], min(largest[b], largest[c]))
-    # The last triangle adds no edge, and closes the gap even if its corners are collinear.
-    if size > 3 and (radius >= most or (flat < 0 and square > most * most)):
-        return INFINITY
-    folded: cython.double = max(_fold(P, a, b, c, ring[BEYOND, before]), _fold(P, b, c, a, ring[BEYOND, i]))
-    if size == 3:
-        folded = max(folded, _fold(P, c, a, b, ring[BEYOND, after]))
-    return INFINITY if folded > most_folded else radius
-
-
-@cython.cfunc
-@cython.nogil
-def _enter(
-    head: cython.int[::1], link: cython.int[:, ::1], e: cython.Py_ssize_t, a: cython.int, b: cython.int
-) -> cython.void:
-    link[e, 0], link[e, 1] = max(a, b), head[min(a, b)]
-    head[min(a, b)] = cython.cast(cython.int, e)
-
-
-@cython.cfunc
-@cython.nogil
-def _is_edge(head: cython.int[::1], link: cython.int[:, ::1], a: cython.int, b: cython.int) -> cython.bint:
-    e: cython.int = head[min(a, b)]
-    while e >= 0 and link[e, 0] != max(a, b):
-        e = link[e, 1]
-    return e >= 0
-
-
-@cython.cfunc
-@cython.nogil
-def _fold(
-    P: cython.const[cython.double][:, ::1],
-    a: cython.Py_ssize_t,
-    b: cython.Py_ssize_t,
-    c: cython.Py_ssize_t,
-    d: cython.Py_ssize_t,
-) -> cython.double:
-    """Cosine of the angle at edge ab between the triangles with corners c and d: 1 if folded onto each other."""
-    square: cython.double = 0.0
-    of_c: cython.double = 0.0
-    of_d: cython.double = 0.0
-    for x in range(3):
-        square += (P[b, x] - P[a, x]) * (P[b, x] - P[a, x])
-        of_c += (P[c, x] - P[a, x]) * (P[b, x] - P[a, x])
-        of_d += (P[d, x] - P[a, x]) * (P[b, x] - P[a, x])
-    size_c: cython.double = 0.0
-    size_d: cython.double = 0.0
-    alike: cython.double = 0.0
-    for x in range(3):
-        along: cython.double = (P[b, x] - P[a, x]) / square if square > 0.0 else 0.0
-        across_c: cython.double = P[c, x] - P[a, x] - of_c * along
-        across_d: cython.double = P[d, x] - P[a, x] - of_d * along
-        size_c += across_c * across_c
-        size_d += across_d * across_d
-        alike += across_c * across_d
-    size: cython.double = sqrt(size_c) * sqrt(size_d)
-    return alike / size if size > 0.0 else -1.0
+    @cython.cfunc
+    @cython.nogil
+    def fold(
+        self, a: cython.Py_ssize_t, b: cython.Py_ssize_t, c: cython.Py_ssize_t, d: cython.Py_ssize_t
+    ) -> cython.double:
+        """Cosine of the angle at edge ab between the triangles with corners c and d: 1 if folded onto each other."""
+        P = self.P
+        square: cython.double = self.square(a, b)
+        of_c: cython.double = 0.0
+        of_d: cython.double = 0.0
+        for x in range(3):
+            of_c += (P[c, x] - P[a, x]) * (P[b, x] - P[a, x])
+            of_d += (P[d, x] - P[a, x]) * (P[b, x] - P[a, x])
+        size_c: cython.double = 0.0
+        size_d: cython.double = 0.0
+        alike: cython.double = 0.0
+        for x in range(3):
+            along: cython.double = (P[b, x] - P[a, x]) / square if square > 0.0 else 0.0
+            across_c: cython.double = P[c, x] - P[a, x] - of_c * along
+            across_d: cython.double = P[d, x] - P[a, x] - of_d * along
+            size_c += across_c * across_c
+            size_d += across_d * across_d
+            alike += across_c * across_d
+        size: cython.double = sqrt(size_c) * sqrt(size_d)
+        return alike / size if size > 0.0 else -1.0
