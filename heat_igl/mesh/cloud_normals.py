@@ -59,9 +59,9 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[Float
     count, total = np.bincount(which), np.abs(np.bincount(which, side))
     contradicts = (total < _NEARLY_ALL * count) & (ends[begin, 0] != ends[begin, 1])
     joins = ends[begin[contradicts]]
-    alone = np.ones(int(group.max()) + 1, np.int64)
-    part = components(joins, len(alone))[group]
-    is_turned = turned_groups(joins.astype(np.int32), -count[contradicts].astype(float), alone)[group]
+    one = np.ones(int(group.max()) + 1, np.int64)
+    is_turned = turned_groups(joins.astype(np.int32), -count[contradicts].astype(float), one)[group]
+    part = components(joins, len(one))[group]
     is_turned ^= (np.bincount(part, is_turned) > np.bincount(part) / 2)[part]
     # Those of a single point are on one side of it, too. In groups of which one was turned they are opposite no more.
     stays = ~contradicts[which] | (is_turned[a] == is_turned[b])

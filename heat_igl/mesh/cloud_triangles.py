@@ -29,8 +29,6 @@ _LARGEST_RADIUS = 0.6
 # The same for gaps, in shares of the distance of the farthest neighbour: larger, since the sides of a gap are known to
 # belong to the surface. With 0.7 and 1.2 errors are 1 % larger in the mean, with 2 they are 4 %.
 _LARGEST_GAP = 0.9
-# Sides, those of neighbours on them, and whether both run alike.
-GluedSides = tuple[IntArray, IntArray, BoolArray]
 # Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge.
 _OTHER_SHEET = -0.25
 # Cosine of the angle to the next triangle above which the two fold back and may join sheets wrongly: 60 degrees.
@@ -83,7 +81,9 @@ def with_gaps_closed(
     size = np.bincount(part)
     is_apart, is_part = part != np.argmax(size), (size > K)[part]
     # Stars are flat: there is more only where triangles came after them.
-    is_doubtful = is_gap & (_angles(P, F.compress(at_some_corner(is_gap, F), axis=0)) > _CROWDED)
+    around = F.compress(at_some_corner(is_gap, F), axis=0)
+    turn = np.bincount(around.ravel(), igl.internal_angles(P, around).ravel(), len(P))
+    is_doubtful = is_gap & (turn > _CROWDED)
     at_gap = np.flatnonzero(is_gap & is_part & (near.index[:, -1] < 0))
     is_doubtful[torn_points(F, tree.neighbours[0][at_gap, : _NEAREST + 1], is_part, _EDGES_AWAY)] = True
     others = np.flatnonzero(is_apart & is_part)
@@ -97,11 +97,6 @@ def with_gaps_closed(
 def _to_full(near: Neighbourhoods) -> float:
     """From radii of neighbourhoods in a cloud of few points to those of `K` points as dense."""
     return float(np.sqrt(K / (near.index.shape[1] - 1)))
-
-
-def _angles(P: FloatArray, F: IntArray) -> FloatArray:
-    """The sum (n,) of the angles of triangles F (m, 3) at each point."""
-    return np.asarray(np.bincount(F.ravel(), igl.internal_angles(P, F).ravel(), len(P)))
 
 
 def _triangles_of_stars(
@@ -195,7 +190,7 @@ def at_some_corner(is_chosen: BoolArray, F: IntArray) -> BoolArray:
     return ~at_all_corners(~is_chosen, F)
 
 
-def glued_sides(F: IntArray, n: int) -> GluedSides:
+def glued_sides(F: IntArray, n: int) -> tuple[IntArray, IntArray, BoolArray]:
     """Sides 3 f + c (k,), opposite corner c of triangle f, the sides of neighbours on them, and whether both run alike.
 
     On n points; an edge has at most two of the triangles F (m, 3).

@@ -121,19 +121,17 @@ def _average(
     share: cython.float[:, ::1],
     normal: cython.double[::1],
 ) -> cython.void:
-    """The mean direction on the side of the largest ball; `share` gets the fourth powers."""
+    """The mean direction on the side of the largest ball; `share` takes the fourth powers."""
     mean: cython.float[12]
     best: cython.Py_ssize_t = 0
     of_best: cython.Py_ssize_t = 0
     for side in range(2):
         for a in range(share.shape[1]):
+            share[side, a] = share[side, a] * share[side, a] * share[side, a] * share[side, a]
             if share[side, a] > share[of_best, best]:
                 of_best, best = side, a
     for x in range(3):
         normal[x] = directions[x, best] if of_best == 0 else -directions[x, best]
-    for side in range(2):
-        for a in range(share.shape[1]):
-            share[side, a] = share[side, a] * share[side, a] * share[side, a] * share[side, a]
     for _ in range(ROUNDS):
         nx: cython.float = cython.cast(cython.float, normal[0])
         ny: cython.float = cython.cast(cython.float, normal[1])

@@ -39,6 +39,7 @@ def turned_groups(
     link: cython.int[::1] = np.empty(2 * k, np.int32)
     total: cython.double[::1] = np.zeros(n)
     is_joined: cython.bint = True
+    is_turned: cython.bint = False
     with cython.nogil:
         while is_joined:
             kept: cython.Py_ssize_t = 0
@@ -54,47 +55,26 @@ def turned_groups(
                     kept += 1
             k, is_joined = kept, False
             for g in range(n):
-                if head[g] >= 0:
-                    is_joined |= _join(g, ends, weight, size, head, link, total, root, turns)
+                at: cython.int = head[g]
+                while at >= 0:
+                    total[ends[at // 2, 1 - at % 2]] += weight[at // 2]
+                    at = link[at]
+                strongest: cython.double = 0.0
+                to: cython.Py_ssize_t = g
+                at = head[g]
+                while at >= 0:
+                    other: cython.Py_ssize_t = ends[at // 2, 1 - at % 2]
+                    # Of equal joins an arbitrary one: with the lowest, groups would be joined one after the other.
+                    share: cython.double = (1.0 + 1e-6 * ((g + other) * 7919 % 1009)) / (size[g] + size[other])
+                    if share * fabs(total[other]) > strongest:
+                        strongest, to, is_turned = share * fabs(total[other]), other, total[other] < 0.0
+                    total[other] = 0.0
+                    at = link[at]
+                if size[to] > size[g] or (size[to] == size[g] and to < g):
+                    root[g], turns[g], is_joined = to, is_turned, True
             for g in range(n):
                 while root[root[g]] != root[g]:
                     turns[g], root[g] = turns[g] ^ turns[root[g]], root[root[g]]
                 if root[g] != g:
                     size[root[g]], size[g] = size[root[g]] + size[g], 0
     return turned
-
-
-@cython.cfunc
-@cython.nogil
-def _join(
-    g: cython.Py_ssize_t,
-    ends: cython.int[:, ::1],
-    weight: cython.double[::1],
-    size: cython.longlong[::1],
-    head: cython.int[::1],
-    link: cython.int[::1],
-    total: cython.double[::1],
-    root: cython.int[::1],
-    turns: cython.uchar[::1],
-) -> cython.bint:
-    """Join group g to the one to which its join is strongest, if that is larger; whether it is. `total` stays 0."""
-    strongest: cython.double = 0.0
-    to: cython.int = -1
-    at: cython.int = head[g]
-    while at >= 0:
-        total[ends[at // 2, 1 - at % 2]] += weight[at // 2]
-        at = link[at]
-    at = head[g]
-    while at >= 0:
-        other: cython.int = ends[at // 2, 1 - at % 2]
-        # Of equal joins, an arbitrary order: with that of the numbers, groups would be joined one after the other.
-        share: cython.double = fabs(total[other]) / (size[g] + size[other]) * (1.0 + 1e-6 * ((g + other) * 7919 % 1009))
-        if share > strongest:
-            strongest, to, turns[g] = share, other, total[other] < 0.0
-        total[other] = 0.0
-        at = link[at]
-    if to >= 0 and (size[to] > size[g] or (size[to] == size[g] and to < g)):
-        root[g] = to
-        return True
-    turns[g] = 0
-    return False

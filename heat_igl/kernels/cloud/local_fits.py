@@ -31,7 +31,9 @@ def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[c
     local: cython.double[:, ::1] = np.empty((index.shape[1], 4))
     with cython.nogil:
         for row in range(index.shape[0]):
-            _principal_axes(P, index[row], local, work, axes[row], variances)
+            _around(P, index[row], local)
+            _covariance(local, work)
+            _principal(work, axes[row], variances)
             bend[row] = variances[0] / max(variances[1], TINY)
     return found, bends
 
@@ -68,7 +70,9 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
     x: cython.int
     with cython.nogil:
         for row in range(b):
-            radius: cython.double = _principal_axes(P, index[row], local, work, axes, variances)
+            radius: cython.double = _around(P, index[row], local)
+            _covariance(local, work)
+            _principal(work, axes, variances)
             _turn(local, axes)
             _normal_equations(local, system)
             total: cython.double = system[0, 0]
@@ -79,23 +83,6 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
             for x in range(3):
                 moved[row, x] = P[index[row, 0], x] + radius * system[0, 6] * axes[2, x]
     return positions, deviations
-
-
-@cython.cfunc
-@cython.nogil
-def _principal_axes(
-    P: cython.const[cython.double][:, ::1],
-    index: cython.const[cython.int][::1],
-    local: cython.double[:, ::1],
-    work: cython.double[:, ::1],
-    axes: cython.double[:, ::1],
-    variances: cython.double[::1],
-) -> cython.double:
-    """Put the neighbours into `local`, and find their axes and variances; the radius."""
-    radius: cython.double = _around(P, index, local)
-    _covariance(local, work)
-    _principal(work, axes, variances)
-    return radius
 
 
 @cython.cfunc

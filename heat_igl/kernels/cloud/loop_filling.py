@@ -103,7 +103,16 @@ def filling_triangles(
     gaps.link = np.empty((n_sides + k, 2), np.int32)
     with cython.nogil:
         gaps.find_loops()
-        gaps.fill_all()
+        for h in range(n_sides):
+            if twin[h] < h and is_gap[gaps.at_end(2 * h)] and is_gap[gaps.at_end(2 * h + 1)]:
+                gaps.enter(h, gaps.at_end(2 * h), gaps.at_end(2 * h + 1))
+        for h in range(n_sides):
+            if gaps.partner[2 * h] >= 0 and not gaps.seen[h]:
+                begin: cython.Py_ssize_t = gaps.count
+                size: cython.Py_ssize_t = gaps.loop(h)
+                gaps.fill(size)
+                if gaps.count - begin < size - 2:
+                    gaps.is_whole[begin : gaps.count] = 0
     return found[: gaps.count], whole[: gaps.count]
 
 
@@ -137,24 +146,6 @@ class _Gaps:
     link: cython.int[:, ::1]
 
     @cython.cfunc
-    @cython.nogil
-    def fill_all(self) -> cython.void:
-        """Fill all loops."""
-        for h in range(self.twin.shape[0]):
-            tail: cython.int = self.at_end(2 * h)
-            end: cython.int = self.at_end(2 * h + 1)
-            if self.twin[h] < h and self.is_gap[tail] and self.is_gap[end]:
-                self.enter(h, tail, end)
-        for h in range(self.twin.shape[0]):
-            if self.partner[2 * h] >= 0 and not self.seen[h]:
-                size: cython.Py_ssize_t = self.loop(h)
-                if size >= 3:
-                    begin: cython.Py_ssize_t = self.count
-                    self.fill(size)
-                    if self.count - begin < size - 2:
-                        self.is_whole[begin : self.count] = 0
-
-    @cython.cfunc
     @cython.inline
     @cython.nogil
     def at_end(self, end: cython.Py_ssize_t) -> cython.int:
@@ -165,7 +156,7 @@ class _Gaps:
     @cython.cfunc
     @cython.nogil
     def find_loops(self) -> cython.void:
-        """Find the partner of each end of a boundary side: in the same fan if its point has one fan, else in the next fan.
+        """Find the partner of each end of a boundary side: in the same fan, or in the next if its point has several.
 
         `joints` takes the number of further fans. `head` is restored.
         """
@@ -258,7 +249,8 @@ class _Gaps:
     def fill(self, size: cython.Py_ssize_t) -> cython.void:
         """Clip admissible ears from a ring of points. The third side of each is added as an edge."""
         flat: cython.Py_ssize_t = -1
-        self.measure(size, flat)
+        for i in range(size):
+            self.cost[i] = self.ear(size, i, flat)
         while size > 2:
             best: cython.Py_ssize_t = 0
             for i in range(1, size):
@@ -273,13 +265,13 @@ class _Gaps:
                         self.head[a] = self.link[self.twin.shape[0] + self.count, 1]
                     return
                 flat = self.count
-                self.measure(size, flat)
+                for i in range(size):
+                    self.cost[i] = self.ear(size, i, flat)
                 continue
             before: cython.Py_ssize_t = size - 1 if best == 0 else best - 1
             after: cython.Py_ssize_t = 0 if best == size - 1 else best + 1
             point: cython.int = self.ring[POINT, best]
-            # Since its cost was computed, its third side may have become an edge, or all fans there may have been
-            # joined.
+            # Since its cost was computed, its third side may be an edge now, or all fans there may be joined.
             is_edge: cython.bint = size > 3 and self.is_edge(self.ring[POINT, before], self.ring[POINT, after])
             if is_edge or (self.cost[best] < 0.0 and self.joints[point] == 0):
                 self.cost[best] = self.ear(size, best, flat)
@@ -301,13 +293,6 @@ class _Gaps:
                 self.cost[j] = self.ear(size, j, flat)
             if size == 3:  # one triangle is left
                 self.cost[0] = self.cost[1] = self.cost[2] = self.ear(size, 0, flat)
-
-    @cython.cfunc
-    @cython.nogil
-    def measure(self, size: cython.Py_ssize_t, flat: cython.Py_ssize_t) -> cython.void:
-        """The cost of all ears of a ring."""
-        for i in range(size):
-            self.cost[i] = self.ear(size, i, flat)
 
     @cython.cfunc
     @cython.nogil
