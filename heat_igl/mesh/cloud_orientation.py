@@ -42,8 +42,7 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
     if len(left_out) and np.median(folds) > _FLAT:
         F, is_turned, part = np.delete(F, left_out, 0), np.delete(is_turned, left_out), np.delete(part, left_out)
         pairs, folds = pairs[:0], folds[:0]
-    turned = np.flatnonzero(is_turned)
-    F[turned, 1:] = F[turned, :0:-1]
+    F = np.where(is_turned[:, None], F[:, [0, 2, 1]], F)
     if normals is not None:
         area = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
         along = np.bincount(part, np.einsum("fx,fx->f", area, normals[F].sum(axis=1)))

@@ -81,7 +81,7 @@ def with_gaps_closed(
     size = np.bincount(part)
     is_apart, is_part = part != np.argmax(size), (size > K)[part]
     # Stars are flat: there is more only where triangles came after them.
-    around = F.compress(at_some_corner(is_gap, F), axis=0)
+    around = F.compress(~at_all_corners(~is_gap, F), axis=0)
     turn = np.bincount(around.ravel(), igl.internal_angles(P, around).ravel(), len(P))
     is_doubtful = is_gap & (turn > _CROWDED)
     at_gap = np.flatnonzero(is_gap & is_part & (near.index[:, -1] < 0))
@@ -142,8 +142,8 @@ def _with_small_parts(tree: PointTree, F: IntArray, part: IntArray, size: IntArr
         return F
     is_near = np.zeros(len(P), bool)
     is_near[index[is_other]] = True
-    is_around = at_some_corner(is_near, F)
-    inside, F = F.compress(~is_around, axis=0), F.compress(is_around, axis=0)
+    is_inside = at_all_corners(~is_near, F)
+    inside, F = F.compress(is_inside, axis=0), F.compress(~is_inside, axis=0)
     while is_other.any():
         points = np.flatnonzero(is_other)
         beside, distance = _nearest_of(tree, points, ~is_other)
@@ -183,11 +183,6 @@ def at_all_corners(is_chosen: BoolArray, F: IntArray) -> BoolArray:
     """Which of the triangles F (m, 3) have chosen corners alone; by columns, in a fifth of the time of rows."""
     a, b, c = F.T
     return np.asarray(is_chosen.take(a) & is_chosen.take(b) & is_chosen.take(c))
-
-
-def at_some_corner(is_chosen: BoolArray, F: IntArray) -> BoolArray:
-    """Which of the triangles F (m, 3) have a chosen corner."""
-    return ~at_all_corners(~is_chosen, F)
 
 
 def glued_sides(F: IntArray, n: int) -> tuple[IntArray, IntArray, BoolArray]:
@@ -233,8 +228,8 @@ def _with_largest_fans(F: IntArray, is_gap: BoolArray) -> IntArray:
     """
     n, inside = len(is_gap), F[:0]
     while True:
-        is_around = at_some_corner(is_gap, F)
-        inside, around = np.concatenate([inside, F.compress(~is_around, axis=0)]), F.compress(is_around, axis=0)
+        is_inside = at_all_corners(~is_gap, F)
+        inside, around = np.concatenate([inside, F.compress(is_inside, axis=0)]), F.compress(~is_inside, axis=0)
         fan, vertex = fans(around, n)
         size, most, largest = np.bincount(fan), np.zeros(n, np.int64), np.empty(n, np.int64)
         np.maximum.at(most, vertex, size)

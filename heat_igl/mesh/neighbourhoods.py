@@ -221,8 +221,7 @@ def without_noise(tree: PointTree) -> PointTree:
     for k, stride in _spreads(tree, sample):
         index = _nearest(tree, np.arange(n), k, stride)
         for _ in range(_PASSES):
-            P = tree.P
-            tree = PointTree(by_rows(lambda rows, P=P, index=index: onto_quadrics(P, index[rows]), n)[0], tree.order)
+            tree = PointTree(_onto_quadrics(tree.P, index), tree.order)
     return tree
 
 
@@ -297,6 +296,11 @@ def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyA
     near[is_other, 1:] = near[is_other, :-1]
     near[:, 0] = chosen
     return near
+
+
+def _onto_quadrics(P: FloatArray, index: AnyArray) -> FloatArray:
+    """Points (b, 3), moved onto quadrics fitted to their neighbours, see `onto_quadrics`."""
+    return np.asarray(by_rows(lambda rows: onto_quadrics(P, index[rows]), len(index))[0])
 
 
 def by_rows(work: Callable[[slice], tuple[AnyArray, ...]], n: int) -> tuple[AnyArray, ...]:
