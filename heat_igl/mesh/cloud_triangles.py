@@ -55,8 +55,7 @@ def cloud_triangles(P: FloatArray, near: Neighbourhoods, has_side: BoolArray) ->
     settled, agreed, others = _triangles_of_stars(P, near, np.where(has_side, _OTHER_SHEET, -2.0))
     # The angle of a corner is the same number in every star that has the triangle.
     both = np.concatenate([agreed, others])
-    fits = fitting_triangles(P, near.axes, both, len(agreed))
-    return np.concatenate([settled, both.compress(fits, axis=0)])
+    return np.concatenate([settled, both.compress(fitting_triangles(P, near.axes, both, len(agreed)), axis=0)])
 
 
 def with_gaps_closed(

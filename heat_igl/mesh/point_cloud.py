@@ -139,8 +139,7 @@ class PointCloud:
         order = np.flatnonzero(np.isin(total, again))
         # The sort is stable: the first of equal points has the smallest index.
         order = order[np.lexsort(P[order].T)]
-        is_new = np.ones(len(order), bool)
-        is_new[1:] = (P[order[1:]] != P[order[:-1]]).any(axis=1)
+        is_new = np.append(True, (P[order[1:]] != P[order[:-1]]).any(axis=1))
         original[order] = order[is_new][np.cumsum(is_new) - 1]
         return np.unique(original, return_inverse=True)
 

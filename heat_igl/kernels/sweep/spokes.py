@@ -63,8 +63,7 @@ def _side(k: cython.int, is_left: cython.bint) -> cython.int:
 class _Spokes:
     """Arrays that `fill` reads and writes.
 
-    `left` has the corner to the left of each spoke, twice, and one more if it is turned over; -1 past the end of an
-    open fan.
+    `left` is the corner at the left of each spoke, twice, one more if turned over; -1 past the end of an open fan.
     """
 
     vertex: cython.const[cython.int][::1]
