@@ -85,8 +85,7 @@ def closing_of_gaps(
     size = np.maximum(np.where(on_curve, 0.0, np.abs(phi)), np.finfo(float).tiny)
     faces, start, end, edges = level_segments(mesh, np.where(left, -size, size), 0.0)
     share = _crossed(mesh, sources)
-    is_met = (share >= 0) | on_curve[mesh.edges].any(axis=1)
-    kept = ~is_met[edges].all(axis=1)
+    kept = ((share[edges] < 0) & ~on_curve[mesh.edges[edges]].any(axis=2)).any(axis=1)
     ends, begins = _loose(mesh, sources)
     # The last row is for faces without one.
     loose = np.concatenate([sources.end[ends], sources.start[begins], np.zeros((1, 3))])
@@ -151,7 +150,7 @@ def left_of_closed(
     tail, head = mesh.edges.T
     joined = np.concatenate(
         [
-            mesh.edges[~is_met & free[tail] & free[head]],
+            np.compress(~is_met & free[tail] & free[head], mesh.edges, axis=0),
             np.column_stack([n + near[at], mesh.F[near[at], corner]]),
             n + np.column_stack([half_edge, twin[half_edge]]) // 3,
         ]

@@ -31,7 +31,7 @@ from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, one_sided
 from heat_igl.operators import Operators, TriangleElements, divergence_matrix, edge_rotations, face_rotations, operators
 from heat_igl.runtime import LOWEST_HEAT, SOURCE_HEAT, both, n_threads, warn_caller
-from heat_igl.sources import Oriented, OrientedSet, Sources, oriented_set, require_resolved, source_set
+from heat_igl.sources import Oriented, OrientedSet, Sources, SourceSet, oriented_set, require_resolved, source_set
 from heat_igl.sweep import SweepEngine
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.windows import MeshTriangles, guarded_windows
@@ -218,7 +218,7 @@ class SignedHeatSolver:
 
     def _measured(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) from the curves, with their gaps closed, and which vertices (n,) are on the left."""
-        sources, on_curve = chosen.unoriented(), same_place(self._mesh)
+        sources, on_curve, size = chosen.unoriented(), same_place(self._mesh), None
         left, is_known = np.zeros((2, self.n_vertices), bool)
         if not has_gaps(self._mesh, chosen):
             size, (left, is_known) = both(
@@ -229,12 +229,18 @@ class SignedHeatSolver:
         # The nearest segment in the faces of a vertex may not be the nearest of all.
         left_of_nearest, away = left_beside(self._faces, chosen)
         reach = float(away.max(where=np.isfinite(away), initial=on_curve))
-        near, phi = self._integration.distance_beside(lambda: self._from(sources, reach), chosen, level)
+        near, phi = self._integration.distance_beside(
+            lambda: self._exact.windows.distance(self._places(sources), reach) if size is None else size, chosen, level
+        )
         is_beside = np.isfinite(away) & (away <= near)
         left = np.where(is_known, left, np.where(is_beside, left_of_nearest, phi < 0))
         closing = closing_of_gaps(self._mesh, chosen, phi, left, near <= on_curve)
         self._warn_if_unsure(chosen, closing, np.flatnonzero(is_beside & (left != (phi < 0))), int(is_beside.sum()))
-        return self._from(sources if closing is None else [sources, closing]), left
+        if size is None:
+            return self._from(sources if closing is None else [sources, closing]), left
+        if closing is not None:
+            size = np.minimum(size, self._exact.nearer(self._places(closing), size, n_threads()))
+        return size, left
 
     def _warn_if_unsure(
         self, chosen: OrientedSet, closing: SurfaceCurve | None, contradicted: IntArray, n_beside: int
@@ -257,10 +263,14 @@ class SignedHeatSolver:
                 AccuracyWarning,
             )
 
-    def _from(self, sources: Sources, cutoff: float = np.inf) -> FloatArray:
-        """Exact distance (n,) from sources without a side, ``inf`` beyond a cutoff."""
+    def _from(self, sources: Sources) -> FloatArray:
+        """Exact distance (n,) from sources without a side."""
+        return self._exact.distance(self._places(sources), threads=n_threads())
+
+    def _places(self, sources: Sources) -> SourceSet:
+        """Sources without a side, checked."""
         places = source_set(sources, self.n_vertices, self._mesh.F, originals=self._mesh.originals)
-        return self._exact.distance(require_resolved(places, self._domain.mean_edge_length), cutoff, n_threads())
+        return require_resolved(places, self._domain.mean_edge_length)
 
 
 def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, IntrinsicTriangulation]:

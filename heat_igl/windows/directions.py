@@ -24,8 +24,8 @@ from heat_igl.mesh.cloud_orientation import on_one_side
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet, source_set
-from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
-from heat_igl.windows.exact import ExactSolution, Leaving, Origin, Searched, search
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.windows.exact import ExactSolution, Origin, search
 from heat_igl.windows.guards import Invariants
 from heat_igl.windows.tables import Tables, from_mesh
 
@@ -157,9 +157,10 @@ class PathDirections:
         return PathAngles(*_handed_on(row, ways.root, departure, back, scale))
 
     def _at_corners(self, corner: IntArray, seen: FloatArray) -> FloatArray:
-        """Polar angles (k,) of directions at angles `seen` from the side to the next corner."""
+        """Polar angles (k,) of directions at angles `seen` from the side to the next corner; none leaves the faces."""
         angles, v = self.angles, self._triangulation.F.ravel()[corner]
-        return _polar(angles.outgoing[previous_half_edge(corner)], seen, angles.scale[v], angles.on_boundary[v])
+        found = angles.outgoing[previous_half_edge(corner)] + angles.scale[v] * seen
+        return np.where(angles.on_boundary[v], np.clip(found, 0.0, np.pi), found)
 
     def around_corners(self, corner: IntArray, departure: FloatArray) -> FloatArray:
         """Polar angles (k,) of directions at corners, given by angles (k,) from the side of corners 0 and 1."""
@@ -203,12 +204,6 @@ def first_parts(root: IntArray) -> IntArray:
     while not ((further := first[first]) == first).all():
         first = further
     return first
-
-
-def _polar(begin: FloatArray, angles: FloatArray, scale: FloatArray, on_boundary: BoolArray) -> FloatArray:
-    """Polar angles (k,) of angles in fans; at the boundary clipped to the range of the faces."""
-    found = begin + scale * angles
-    return np.where(on_boundary, np.clip(found, 0.0, np.pi), found)
 
 
 def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: FloatArray, scale: FloatArray) -> FloatArray:
@@ -378,16 +373,19 @@ def vectors_from(mesh: Mesh, source: int) -> FloatArray | None:
         return None
     begin = np.zeros(len(tables.edges.vertex))
     begin[around.corner] = first + scale * around.angle
-    top, straight, seen = _first_parts(done, leaving, int(tables.number[source]))
-    angle = begin[leaving.corner[straight]] + scale * seen
+    # Straight paths from the source, at angles from the first side of the corner through which they leave.
+    root, start = done.found.root.astype(np.int64), int(tables.number[source])
+    straight = np.flatnonzero((root == start) & (np.arange(len(root)) != start))
+    x, y = leaving.direction[straight].T
+    angle = begin[leaving.corner[straight]] + scale * np.arctan2(y, x)
     if on_boundary:
         angle = np.clip(angle, 0.0, np.pi)
-    unit = np.zeros((len(top), 2))
+    unit = np.zeros((len(root), 2))
     unit[straight, 0], unit[straight, 1] = np.cos(angle), np.sin(angle)
     distance = tables.unscaled(done.found.distance)[tables.number]
     if Invariants(mesh.F, mesh.components, mesh.V).contradiction(distance, chosen) is not None:
         return None
-    return np.asarray(np.where(np.isfinite(distance), distance, 0.0)[:, None] * unit[top][tables.number])
+    return np.asarray(np.where(np.isfinite(distance), distance, 0.0)[:, None] * unit[first_parts(root)][tables.number])
 
 
 def _given_spokes(mesh: Mesh, source: int) -> tuple[_Spokes, float, bool] | None:
@@ -444,16 +442,3 @@ def _first_angle(given: _Spokes, around: _Spokes, scale: float) -> float | None:
     ahead = given.angle[i] - scale * around.angle[j]
     off = ahead - ahead[0]
     return None if np.abs(off - 2 * np.pi * np.rint(off / (2 * np.pi))).max() > _SAME_ANGLE else float(ahead[0])
-
-
-def _first_parts(done: Searched, leaving: Leaving, source: int) -> tuple[IntArray, IntArray, FloatArray]:
-    """Ends (n,) of the first straight parts of paths, the k vertices with straight paths, and the angles (k,) of these.
-
-    Angles are measured from the first side of the corner through which a path leaves the source.
-    """
-    root = done.found.root.astype(np.int64)
-    is_first = root == source
-    is_first[source] = False
-    straight = np.flatnonzero(is_first)
-    x, y = leaving.direction[straight].T
-    return first_parts(root), straight, np.arctan2(y, x)

@@ -36,7 +36,7 @@ class Engine(ABC):
         return self.labelled(sources, cutoff, threads)[0]
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
-        """Distance (n,) from vertices where it is smaller than `than` (n,), the distance from others; else ``inf``."""
+        """Distance (n,) where it is smaller than `than` (n,), the distance from other sources; else ``inf``."""
         found = self.distance(sources, float(than.max()), threads)
         found[found >= than] = np.inf
         return found
@@ -204,7 +204,7 @@ class WindowEngine(TriangleEngine):
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
         """Distance (n,) where it is smaller than `than`, see `Engine`; the search ends where it is not."""
-        return self._from_vertices.distance(sources, float(than.max()), threads, than)
+        return self._surface(sources).distance(sources, float(than.max()), threads, than)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,) and nearest source (n,)."""

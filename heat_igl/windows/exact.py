@@ -56,8 +56,8 @@ NO_STARTS = Starts(
 )
 
 
-def starts_at(tables: Tables, sources: SourceSet) -> Starts:
-    """Sources for the kernel; points at corners become vertices.
+def starts_at(tables: Tables, sources: SourceSet, directed: bool = False) -> Starts:
+    """Sources for the kernel; points at corners become vertices. Directed searches need the turns of copies.
 
     A ValueError if there are points or segments, and the tables cannot locate them.
     """
@@ -68,7 +68,7 @@ def starts_at(tables: Tables, sources: SourceSet) -> Starts:
         return NO_STARTS._replace(vertices=vertices, offset=begin, place=label[k:], label=label)
     number = p + np.arange(len(segments.faces))
     points = sources.points.joined(segments.ends())
-    place, lines = tables.located(points), tables.located_segments(segments)
+    place, lines = tables.located(points, directed), tables.located_segments(segments)
     late = tables.scaled(points.offset)[place.point]
     counted = np.concatenate([np.arange(p), number, number])[place.point]
     is_corner = (place.barycentric == 0).sum(axis=1) == 2
@@ -336,7 +336,7 @@ def search(
 
     Only distances smaller than `upper` (n,), in the numbering of the tables, are found.
     """
-    n, starts, place = tables.n, starts_at(tables, sources), tables.located(targets)
+    n, starts, place = tables.n, starts_at(tables, sources, directed), tables.located(targets)
     wanted = Targets(place, *tables.by_face(place), tables.largest_circle(place), Found.of(len(place.faces), 0))
     n_labels = n + len(starts.points.faces) + len(starts.segments.faces)
     found, leaving = Found.of(n, n_labels), Leaving.of(n) if directed else None

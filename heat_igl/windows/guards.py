@@ -70,7 +70,7 @@ class Invariants:
 
         def found(slack: float) -> str | None:
             return (
-                self._at_sources(distance, sources, cutoff, slack)
+                self._at_sources(nearest, sources, cutoff, slack)
                 or self._elsewhere(distance, sources)
                 or self._along_edges(nearest, cutoff, slack)
                 or self._below_lines(distance, sources, slack)

@@ -125,14 +125,17 @@ class Tables:
         old = 3 * self.face[half_edge // 3].astype(np.int64) + half_edge % 3
         return np.asarray(np.where(half_edge >= 0, old, -1))
 
-    def located(self, points: SurfacePoints | SourcePoints | None) -> Located:
-        """Points of the mesh in the triangles; a ValueError for tables without history, as those of `from_mesh`."""
+    def located(self, points: SurfacePoints | SourcePoints | None, turned: bool = False) -> Located:
+        """Points of the mesh in the triangles; a ValueError for tables without history, as those of `from_mesh`.
+
+        The turns of copies are 0 unless asked for by `turned`.
+        """
         if points is None or not len(points.faces):
             return NO_POINTS
         if self._triangulation is None:
             raise ValueError("this surface knows vertices only: make it from a triangulation")
         faces, barycentric = self._triangulation.locate(points.faces, points.barycentric)
-        located = self._on_all_faces(faces, barycentric[:, None])
+        located = self._on_all_faces(faces, barycentric[:, None], turned)
         return located._replace(barycentric=located.barycentric[:, 0])
 
     def located_segments(self, segments: SourceSegments) -> Located:
@@ -147,7 +150,7 @@ class Tables:
         ends = [self._triangulation.locate(segments.faces, end) for end in (segments.start, segments.end)]
         return self._on_all_faces(ends[0][0], np.stack([end[1] for end in ends], axis=1))
 
-    def _on_all_faces(self, faces: IntArray, barycentric: FloatArray) -> Located:
+    def _on_all_faces(self, faces: IntArray, barycentric: FloatArray, turned: bool = False) -> Located:
         """Sets of e points each (k, e, 3) in renumbered faces, with a copy for every further face at a side."""
         t = self.edges
         faces = self._new_face[faces]
@@ -170,7 +173,8 @@ class Tables:
             other[k, :, (here + 1) % 3] = np.where(same_way, tail, head)
             other[k, :, (here + 2) % 3] = np.where(same_way, head, tail)
             # The direction of the side is reversed there.
-            rows.append((here // 3, other, point[i], np.angle(-self._along(start) * self._along(here).conj())))
+            turn = np.angle(-self._along(start) * self._along(here).conj()) if turned else np.zeros(len(i))
+            rows.append((here // 3, other, point[i], turn))
         faces, barycentric, point, turn = (np.concatenate(column) for column in zip(*rows, strict=True))
         return Located(faces.astype(np.int32), np.ascontiguousarray(barycentric), point, turn)
 
