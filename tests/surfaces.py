@@ -4,7 +4,6 @@ from itertools import pairwise
 
 import igl
 import numpy as np
-import pytest
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
 import scipy.spatial
@@ -13,7 +12,7 @@ from conftest import perturbed
 from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
 from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.validation.construction import joined
+from heat_igl.validation.construction import joined, merged, planar, ring
 
 
 def twice(mesh: Mesh, apart: float | np.ndarray = 5.0) -> Mesh:
@@ -82,7 +81,7 @@ def folded_torus(n: int) -> Mesh:
 def rough_field(seed: int) -> Mesh:
     rng = np.random.default_rng(seed)
     P = rng.random((rng.integers(8, 60), 2))
-    return Mesh(np.column_stack([P, rng.normal(size=len(P)) * 0.3]), scipy.spatial.Delaunay(P).simplices)
+    return planar(P, rng.normal(size=len(P)) * 0.3)
 
 
 def rough_star(seed: int) -> Mesh:
@@ -94,15 +93,10 @@ def rough_star(seed: int) -> Mesh:
 
 def random_disk(n: int, seed: int) -> Mesh:
     """A Delaunay triangulation of random points in the unit disk, boundary points on the circle."""
-    spatial = pytest.importorskip("scipy.spatial")
     rng = np.random.default_rng(seed)
     radius, angle = 0.97 * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
-    rim = 2 * np.pi * np.arange(int(4 * np.sqrt(n))) / int(4 * np.sqrt(n))
-    points = np.concatenate(
-        [np.stack([radius * np.cos(angle), radius * np.sin(angle)], 1), np.stack([np.cos(rim), np.sin(rim)], 1)]
-    )
-    faces = spatial.Delaunay(points).simplices
-    return Mesh(np.column_stack([points, np.zeros(len(points))]), faces)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    return planar(np.concatenate([points, ring(int(4 * np.sqrt(n)))]))
 
 
 def sheared(mesh: Mesh, shear: float) -> Mesh:
@@ -123,28 +117,17 @@ def with_point(mesh: Mesh, face: int, barycentric: np.ndarray) -> Mesh:
 
 def moebius_strip(around: int, across: int, half_width: float = 0.4) -> Mesh:
     """A strip that cannot be oriented, of `around` by `across` cells."""
-    t = np.linspace(0, 2 * np.pi, around, endpoint=False)
-    s = np.linspace(-half_width, half_width, across + 1)
-    T, S = np.meshgrid(t, s, indexing="ij")
-    V = np.stack([(1 + S * np.cos(T / 2)) * np.cos(T), (1 + S * np.cos(T / 2)) * np.sin(T), S * np.sin(T / 2)], axis=-1)
-    faces = []
-    for i in range(around):
-        for j in range(across):
-            a, b = i * (across + 1) + j, i * (across + 1) + j + 1
-            c, d = (a + across + 1, b + across + 1) if i < around - 1 else (across - j, across - j - 1)
-            faces += [[a, c, b], [b, c, d]]
-    return Mesh(V.reshape(-1, 3), faces)
+    t, s = np.linspace(0, 2 * np.pi, around + 1)[:, None], np.linspace(-half_width, half_width, across + 1)
+    r = 1 + s * np.cos(t / 2)
+    return merged(shapes.lattice_mesh(r * np.cos(t), r * np.sin(t), s * np.sin(t / 2)))
 
 
 def bent_pages() -> Mesh:
     """Three pages at one edge, each of them bent."""
     page = shapes.grid(6)
-    x, y, _ = (page.V - page.V.min(axis=0)).T
-    V = [np.column_stack([x * np.cos(a), x * np.sin(a), y]) for a in (0.0, 2.0, 4.0)]
-    stacked = np.concatenate(V)
-    F = np.concatenate([page.F + k * page.n_vertices for k in range(3)])
-    _, first, inverse = np.unique(np.round(stacked, 9), axis=0, return_index=True, return_inverse=True)
-    return Mesh(stacked[first], inverse.ravel()[F])
+    x, y, _ = page.V.T
+    turned = (np.column_stack([x * np.cos(a), x * np.sin(a), y]) for a in (0.0, 2.0, 4.0))
+    return merged(joined(*(Mesh(V, page.F) for V in turned)))
 
 
 def dual(mesh: Mesh) -> PolygonMesh:

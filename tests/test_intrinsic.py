@@ -533,9 +533,7 @@ def fan_of_five(halvings: int) -> Mesh:
     apex = np.stack([np.cos(angle), np.sin(angle), np.full(5, 1 / np.sqrt(3))], axis=1) * np.sqrt(3) / 2
     mesh = Mesh(np.concatenate([[[0, 0, 0], [0, 0, 1]], apex]), [[0, 1, k] for k in range(2, 7)])
     for _ in range(halvings):
-        a, b, c, p, q, r = *mesh.F.T, *(mesh.n_vertices + mesh.facets.of_face.T)
-        parts = [np.stack(part, axis=1) for part in ((a, r, q), (b, p, r), (c, q, p), (p, q, r))]
-        mesh = Mesh(np.concatenate([mesh.V, mesh.V[mesh.edges].mean(axis=1)]), np.concatenate(parts))
+        mesh = Mesh(*shapes.quartered(mesh.V, mesh.F))
     return mesh
 
 
