@@ -117,9 +117,17 @@ def with_point(mesh: Mesh, face: int, barycentric: np.ndarray) -> Mesh:
 
 def moebius_strip(around: int, across: int, half_width: float = 0.4) -> Mesh:
     """A strip that cannot be oriented, of `around` by `across` cells."""
-    t, s = np.linspace(0, 2 * np.pi, around + 1)[:, None], np.linspace(-half_width, half_width, across + 1)
-    r = 1 + s * np.cos(t / 2)
-    return merged(shapes.lattice_mesh(r * np.cos(t), r * np.sin(t), s * np.sin(t / 2)))
+    t = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    s = np.linspace(-half_width, half_width, across + 1)
+    T, S = np.meshgrid(t, s, indexing="ij")
+    V = np.stack([(1 + S * np.cos(T / 2)) * np.cos(T), (1 + S * np.cos(T / 2)) * np.sin(T), S * np.sin(T / 2)], axis=-1)
+    faces = []
+    for i in range(around):
+        for j in range(across):
+            a, b = i * (across + 1) + j, i * (across + 1) + j + 1
+            c, d = (a + across + 1, b + across + 1) if i < around - 1 else (across - j, across - j - 1)
+            faces += [[a, c, b], [b, c, d]]
+    return Mesh(V.reshape(-1, 3), faces)
 
 
 def bent_pages() -> Mesh:
