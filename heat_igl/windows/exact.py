@@ -25,7 +25,8 @@ TOLERANCE = 1e-11
 # With fewer vertices a search takes a few milliseconds, and starting a thread a large part of one.
 _FEWEST_SHARED = 10_000
 # Length of a round of two threads, in mean edge lengths. Shorter rounds spend more time on synchronization; longer ones
-# let more windows cross the border of the two parts.
+# let more windows cross the border of the two parts. From 1 to 10 distances are the same bits, and the processor time
+# within 7 %, on six meshes of 10k to 41k vertices.
 _ROUND = 3.0
 # From about this number of windows on the front, a round of two threads has enough work: a tenth of a millisecond.
 _PLENTY = 1000
