@@ -30,16 +30,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
-from heat_igl import (
-    GeodesicSolver,
-    HeatMethodSolver,
-    Mesh,
-    PointCloud,
-    VectorHeatSolver,
-    log_map,
-    shapes,
-    tangent_frames,
-)
+import heat_igl
+from heat_igl import GeodesicSolver, Mesh, PointCloud, VectorHeatSolver, log_map, shapes, tangent_frames
 from heat_igl.typing import FloatArray, IntArray
 
 from harness import Query, Row, Table, collected, drawn, mean_error, named, on_sphere, parsed, publish, seconds
@@ -110,7 +102,7 @@ def _restricted(mesh: Mesh, truth: Query) -> Query:
 
 
 METHODS: dict[str, Callable[[FloatArray], Query]] = {
-    "heat": lambda P: HeatMethodSolver(PointCloud(P)).distance,
+    "heat": lambda P: heat_igl.HeatMethodSolver(PointCloud(P)).distance,
     "default": lambda P: GeodesicSolver(PointCloud(P)).distance,
     "windows": lambda P: GeodesicSolver(PointCloud(P), method="windows").distance,
     "potpourri3d": lambda P: PointCloudHeatSolver(P).compute_distance,

@@ -25,6 +25,7 @@ import numpy as np
 from heat_igl import HeatMethodSolver, Mesh, cluster, read_mesh, shapes, write_mesh
 from heat_igl.cluster.worker import PROCESS_MEMORY, solver_memory
 from heat_igl.geodesic import DistanceMethod
+from heat_igl.runtime.memory import memory_field
 
 from harness import Row, Table, collected, parsed, publish, ratio, subdivided
 
@@ -106,11 +107,6 @@ def rates(count: int, real: Sequence[Path], repeats: int) -> tuple[Table, str]:
     return Table(rows, {"": "name", "seconds": "{seconds:.1f}"}, text), said
 
 
-def _peak() -> int:
-    status = Path("/proc/self/status").read_text()
-    return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmHWM"))) * 1024
-
-
 def memory(real: Sequence[Path]) -> Iterator[Row]:
     """Peak memory of a worker beside the bound that the batch states: spheres, the first real mesh subdivided."""
     meshes = {f"sphere {size}": shapes.icosphere(size) for size in MEMORY_SIZES}
@@ -120,7 +116,7 @@ def memory(real: Sequence[Path]) -> Iterator[Row]:
             with tempfile.TemporaryDirectory() as scratch, cluster.connected(n_workers=1) as client:
                 store = Path(scratch) / "store"
                 cluster.distances({name: mesh}, list(range(2 * SOURCES)), store, client=client, method=method)
-                (peak,) = client.run(_peak).values()
+                (peak,) = client.run(memory_field, "self/status", "VmHWM").values()
             stated = PROCESS_MEMORY + solver_memory(mesh, method)
             row = {"mesh": name, "n": mesh.n_vertices, "method": method, "ratio": peak / stated}
             yield row | {"peak": peak / 2**20, "stated": stated / 2**20}

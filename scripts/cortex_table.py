@@ -10,12 +10,11 @@ are means over the same rows, in percent. Needs the extra ``bench``. docs/region
 
 from __future__ import annotations
 
-import os
-import pickle
 import resource
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -48,20 +47,22 @@ def cortex(n: int) -> tuple[Mesh, BoolArray]:
 
 def in_a_process(call: Callable[[], object]) -> tuple[float, float, Any]:
     """Processor seconds, megabytes to the peak, and the result of a call in a fork of this process."""
-    here, there = os.pipe()
-    if os.fork() == 0:
+    context = get_context("fork")
+    here, there = context.Pipe(duplex=False)
+
+    def child() -> None:
         held = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
         start = time.process_time()
         found = call()
         used = time.process_time() - start
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-        with os.fdopen(there, "wb") as pipe:
-            pickle.dump((used, max(peak - held, 0) / 1e6, found), pipe)
-        os._exit(0)
-    os.close(there)
-    with os.fdopen(here, "rb") as pipe:
-        spent, peak, result = pickle.load(pipe)
-    os.wait()
+        there.send((used, max(peak - held, 0) / 1e6, found))
+
+    process = context.Process(target=child)
+    process.start()
+    there.close()  # so that a child that fails is an EOFError here
+    spent, peak, result = here.recv()
+    process.join()
     return spent, peak, result
 
 

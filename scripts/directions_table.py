@@ -26,18 +26,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csgraph
 
-from heat_igl import (
-    GeodesicSolver,
-    Mesh,
-    SurfacePoints,
-    VectorHeatSolver,
-    edge_curve,
-    exp_map,
-    log_map,
-    pair_distances,
-    shortest_paths,
-    tangent_frames,
-)
+import heat_igl
+from heat_igl import Mesh, SurfacePoints, VectorHeatSolver, exp_map, log_map, shortest_paths, tangent_frames
 from heat_igl.curves import GeodesicPathSolver
 from heat_igl.intrinsic import TangentFrames
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
@@ -89,7 +79,7 @@ def log_maps(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
     """Errors of each way to the log map, means over the sources."""
     import potpourri3d
 
-    solver, peer = GeodesicSolver(mesh), potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
+    solver, peer = heat_igl.GeodesicSolver(mesh), potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
     x, y, _ = peer.get_tangent_frames()
     found: dict[str, list[list[float]]] = {}
     gaps = []
@@ -148,7 +138,7 @@ def times(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
     import potpourri3d
 
     V, F, rng = mesh.V, mesh.F, np.random.default_rng(0)
-    solver, peer = GeodesicSolver(mesh), potpourri3d.MeshVectorHeatSolver(V, F)
+    solver, peer = heat_igl.GeodesicSolver(mesh), potpourri3d.MeshVectorHeatSolver(V, F)
     points = [SurfacePoints([face], [[0.2, 0.3, 0.5]]) for face in rng.integers(0, mesh.n_faces, len(sources))]
     curves = [shortest_paths(mesh, a, b)[0] for a, b in pairwise(sources)]
 
@@ -215,7 +205,7 @@ def paths(name: str, mesh: Mesh, n_pairs: int, seed: int) -> Iterator[Row]:
     usable = np.flatnonzero(mesh.components == mesh.components[mesh.F[0, 0]])
     pairs = [rng.choice(usable, 2, replace=False).tolist() for _ in range(n_pairs)]
     loops = [edge_loop(mesh, rng.choice(usable, 4, replace=False).tolist()) for _ in range(max(n_pairs // 10, 1))]
-    curves = [edge_curve(mesh, loop, closed=True) for loop in loops]
+    curves = [heat_igl.edge_curve(mesh, loop, closed=True) for loop in loops]
     ours, theirs = GeodesicPathSolver(mesh), potpourri3d.EdgeFlipGeodesicSolver(mesh.V, mesh.F)
     found: dict[str, list[tuple[float, float, float, float]]] = {"paths": [], "loops": []}
 
@@ -237,7 +227,7 @@ def paths(name: str, mesh: Mesh, n_pairs: int, seed: int) -> Iterator[Row]:
         row |= {"shorter": int((excess < -SAME).sum()), "longer": int((excess > SAME).sum())}
         row |= {"median time": np.median(time / peer_time), "time": time.sum() / peer_time.sum()}
         if kind == "paths":
-            exact = pair_distances(mesh, np.array(pairs))
+            exact = heat_igl.pair_distances(mesh, np.array(pairs))
             row["not shortest"] = [int((each > exact * (1 + SAME)).sum()) for each in (length, other)]
         yield row
 

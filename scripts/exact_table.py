@@ -25,16 +25,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import Delaunay
 
-from heat_igl import (
-    GeodesicSolver,
-    Mesh,
-    distances_within,
-    geodesic_distance,
-    nearest_vertices,
-    pair_distances,
-    shapes,
-    write_distances_within,
-)
+import heat_igl
+from heat_igl import Mesh, distances_within, geodesic_distance, pair_distances, shapes, write_distances_within
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.sources import source_set
@@ -127,7 +119,7 @@ def beside_vtp(mesh: Mesh, source: int, repeats: int) -> tuple[float, float]:
 
 def local(name: str, mesh: Mesh, repeats: int) -> Row:
     """Seconds of each of many local queries, preparation shared, and of one full query."""
-    source, solver = drawn(mesh, 1)[0], GeodesicSolver(mesh)
+    source, solver = drawn(mesh, 1)[0], heat_igl.GeodesicSolver(mesh)
     distance = solver.distance(source)
     usable = np.flatnonzero(np.isfinite(distance))
     some = np.random.default_rng(0).choice(usable, min(LOCAL, len(usable)), replace=False)
@@ -142,7 +134,7 @@ def local(name: str, mesh: Mesh, repeats: int) -> Row:
         "query": lambda: solver.distance(source),
         "within": lambda: distances_within(mesh, radius, some),
         "pair": lambda: pair_distances(mesh, pairs),
-        "nearest": lambda: nearest_vertices(mesh, NEAREST),
+        "nearest": lambda: heat_igl.nearest_vertices(mesh, NEAREST),
     }
     took = {key: float(np.median(times)) for key, times in paired(calls, repeats).items()}
     parts = {key: took["query"] / took[key] * len(some) for key in ("within", "pair")}

@@ -43,19 +43,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
-from heat_igl import (
-    AccuracyWarning,
-    GeodesicSolver,
-    Mesh,
-    PolygonMesh,
-    fibre_metric,
-    geodesic_distance,
-    image_domain,
-    metric_operators,
-    read_polygon_mesh,
-    shapes,
-    speed_operators,
-)
+import heat_igl
+from heat_igl import GeodesicSolver, Mesh, PolygonMesh, metric_operators, read_polygon_mesh, shapes, speed_operators
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.mesh import PolygonFans
 from heat_igl.operators import MetricSimplices, Operators
@@ -155,7 +144,7 @@ def across_hand(V: FloatArray, i: int, cells: int) -> FloatArray:
     plan = Mesh(plan.V, plan.F[in_hand(plan.V[plan.F].mean(axis=1))])
     number = {place: k for k, place in enumerate(map(tuple, np.rint(cells * plan.V[:, :2]).astype(int).tolist()))}
     on_plan = np.array([number[x, y] for x, y in np.rint(cells * V[:, :2]).astype(int).tolist()])
-    flat = geodesic_distance(plan, int(on_plan[i]), method="exact")[on_plan]
+    flat = heat_igl.geodesic_distance(plan, int(on_plan[i]), method="exact")[on_plan]
     return np.asarray(np.hypot(flat, V[:, 2] - V[i, 2]))
 
 
@@ -370,7 +359,7 @@ def speeds(values: Sequence[float] | FloatArray) -> FloatArray:
 
 def fibres(angle: FloatArray, ratio: FloatArray | float) -> FloatArray:
     """Lengths across fibres are `ratio` times those along them."""
-    return fibre_metric(np.column_stack([np.cos(angle), np.sin(angle)]), 1.0, ratio)[:, :2, :2]
+    return heat_igl.fibre_metric(np.column_stack([np.cos(angle), np.sin(angle)]), 1.0, ratio)[:, :2, :2]
 
 
 def on_layers(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
@@ -454,7 +443,7 @@ def hyperbolic(V: FloatArray, source: int, most: float = 20) -> FloatArray:
 
 
 def on_simplices(mask: BoolArray, speed: FloatArray, source: tuple[int, ...]) -> FloatArray:
-    domain = image_domain(mask, [1 / k for k in mask.shape])
+    domain = heat_igl.image_domain(mask, [1 / k for k in mask.shape])
     made: Mesh | Operators = domain.mesh
     if np.ptp(speed) > 0:
         height = domain.mesh.V[:, mask.ndim - 1] - domain.mesh.V[domain.index.flat[0], mask.ndim - 1]
@@ -732,7 +721,7 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
 def main(argv: Sequence[str] | None = None) -> None:
     more = {"rows": 48, "points": 20_000, "sources": 3, "border": 24, "edge": 20, "count": 3}
     options = parsed(__doc__, argv, "*", TABLES, **more)
-    warnings.simplefilter("ignore", AccuracyWarning)  # that heat is wrong here is what the tables show
+    warnings.simplefilter("ignore", heat_igl.AccuracyWarning)  # that heat is wrong here is what the tables show
     measured, columns = TABLES[options.table]
     rows = collected(measured(options, np.random.default_rng(options.seed)))
     publish(options, {options.table: Table(rows, columns)})

@@ -45,23 +45,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
-from heat_igl import (
-    GeodesicSolver,
-    HeatMethodSolver,
-    Mesh,
-    SignedHeatSolver,
-    SurfaceCurve,
-    SurfacePoints,
-    curve_on,
-    cut,
-    edge_curve,
-    exp_map,
-    geodesic_distance,
-    isolines,
-    log_map,
-    shapes,
-    tangent_frames,
-)
+import heat_igl
+from heat_igl import Mesh, SurfaceCurve, curve_on, exp_map, geodesic_distance, isolines, log_map, shapes, tangent_frames
 from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.intrinsic import intrinsic_triangulation, mollify
 from heat_igl.mesh import region_boundary
@@ -114,11 +99,6 @@ def needles(rng: Random) -> Mesh:
     return Mesh(mesh.V * 10 ** (rng.permutation([1, 0, 0]) * rng.uniform(1, 2)), mesh.F)
 
 
-def seeded(makes: dict[str, Callable[[Random], Mesh]]) -> dict[str, Callable[[int], Mesh]]:
-    """Shapes by seed in place of a generator."""
-    return {name: lambda seed, make=make: make(np.random.default_rng(seed)) for name, make in makes.items()}
-
-
 def long_tube(rng: Random) -> Mesh:
     """Rings of few vertices, up to 1.6 times as far from the next as from the one before; ridges that are straight."""
     around, along = rng.integers(3, 9), int(rng.integers(10, 31))
@@ -131,16 +111,14 @@ def long_tube(rng: Random) -> Mesh:
     return Mesh(V, lattice_faces(along, around, wrap_columns=True))
 
 
-COARSE = seeded(
-    {
-        "star": lambda rng: spikes(hull(on_sphere(int(rng.integers(8, _COARSE)), rng)), rng, 0.6),
-        "height field": height_field,
-        "torus of 30 vertices": rough(shapes.torus(6, 5), 0.3),
-        "book of 3 pages": rough(shapes.book(3, 3), 0.3),
-        "needles": needles,
-        "long tube": long_tube,
-    }
-)
+COARSE: dict[str, Callable[[Random], Mesh]] = {
+    "star": lambda rng: spikes(hull(on_sphere(int(rng.integers(8, _COARSE)), rng)), rng, 0.6),
+    "height field": height_field,
+    "torus of 30 vertices": rough(shapes.torus(6, 5), 0.3),
+    "book of 3 pages": rough(shapes.book(3, 3), 0.3),
+    "needles": needles,
+    "long tube": long_tube,
+}
 NEARLY_FLAT = (
     "nearly flat cylinder",
     "nearly flat cone",
@@ -149,7 +127,7 @@ NEARLY_FLAT = (
     "nearly flat grid",
     "grid of integers",
 )
-EXACT = {name: FAMILIES[name] for name in NEARLY_FLAT} | COARSE
+EXACT = *NEARLY_FLAT, *COARSE
 
 
 def straight_lines(mesh: Mesh, sources: Sequence[int]) -> FloatArray:
@@ -219,9 +197,9 @@ def _least(P: tuple[float, float], Q: tuple[float, float]) -> float:
 
 
 def exact(seed: int) -> Member:
-    name = list(EXACT)[seed % len(EXACT)]
+    name = EXACT[seed % len(EXACT)]
     try:
-        mesh = EXACT[name](seed)
+        mesh = COARSE[name](np.random.default_rng(seed)) if name in COARSE else FAMILIES[name](seed)
         surfaces = [ExactSurface(from_mesh(mesh, 0)), ExactSurface(intrinsic_triangulation(mesh, MARGIN))]
     except MeshError:
         return f"{name}, refused", {}, 0.0
@@ -248,7 +226,7 @@ def many_faced(seed: int) -> Member:
     T = Delaunay(P).simplices
     mesh = Mesh(P, igl.boundary_facets(T[rng.random(len(T)) < rng.uniform(0.2, 0.8)])[0])
     sources = rng.choice(np.unique(mesh.F), 10).tolist()
-    solvers = GeodesicSolver(mesh, method="exact"), HeatMethodSolver(mesh)
+    solvers = heat_igl.GeodesicSolver(mesh, method="exact"), heat_igl.HeatMethodSolver(mesh)
     with catch_warnings():
         simplefilter("ignore", AccuracyWarning)
         for solver in solvers:
@@ -326,7 +304,7 @@ def along_edges(rng: Random) -> tuple[Mesh, list[SurfaceCurve]]:
     path = [int(rng.integers(mesh.n_vertices))]
     for _ in range(int(rng.integers(1, 20))):
         path.append(int(rng.choice(np.concatenate([head[tail == path[-1]], tail[head == path[-1]]]))))
-    return mesh, [edge_curve(mesh, path)]
+    return mesh, [heat_igl.edge_curve(mesh, path)]
 
 
 CURVES = (segments, nearly, loops, across, levels, along_edges)
@@ -338,7 +316,7 @@ def cuts(seed: int) -> Member:
     name = make.__name__.replace("_", " ")
     if not curves:
         return f"{name}, no curve", {}, 0.0
-    found = cut(mesh, curves)
+    found = heat_igl.cut(mesh, curves)
     new, both = found.mesh, (mesh, found.mesh)
     tangent_frames(new)  # raises unless each vertex has one fan, and neighbours are oriented alike
     characteristic, n_loops = (
@@ -403,7 +381,7 @@ def log_maps(seed: int) -> Member:
     body, place = rng.choice(list(BODIES)), rng.choice(list(PLACES))
     made = BODIES[body](rng)
     mesh = Mesh(made.V * 10 ** rng.uniform(0, 2, 3), made.F)
-    start = SurfacePoints([int(rng.integers(mesh.n_faces))], [rng.permutation(PLACES[place](rng))])
+    start = heat_igl.SurfacePoints([int(rng.integers(mesh.n_faces))], [rng.permutation(PLACES[place](rng))])
     log = log_map(mesh, start, method="exact")
     surface = operators(mesh).surface
     if surface is None:
@@ -443,7 +421,7 @@ def signed(seed: int) -> Member:
     centres = mesh.V[mesh.F].mean(axis=1)
     radius = np.linalg.norm(centres - centres[rng.integers(len(centres))], axis=1)
     region = (radius < np.quantile(radius, rng.uniform(0.05, 0.6))) ^ (rng.random(len(radius)) < exchanged)
-    distance = SignedHeatSolver(mesh).distance(region)
+    distance = heat_igl.SignedHeatSolver(mesh).distance(region)
     n_faces, n_inside = (np.bincount(f.ravel(), minlength=mesh.n_vertices) for f in (mesh.F, mesh.F[region]))
     is_wrong = (distance >= 0) & (n_inside == n_faces) | (distance <= 0) & (n_inside == 0)
     truth = geodesic_distance(mesh, region_boundary(mesh, faces=region), method="exact")

@@ -21,15 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl import (
-    Mesh,
-    SignedHeatSolver,
-    SurfaceCurve,
-    curve_on,
-    geodesic_distance,
-    isolines,
-    shapes,
-)
+from heat_igl import Mesh, SignedHeatSolver, SurfaceCurve, curve_on, geodesic_distance, isolines, shapes
 from heat_igl.curves import sublevel_areas
 from heat_igl.typing import FloatArray
 
