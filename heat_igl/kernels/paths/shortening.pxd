@@ -28,7 +28,7 @@ cdef class Shortener:
     cdef Choice[::1] choice
     cdef int[::1] tried
     cdef int n_choices, n_tried
-    cdef double largest_loss
+    cdef bint is_loop
     # The result.
     cdef SegmentList segments
     cdef double length

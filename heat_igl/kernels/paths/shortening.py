@@ -15,26 +15,28 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import INFINITY, M_PI, acos, atan2, cos, fabs, sqrt
 
-# A bend is worth repairing when the angle another way falls short of pi by more than this; it saves the square.
+# Ranges are of 4000 paths and 300 loops through random vertices of eight shapes.
+
+# A bend is worth repairing when the angle another way falls short of pi by more than this; it saves the square. Curves
+# have the same bits from 1e-12 on, and the same lengths up to 1e-5.
 _NEARLY_STRAIGHT = cython.declare(cython.double, 1e-7)
-# A curve that becomes shorter by less than this share has not changed: rounding.
+# A curve that becomes shorter by less than this share has not changed: rounding. From 1e-14 to 1e-10 lengths are the
+# same; with 1e-15 those of three paths and four loops are not.
 _GAIN = cython.declare(cython.double, 1e-13)
-# The other side of a vertex is tried on open paths unless it promises to lose more than this share of the square of a
-# straight part. The promise looks at one vertex alone: other vertices beside it change the length by some percent.
-_LARGEST_LOSS = cython.declare(cython.double, 0.01)
-# Cosine by which the angle that a path spans may fall short of half of those around the vertex.
+# Cosine by which the angle that a path spans may fall short of half of those around the vertex. With 0.01, 27 paths are
+# longer, by up to 1 %; with 0.1, 128 are shorter, and one is longer.
 _MARGIN_OF_TURN = cython.declare(cython.double, 0.03)
-# The base of a loop does not slide by a smaller share of its edge.
-_SHORTEST_SLIDE = cython.declare(cython.double, 1e-4)
-# So many vertices are noted at a time, and tried altogether on one path.
+# So many vertices are noted at a time, and tried altogether on one path. With 16, 44 and 46 paths are longer; with
+# 1024, one is shorter, and of the second nothing changes from 64 on.
 _MOST_CHOICES = cython.declare(cython.int, 64)
 _MOST_TRIED = cython.declare(cython.int, 256)
-# A loop whose length stays the same from this many bases, one after another, is straight at all of them.
+# A loop whose length stays the same from this many bases, one after another, is straight at all of them. With 1, two
+# loops are longer; with 3 none changes.
 _BOTH_WAYS = cython.declare(cython.int, 2)
 # Before the loop is straightened from one, it is led past its bends from so many: with 3 and without bound, more loops
 # are longer than those of flips of edges.
 _FIRST_BASES = cython.declare(cython.int, 8)
-# From so many at most: a loop moves to the next vertex with each.
+# From so many at most: a loop moves to the next vertex with each. No loop of the 300 moves 30 times.
 _MOST_BASES = cython.declare(cython.int, 100000)
 
 _CHOICE = np.dtype([("saved", "f8"), ("vertex", "i4"), ("first", "i4"), ("last", "i4")], align=True)
@@ -71,9 +73,7 @@ class Shortener:
         stuck: cython.Py_ssize_t = -1
         for c in range(3):
             start.c[c], end.c[c] = ends[0, c], ends[1, c]
-        # A loop is straightened from many bases.
-        self.largest_loss = 0.0 if is_closed else _LARGEST_LOSS
-        self.segments.n, self.length = 0, 0.0
+        self.segments.n, self.length, self.is_loop = 0, 0.0, is_closed
         with cython.nogil:
             self.begin(face[0], start)
             for i in range(join.shape[0]):
@@ -322,7 +322,9 @@ class Shortener:
     def note(self, j: cython.int, side: cython.int, saved: cython.double) -> cython.void:
         """Insert the vertex at a side of crossing j into the sorted choices."""
         v: cython.int = self.funnel.gate[j].vertex[side]
-        if not saved > -self.largest_loss:
+        # The promise looks at one vertex alone, and those beside it may turn a loss into a gain: an open path tries it.
+        # A loop, which is straightened from many bases, would often slide off to a shorter one far away, or to none.
+        if self.is_loop and not saved > 0.0:
             return
         for k in range(self.n_tried):
             if self.tried[k] == v:
@@ -417,7 +419,7 @@ class Shortener:
         here: cython.double = self.ends.start.c[b]
         self.save()
         # The straight line may leave the strip. The length is a convex function of the share: a shorter way helps.
-        while fabs(share - here) > _SHORTEST_SLIDE:
+        while fabs(share - here) > SNAP:
             self.place_base(f, a, b, a_end, b_end, share)
             trial: cython.double = self.settle()
             if trial < length * (1.0 - _GAIN):
