@@ -185,6 +185,8 @@ def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told():
     assert not drawn.figure.legends
     with pytest.raises(ValueError, match="limits must be two numbers, the lower one first"):
         plot_field(mesh, x, label="heat", limits=(1, 0))
+    with pytest.raises(ValueError, match="view must be two angles in degrees"):
+        plot_field(mesh, x, label="heat", view=(30, 20, 10))
     with pytest.raises(ValueError, match=r"values\[2\] is NaN"):
         plot_field(mesh, np.where(np.arange(441) == 2, np.nan, x), label="heat")
 

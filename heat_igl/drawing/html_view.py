@@ -194,6 +194,8 @@ def _add_sweep(arrays: dict[str, AnyArray], meta: dict[str, Any], mesh: Mesh) ->
 def _add_fields(arrays: dict[str, AnyArray], meta: dict[str, Any], fields: Mapping[str, ArrayLike], n: int) -> None:
     """Add further fields: the name of each, and how many numbers it has at a vertex."""
     meta["fields"] = []
+    if not isinstance(fields, Mapping):
+        raise ValueError(f"fields must be a dictionary of names and values, not {type(fields).__name__}")
     for name, given in fields.items():
         if name in ("distance", _LOG_MAP, ""):
             raise ValueError(f"fields cannot have the name {name!r}, which the page uses itself")

@@ -113,7 +113,10 @@ def scene(
         marked = np.arange(len(V), len(shown)) if len(shown) > len(V) else None
         turn = default_rotation(shown @ upright.T, F, used, marked)
     else:
-        turn = rotation(*view)
+        angles = real_numbers("view", view)
+        if angles.shape != (2,) or not np.isfinite(angles).all():
+            raise ValueError(f"view must be two angles in degrees, azimuth and elevation, not {view!r}")
+        turn = rotation(*angles)
     return Scene(
         V=V, F=F, used=used, centre=centre, unit=unit, turn=turn @ upright, values=checked,
         limits=(low, high if high > low else low + 1.0), step=step, vertices=vertices, dots=dots, lines=lines,

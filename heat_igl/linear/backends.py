@@ -62,6 +62,10 @@ def analyse(pattern: sp.csc_matrix, backend: Backend = "auto") -> Analysis:
     ValueError if there is no such backend.
     """
     require_choice("backend", backend, get_args(Backend))
+    if getattr(pattern, "format", None) != "csc":
+        raise ValueError(
+            f"the matrix must be a scipy.sparse.csc_matrix, not {type(pattern).__name__}: csc_matrix(A) is"
+        )
     n = pattern.shape[0]
     if backend != "auto" or n < SMALLEST_MULTIFRONTAL:
         return _ANALYSES["scipy" if backend == "auto" else backend](pattern)
