@@ -17,16 +17,8 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.transform import Rotation
 from surfaces import arcs, dual_of_sphere, moebius_strip, on_pages
 
-from heat_igl import (
-    Mesh,
-    PointCloud,
-    PolygonMesh,
-    fibre_metric,
-    image_domain,
-    metric_operators,
-    shapes,
-    speed_operators,
-)
+import heat_igl
+from heat_igl import Mesh, PolygonMesh, fibre_metric, image_domain, metric_operators, shapes, speed_operators
 from heat_igl.geodesic import SolverChoice
 from heat_igl.geodesic.choice import Solver
 from heat_igl.validation.closed_forms import around_the_wall, by_fermat, straight
@@ -58,7 +50,7 @@ class Domain:
     def made(self) -> Any:
         """What a solver is given."""
         if self.kind == "points":
-            return PointCloud(self.V, self.field)
+            return heat_igl.PointCloud(self.V, self.field)
         if self.kind == "polygons":
             return PolygonMesh(self.V, self.cells)
         mesh = Mesh(self.V, self.cells)

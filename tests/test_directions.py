@@ -3,30 +3,13 @@
 import numpy as np
 import pytest
 from conftest import flat_perturbed, perturbed
-from scipy.spatial import ConvexHull
 from surfaces import angle_between, nearest_vertex, on, twice
 
 import heat_igl
-from heat_igl import (
-    GeodesicSolver,
-    Mesh,
-    SurfacePoints,
-    exp_map,
-    geodesic_path,
-    isolines,
-    log_map,
-    shapes,
-    tangent_frames,
-)
+from heat_igl import GeodesicSolver, Mesh, SurfacePoints, exp_map, isolines, log_map, shapes, tangent_frames
 from heat_igl.mesh import region_boundary
+from heat_igl.validation.construction import hull
 from heat_igl.windows import ExactSurface, vectors_from
-
-
-def convex_hull(P: np.ndarray) -> Mesh:
-    """The hull of points around the origin, its faces counterclockwise from outside."""
-    F = ConvexHull(P).simplices
-    inward = np.linalg.det(P[F]) < 0
-    return Mesh(P, np.where(inward[:, None], F[:, ::-1], F))
 
 
 def straight(mesh: Mesh, source: int | SurfacePoints) -> np.ndarray:
@@ -113,7 +96,7 @@ def test_exp_map_undoes_the_log_map_from_edges_that_were_flipped(seed, place):
     rng = np.random.default_rng(seed)
     P = rng.normal(size=(100, 3))
     # Stretched as much, a hull has thin faces, of which almost all edges are flipped.
-    mesh = convex_hull(P / np.linalg.norm(P, axis=1, keepdims=True) * [1, 10, 100])
+    mesh = hull(P / np.linalg.norm(P, axis=1, keepdims=True) * [1, 10, 100])
     start = SurfacePoints([int(rng.integers(mesh.n_faces))], np.array([place]))
     log = log_map(mesh, start, method="exact")
     gap = np.linalg.norm(exp_map(mesh, start, log).positions(mesh) - mesh.V, axis=1)
@@ -338,7 +321,7 @@ def test_paths_from_a_curve_start_at_the_nearest_place_on_it():
 
 @pytest.mark.slow
 def test_exact_paths_from_curves_lead_back_to_the_vertices(sphere):
-    level, through_vertices = isolines(sphere, sphere.V[:, 2], 0.3)[0], geodesic_path(sphere, [5, 900])
+    level, through_vertices = isolines(sphere, sphere.V[:, 2], 0.3)[0], heat_igl.geodesic_path(sphere, [5, 900])
     for sources in (level, through_vertices, [level, SurfacePoints([7], [[0.2, 0.3, 0.5]]), 100]):
         solver = GeodesicSolver(sphere, method="exact")
         found = solver.directions(sources)

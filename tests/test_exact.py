@@ -2,13 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import (
-    flat_perturbed,
-    perturbed,
-    pygeodesic_distance,
-    relative_error,
-    zoo,
-)
+from conftest import flat_perturbed, perturbed, pygeodesic_distance, relative_error, zoo
 from scipy.spatial import Delaunay
 from surfaces import (
     COORDINATES,

@@ -5,15 +5,7 @@ import pytest
 from conftest import perturbed
 
 import heat_igl
-from heat_igl import (
-    GeodesicSolver,
-    HeatMethodSolver,
-    Mesh,
-    OffsetSources,
-    SurfacePoints,
-    geodesic_distance,
-    shapes,
-)
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
 from heat_igl.plan import SurfaceMeasures, distance_plan, sweep_plan
 from heat_igl.windows import engine
 from heat_igl.windows.tables import from_mesh

@@ -10,17 +10,7 @@ from conftest import flat_perturbed, perturbed
 from surfaces import assert_connected
 
 import heat_igl
-from heat_igl import (
-    Mesh,
-    MeshError,
-    SourceError,
-    SurfaceCurve,
-    SurfacePoints,
-    edge_curve,
-    geodesic_path,
-    shapes,
-    straighten,
-)
+from heat_igl import Mesh, MeshError, SurfaceCurve, SurfacePoints, edge_curve, geodesic_path, shapes, straighten
 from heat_igl.curves import GeodesicPathSolver
 
 
@@ -315,7 +305,7 @@ def test_loops_that_contract_become_points(sphere):
     point = straighten(sphere, edge_curve(sphere, order, closed=True))
     assert point.is_closed
     assert length(sphere, point) == 0
-    with pytest.raises(SourceError, match="contracts to a point"):
+    with pytest.raises(heat_igl.SourceError, match="contracts to a point"):
         geodesic_path(sphere, order[:3], closed=True)
 
 

@@ -5,19 +5,7 @@ import pytest
 from scipy import ndimage
 
 import heat_igl
-from heat_igl import (
-    GeodesicSolver,
-    HeatMethodSolver,
-    MeshError,
-    PointCloud,
-    PolygonMesh,
-    image_domain,
-    metric_operators,
-    read_point_cloud,
-    shapes,
-    speed_operators,
-    terrain,
-)
+from heat_igl import HeatMethodSolver, PointCloud, image_domain, metric_operators, read_point_cloud, terrain
 from heat_igl.compat import igl as igl_names
 from heat_igl.compat import potpourri3d as potpourri3d_names
 from heat_igl.geodesic import SolverChoice
@@ -124,8 +112,8 @@ def test_speeds_of_voxels():
     mask = np.ones((3, 3, 12), bool)
     domain = image_domain(mask)
     speed = np.where(np.arange(12) < 6, 1.0, 4.0) * np.ones(mask.shape)
-    operators = speed_operators(domain.mesh, domain.per_face(speed))
-    found = domain.image(GeodesicSolver(operators).distance(domain.index[1, 1, 0]))
+    operators = heat_igl.speed_operators(domain.mesh, domain.per_face(speed))
+    found = domain.image(heat_igl.GeodesicSolver(operators).distance(domain.index[1, 1, 0]))
     np.testing.assert_allclose(found[1, 1, [5, 11]], [5, 5.5 + 5.5 / 4], rtol=1e-3)
 
 
@@ -136,19 +124,19 @@ def test_planar_points_of_files(tmp_path):
     for name in ("a.npy", "a.xyz"):
         np.testing.assert_array_equal(read_point_cloud(tmp_path / name).P, PointCloud(P).P)
     np.save(tmp_path / "b.npy", np.ones((30, 4)))
-    with pytest.raises(MeshError, match=r"or \(n, 2\) in the plane, but its shape is \(30, 4\)"):
+    with pytest.raises(heat_igl.MeshError, match=r"or \(n, 2\) in the plane, but its shape is \(30, 4\)"):
         read_point_cloud(tmp_path / "b.npy")
 
 
 # What each function that takes positions makes of two columns is what it makes of three with z = 0.
-FLAT = shapes.disk(6)
+FLAT = heat_igl.shapes.disk(6)
 TAKE_POSITIONS = {
     "HeatMethodSolver": lambda V: HeatMethodSolver(V, FLAT.F).distance(3),
     "geodesic_distance": lambda V: heat_igl.geodesic_distance((V, FLAT.F), 3),
     "closest_points": lambda V: heat_igl.closest_points(FLAT, V[:5] / 2).points.barycentric,
     "curve_on": lambda V: heat_igl.curve_on(FLAT, V[[0, 4, 9]]).start,
     "PointCloud": lambda V: HeatMethodSolver(PointCloud(V)).distance(3),
-    "PolygonMesh": lambda V: HeatMethodSolver(PolygonMesh(V, FLAT.F)).distance(3),
+    "PolygonMesh": lambda V: HeatMethodSolver(heat_igl.PolygonMesh(V, FLAT.F)).distance(3),
     "tangent_frames": lambda V: heat_igl.tangent_frames((V, FLAT.F)).x,
     "closed_forms.plane": lambda V: heat_igl.validation.closed_forms.plane((V, FLAT.F), 3),
     "with_vertices": lambda V: HeatMethodSolver(FLAT).with_vertices(2 * V).distance(3),

@@ -8,15 +8,7 @@ from conftest import mean_error, perturbed, zoo
 from surfaces import angle_between, moebius_strip, on_pages
 
 import heat_igl
-from heat_igl import (
-    GeodesicSolver,
-    HeatMethodSolver,
-    Mesh,
-    SurfacePoints,
-    geodesic_distance,
-    shapes,
-    tangent_frames,
-)
+from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, shapes, tangent_frames
 from heat_igl.intrinsic import (
     Flipped,
     IntrinsicTriangulation,

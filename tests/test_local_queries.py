@@ -11,23 +11,9 @@ from conftest import perturbed
 from surfaces import angle_between, bent_pages, bumpy, on, two_arms
 
 import heat_igl
-from heat_igl import (
-    Mesh,
-    distances_within,
-    log_maps_within,
-    nearest_vertices,
-    pair_distances,
-    shapes,
-    tangent_frames,
-)
+from heat_igl import Mesh, distances_within, log_maps_within, nearest_vertices, pair_distances, shapes, tangent_frames
 from heat_igl.typing import FloatArray
-from heat_igl.windows import (
-    blocks_within,
-    local,
-    read_distances_within,
-    within_store,
-    write_distances_within,
-)
+from heat_igl.windows import blocks_within, local, read_distances_within, within_store, write_distances_within
 from heat_igl.windows.exact import ExactSurface, Found, exact_distance
 from heat_igl.windows.tables import from_mesh
 

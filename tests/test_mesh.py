@@ -10,18 +10,7 @@ from hypothesis import strategies as st
 from surfaces import assert_connected, twice
 
 import heat_igl
-from heat_igl import (
-    Mesh,
-    MeshError,
-    PolygonMesh,
-    SourceError,
-    SurfaceCurve,
-    SurfacePoints,
-    closest_points,
-    curve_on,
-    edge_curve,
-    shapes,
-)
+from heat_igl import Mesh, MeshError, SourceError, SurfacePoints, closest_points, curve_on, edge_curve, shapes
 from heat_igl.mesh import connectivity
 from heat_igl.validation.construction import tetrahedra
 
@@ -339,7 +328,7 @@ def test_a_sheet_of_quadrilaterals_is_not_taken_for_tetrahedra(bend, n):
     V, F = quads(bend, n)
     with pytest.raises(MeshError, match=r"F has 4 columns, which stands for tetrahedra, but F\[\d+\] = .* is a quadri"):
         Mesh(V, F)
-    assert PolygonMesh(V, F).triangles.n_faces == 2 * n * n
+    assert heat_igl.PolygonMesh(V, F).triangles.n_faces == 2 * n * n
 
 
 @pytest.mark.parametrize(
@@ -405,7 +394,7 @@ def test_positions_are_weighted_corners():
 
 def test_a_curve_runs_through_its_corners():
     # Down the edge 1-2 in face 0, then to vertex 3 in face 1.
-    curve = SurfaceCurve([0, 1], [[0, 1, 0], [0, 0, 1]], [[0, 0, 1], [0, 1, 0]])
+    curve = heat_igl.SurfaceCurve([0, 1], [[0, 1, 0], [0, 0, 1]], [[0, 0, 1], [0, 1, 0]])
     np.testing.assert_allclose(curve.positions(MESH), [[2, 0, 0], [0, 4, 0], [2, 4, 6]])
     np.testing.assert_allclose(curve.lengths(MESH), [np.sqrt(20), np.sqrt(40)])
 

@@ -6,14 +6,7 @@ from conftest import flat_perturbed, perturbed, zoo
 from surfaces import assert_connected, moebius_strip, on, rough_field, rough_star, two_arms
 
 import heat_igl
-from heat_igl import (
-    Mesh,
-    OffsetSources,
-    SurfacePoints,
-    isolines,
-    shapes,
-    shortest_paths,
-)
+from heat_igl import Mesh, OffsetSources, SurfacePoints, isolines, shapes, shortest_paths
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES

@@ -14,17 +14,7 @@ from conftest import zoo
 from surfaces import twice
 
 import heat_igl
-from heat_igl import (
-    AccuracyWarning,
-    HeatMethodSolver,
-    Mesh,
-    SourceError,
-    cli,
-    reference,
-    shapes,
-    validate,
-    validation,
-)
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, SourceError, cli, reference, shapes, validate, validation
 from heat_igl.heat.steps import NormalizedDivergence
 from heat_igl.operators import Operators, operators
 from heat_igl.validation import closed_forms, draw_sources, metrics

@@ -7,15 +7,7 @@ import numpy as np
 import pytest
 from conftest import mean_error, zoo
 
-from heat_igl import (
-    AccuracyWarning,
-    HeatMethodSolver,
-    Mesh,
-    OffsetSources,
-    SurfacePoints,
-    geodesic_distance,
-    shapes,
-)
+from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
 from heat_igl.errors import FactorizationError
 from heat_igl.heat.source_terms import SourceAssembler, drop_overtaken
 from heat_igl.intrinsic import mollify

@@ -14,13 +14,7 @@ import typer
 
 import heat_igl
 from heat_igl.cli.options import say
-from heat_igl.errors import (
-    AccuracyWarning,
-    BatchError,
-    FactorizationError,
-    MissingExtraError,
-    ReferenceSolverError,
-)
+from heat_igl.errors import AccuracyWarning, BatchError, FactorizationError, MissingExtraError, ReferenceSolverError
 
 # Errors that a user can cause. Any other exception is a fault of the package and shows a traceback.
 _EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolverError, MissingExtraError, MemoryError)

@@ -19,16 +19,7 @@ from heat_igl import reference
 from heat_igl.cli import options as opt
 from heat_igl.cli.demo import demonstrate
 from heat_igl.cli.distances import projected
-from heat_igl.cli.options import (
-    check_file,
-    check_json,
-    check_writable,
-    described,
-    plan_row,
-    print_report,
-    print_rows,
-    say,
-)
+from heat_igl.cli.options import described, print_report, print_rows, say
 from heat_igl.drawing.figure import Picture
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import SignedHeatSolver
@@ -49,7 +40,7 @@ def info(mesh: opt.MeshArgument, points: opt.PointsOption = False, json_file: op
     report = loaded.report()
     rows = [(*row, value) for row, value in zip(report.rows(), plain(asdict(report)).values(), strict=True)]
     try:
-        plan = [plan_row(heat_igl.GeodesicSolver(loaded).plan)]
+        plan = [opt.plan_row(heat_igl.GeodesicSolver(loaded).plan)]
     except heat_igl.MeshError:  # the report above says what is wrong
         plan = []
     print_rows([described(mesh, loaded), *rows, *plan], json_file)
@@ -125,7 +116,7 @@ def view(
     from heat_igl.drawing.figure import PAGE_SUFFIXES
 
     target = html or Path(f"{mesh.stem}-view.html")
-    check_file("--html", target, "pages", PAGE_SUFFIXES, "matplotlib view")
+    opt.check_file("--html", target, "pages", PAGE_SUFFIXES, "matplotlib view")
     loaded = read_mesh_or_cloud(mesh, points)
     sources = vertex_sources(np.array(source or [0]), loaded.n_vertices)
     with Console(stderr=True).status("measuring"):
@@ -154,6 +145,6 @@ def demo(
 ) -> None:
     """Distance on a real mesh, with errors against exact distance, files and a picture."""
     out.mkdir(parents=True, exist_ok=True)
-    check_writable(out / "demo.png")
-    check_json(json_file)
+    opt.check_writable(out / "demo.png")
+    opt.check_json(json_file)
     print_rows(demonstrate(out), json_file)

@@ -240,7 +240,9 @@ def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
             raise SourceError(f"the mask {name} selects no vertex: set at least one entry")
         return np.flatnonzero(array)
     if array.dtype.kind not in "iu":
-        raise SourceError(f"{name} must be {_ACCEPTED}, not {_first_of_wrong_type(array)}")
+        is_float = array.dtype.kind == "f"
+        found = f"floats such as {array[0]}; convert with int()" if is_float else f"{array.dtype} such as {array[0]!r}"
+        raise SourceError(f"{name} must be {_ACCEPTED}, not {found}")
     outside = (array < 0) | (array >= n)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
@@ -259,12 +261,6 @@ def are_positions(places: object) -> bool:
     except ValueError:
         return False
     return array.dtype.kind == "f" and array.ndim in (1, 2) and array.shape[-1] == 3
-
-
-def _first_of_wrong_type(array: AnyArray) -> str:
-    if array.dtype.kind == "f":
-        return f"floats such as {array[0]}; convert with int()"
-    return f"{array.dtype} such as {array.ravel()[0]!r}"
 
 
 def _checked_offsets(offsets: ArrayLike) -> FloatArray:
