@@ -185,11 +185,12 @@ def left_of_closed(
     return total[region[:n]] > 0, decided[region[:n]] & free
 
 
-def left_beside(triangulation: IntrinsicTriangulation, sources: OrientedSet) -> tuple[BoolArray, FloatArray]:
-    """Which vertices (n,) are on the left of the nearest segment in their faces, and how far (n,) that is at least.
+def left_beside(
+    mesh: Mesh, triangulation: IntrinsicTriangulation, sources: OrientedSet
+) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Which vertices (n,) are left of the nearest segment in their faces, of which that is known, and which are on it.
 
-    The distance is ``inf`` for vertices without a segment in their faces, those that see it almost along it, and those
-    on it. `triangulation` is the faces of the mesh.
+    It is known if a vertex does not see the segment almost along it. `triangulation` is the faces of the mesh.
     """
     seen = _seen(triangulation, sources)
     face, place = np.divmod(seen.place, 6)
@@ -200,9 +201,9 @@ def left_beside(triangulation: IntrinsicTriangulation, sources: OrientedSet) -> 
     told = np.flatnonzero((away <= nearest[vertex] * (1 + _SAME_DISTANCE)) & (angle > _LEAST_SINE))
     # Of segments that meet in the nearest place, the one seen under the largest angle is written last.
     told = told[np.argsort(angle[told], kind="stable")]
-    left, distance = np.zeros(len(nearest), bool), np.full(len(nearest), np.inf)
-    left[vertex[told]], distance[vertex[told]] = seen.sine[corner[told]] > 0, away[told] * (1 - _SAME_DISTANCE)
-    return left, distance
+    left, is_known = np.zeros((2, len(nearest)), bool)
+    left[vertex[told]], is_known[vertex[told]] = seen.sine[corner[told]] > 0, True
+    return left, is_known, nearest <= same_place(mesh)
 
 
 class _Seen(NamedTuple):

@@ -6,10 +6,9 @@ Crane (2024), and a level.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, reduce
-from typing import Literal, TypeVar, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -44,7 +43,6 @@ _CLOSED_BY_HEAT = 0.5
 # Share of the vertices beside curves that may be on the other side for the heat, whose zero curve is up to half an edge
 # off. It is 4 % at most on 48 broken levels (docs/signed_theory.md).
 _CONTRADICTED = 0.05
-Other = TypeVar("Other")
 
 # Normals that sum to less than this share of the length of the curves have cancelled.
 _CANCELLED = 1e-9
@@ -208,7 +206,7 @@ class SignedHeatSolver:
 
     def _from_heat(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) by integration, and which vertices (n,) are on the left."""
-        _, phi = self._integration.distance_beside(lambda: None, chosen, level)
+        phi = self._integration.distance(chosen, level)
         if level == "zero":
             phi[vertices_on(self._mesh, chosen)] = 0.0
         if level == "zero" and not has_gaps(self._mesh, chosen):
@@ -218,23 +216,18 @@ class SignedHeatSolver:
 
     def _measured(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) from the curves, with their gaps closed, and which vertices (n,) are on the left."""
-        sources, on_curve, size = chosen.unoriented(), same_place(self._mesh), None
+        sources, size = chosen.unoriented(), None
         left, is_known = np.zeros((2, self.n_vertices), bool)
         if not has_gaps(self._mesh, chosen):
             size, (left, is_known) = both(
                 lambda: self._from(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
             )
-            if (is_known | (size <= on_curve) | np.isinf(size)).all():
+            if (is_known | (size <= same_place(self._mesh)) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
-        # The nearest segment in the faces of a vertex may not be the nearest of all.
-        left_of_nearest, away = left_beside(self._faces, chosen)
-        reach = float(away.max(where=np.isfinite(away), initial=on_curve))
-        near, phi = self._integration.distance_beside(
-            lambda: self._exact.windows.distance(self._places(sources), reach) if size is None else size, chosen, level
-        )
-        is_beside = np.isfinite(away) & (away <= near)
-        left = np.where(is_known, left, np.where(is_beside, left_of_nearest, phi < 0))
-        closing = closing_of_gaps(self._mesh, chosen, phi, left, near <= on_curve)
+        phi = self._integration.distance(chosen, level)
+        of_nearest, is_beside, on_curve = left_beside(self._mesh, self._faces, chosen)
+        left = np.where(is_known, left, np.where(is_beside, of_nearest, phi < 0))
+        closing = closing_of_gaps(self._mesh, chosen, phi, left, on_curve)
         self._warn_if_unsure(chosen, closing, np.flatnonzero(is_beside & (left != (phi < 0))), int(is_beside.sum()))
         if size is None:
             return self._from(sources if closing is None else [sources, closing]), left
@@ -329,13 +322,10 @@ class NormalIntegration:
         self._D = divergence_matrix(gradient, triangulation.areas)
         self._domain, self._heat_flow, self._poisson = domain, parts.heat_flow, parts.poisson
 
-    def distance_beside(
-        self, other: Callable[[], Other], chosen: OrientedSet, level: Level
-    ) -> tuple[Other, FloatArray]:
-        """The result of a shorter computation, which runs on a thread of its own, and the signed distance (n,).
+    def distance(self, chosen: OrientedSet, level: Level) -> FloatArray:
+        """The signed distance (n,): steps 1 to 3 of the method, less the level.
 
-        It takes steps 1 to 3 of the method, less the level. A `SourceError` if the normals of all curves cancel, or one
-        of a point is that of the face.
+        A `SourceError` if the normals of all curves cancel, or one of a point is that of the face.
         """
         pieces = self._pieces(chosen)
 
@@ -344,9 +334,9 @@ class NormalIntegration:
             smooth, rest = self._level(phi, pieces, level)
             return phi - smooth, rest
 
-        # The level needs that heat as well, and the other thread has less to do.
-        (found, heat), (phi, rest) = both(lambda: (other(), self._heat(pieces)), integrated)
-        return found, phi if level == "none" else phi - self._extended(rest, pieces, heat)
+        # The level needs that heat as well.
+        heat, (phi, rest) = both(lambda: self._heat(pieces), integrated)
+        return phi if level == "none" else phi - self._extended(rest, pieces, heat)
 
     def _integrated(self, pieces: Pieces) -> FloatArray:
         """The signed distance (n,) up to a level."""
