@@ -241,9 +241,9 @@ def test_few_points_in_a_plane(n):
     P = plane(n, seed=n)
     cloud = PointCloud(P)
     found = GeodesicSolver(cloud).distance(0)
-    straight = np.linalg.norm(P - P[0], axis=1)
-    assert (found >= straight - 1e-12).all()
-    assert np.median(found - straight) < 1e-9
+    excess = found - np.linalg.norm(P - P[0], axis=1)
+    assert excess.min() >= -1e-12
+    assert np.median(excess) < 1e-9
     vectors = heat_igl.VectorHeatSolver(cloud, method="windows").log_map(0)
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), found, atol=1e-9)
 
@@ -606,8 +606,7 @@ def test_discs_lie_in_the_tangent_planes_and_continue_the_values():
     mesh, values = discs(cloud, P @ slope)
     np.testing.assert_array_equal(mesh.V[:400], P)
     assert np.abs(mesh.V[:, 2]).max() < 1e-12
-    inner = np.isin(mesh.F[:, 0], np.flatnonzero((np.abs(P[:, :2] - 0.5) < 0.3).all(axis=1)))
-    corners = mesh.F[inner]
+    corners = mesh.F[np.isin(mesh.F[:, 0], np.flatnonzero((np.abs(P[:, :2] - 0.5) < 0.3).all(axis=1)))]
     np.testing.assert_allclose(values[corners], mesh.V[corners] @ slope, atol=1e-9)
     # No gap: every point inside lies on a disc.
     radius = np.linalg.norm(mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]], axis=1)
@@ -643,6 +642,11 @@ def test_a_bite_out_of_the_border_stays():
     rim = 3.2 * np.exp(1j * np.linspace(0, np.pi, 11))
     P = np.concatenate([np.stack([rim.real, rim.imag, 0 * rim.real], axis=1), P[np.linalg.norm(P, axis=1) > 3.7]])
     assert GeodesicSolver(PointCloud(P)).distance(0)[10] == pytest.approx(3.2 * np.pi, rel=0.04)
+    # Where the spacing changes, the side of a notch may be as long as at the point that is farther from others.
+    P = np.array([[0, 2, 0], [-1, 1, 0], [0, 0, 0], [0.5, 0, 0], [0.25, -0.5, 0]])
+    F = np.array([[0, 1, 2], [1, 4, 2], [2, 4, 3]], np.int32)
+    filled = [with_gaps_filled(P, F, np.array([reach, 1.7, 1.7, 1.7, 1.7]))[0] for reach in (1.7, 3.3)]
+    assert [np.sort(each[3:], axis=1).tolist() for each in filled] == [[], [[0, 2, 3]]]
 
 
 def test_the_border_of_a_small_piece_is_no_gap():
@@ -759,15 +763,13 @@ def test_principal_axes():
 @pytest.mark.parametrize("gap", [2.0, 3.0, 5.0])
 def test_sheets_without_normals_stay_apart(gap):
     """In spacings; in the neighbourhoods of 30 points there are points of both sheets."""
-    n = 1500
-    P, _ = two_sheets(n, gap / np.sqrt(n))
+    P, _ = two_sheets(1500, gap / np.sqrt(1500))
     inner = (np.abs(P[:, :2] - 0.5) < 0.35).all(axis=1)
     upper = P[:, 2] > 0
     F = PointCloud(P).F
     F = F[inner[F].all(axis=1)]
-    joins = upper[F].any(axis=1) != upper[F].all(axis=1)
     assert len(F) > 2000
-    assert not joins.any()
+    assert (upper[F].any(axis=1) == upper[F].all(axis=1)).all()
 
 
 def test_the_two_sides_of_a_thin_disc():
@@ -775,15 +777,12 @@ def test_the_two_sides_of_a_thin_disc():
     rng, n, thickness = np.random.default_rng(3), 3000, 0.12
     radius, angle = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
     radius[:2] = 0
-    flat = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    side = np.where(np.arange(n) % 2 == 0, 1, -1) * thickness / 2
+    flat = np.stack([radius * np.cos(angle), radius * np.sin(angle), thickness * (0.5 - np.arange(n) % 2)], axis=1)
     # A round rim, so that there is one surface.
-    turn = np.pi * (rng.random(400) - 0.5)
-    around = 2 * np.pi * rng.random(400)
+    turn, around = np.pi * (rng.random((2, 400)) - 0.5) * [[1], [2]]
     out = 1 + thickness / 2 * np.cos(turn)
     rim = np.stack([out * np.cos(around), out * np.sin(around), thickness / 2 * np.sin(turn)], axis=1)
-    P = np.concatenate([np.append(flat, side[:, None], axis=1), rim])
-    distance = GeodesicSolver(PointCloud(P), method="exact").distance(0)
+    distance = GeodesicSolver(PointCloud(np.concatenate([flat, rim])), method="exact").distance(0)
     assert distance[1] == pytest.approx(2 + np.pi * thickness / 2, rel=0.03)
 
 

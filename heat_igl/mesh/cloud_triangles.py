@@ -81,8 +81,7 @@ def with_gaps_closed(
     is_apart, is_part = part != np.argmax(size), (size > K)[part]
     # Stars are flat: there is more only where triangles came after them.
     around = F.compress(~at_all_corners(~is_gap, F), axis=0)
-    turn = np.bincount(around.ravel(), igl.internal_angles(P, around).ravel(), len(P))
-    is_doubtful = is_gap & (turn > _CROWDED)
+    is_doubtful = is_gap & (np.bincount(around.ravel(), igl.internal_angles(P, around).ravel(), len(P)) > _CROWDED)
     at_gap = np.flatnonzero(is_gap & is_part & (near.index[:, -1] < 0))
     is_doubtful[torn_points(F, tree.neighbours[0][at_gap, : _NEAREST + 1], is_part, _EDGES_AWAY)] = True
     others = np.flatnonzero(is_apart & is_part)

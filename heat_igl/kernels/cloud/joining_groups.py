@@ -10,7 +10,7 @@ def turned_groups(
     weights: cython.const[cython.double][::1],
     sizes: cython.const[cython.longlong][::1],
 ):
-    """Which of n groups to turn, for pairs of groups with weights that are negative if just one of both should be.
+    """Which (n,) of n groups to turn, for pairs with weights that are negative if just one of both groups should be.
 
     The weights of all pairs between two groups add up. In a round each group is joined to the one to which its join is
     strongest for the sizes of both, if that is larger, or of the same size and a lower number, until nothing is joined.
@@ -20,10 +20,6 @@ def turned_groups(
     pairs : (k, 2) int32
     weights : (k,) float64
     sizes : (n,) int64
-
-    Returns
-    -------
-    (n,) bool
     """
     n: cython.Py_ssize_t = sizes.shape[0]
     k: cython.Py_ssize_t = pairs.shape[0]

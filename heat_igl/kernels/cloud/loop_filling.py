@@ -66,7 +66,8 @@ def filling_triangles(
     The ear with the smallest circumcircle is clipped from a loop repeatedly, as long as an ear is admissible: this
     fills small gaps, and notches of holes and of the boundary. Ears that join two fans of a point come first, whatever
     their size, in ascending order of the third side. Ears that fold back, as in creases, or whose third side is longer
-    than the largest admissible circumradius, come last, and are kept only if they close the loop.
+    than the largest admissible circumradius, come last, and are kept only if they close the loop; but beside a sparser
+    part, where another side of the ear is longer, that of its end there counts.
 
     Parameters
     ----------
@@ -314,8 +315,11 @@ class _Gaps:
             return -1.0 / square if square > 0.0 else -INFINITY
         radius: cython.double = circumradius(self.P, a, b, c)
         most: cython.double = min(self.largest[a], min(self.largest[b], self.largest[c]))
+        longest: cython.double = most
+        if max(self.square(a, b), self.square(b, c)) > most * most:
+            longest = max(self.largest[a], self.largest[c])
         # The last triangle adds no edge, and closes the gap even if its corners are collinear.
-        if size > 3 and (radius >= most or (flat < 0 and square > most * most)):
+        if size > 3 and (radius >= most or (flat < 0 and square > longest * longest)):
             return INFINITY
         folded: cython.double = max(
             self.fold(a, b, c, self.ring[BEYOND, before]), self.fold(b, c, a, self.ring[BEYOND, i])
