@@ -258,7 +258,7 @@ def finer(mesh: Mesh) -> Query:
         simplices = simplices.halved()
     # Of two sources, each vertex first looks for the nearer in space: the other is far away, in no tetrahedron.
     far = mesh.V.max(axis=0) + 10 * np.ptp(mesh.V, axis=0)
-    solver = GeodesicSolver(Mesh(np.vstack([simplices.V, far]), simplices.corners))
+    solver = GeodesicSolver(Mesh(np.vstack([simplices.place, far]), simplices.corners))
     return lambda i: solver.distance([i, simplices.n])[: mesh.n_vertices]
 
 
@@ -609,7 +609,7 @@ def on_choice(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
             other = HopfLaxEngine(simplices).distance(source_set(source, mesh.n_vertices, None))
             off = [np.abs(excess(d, exact)).mean() for d in (one, other)]
             row: Row = {"field": f"{name}, per {where}", "n": mesh.n_vertices, "windows": off[0], "hopf": off[1]}
-            row |= {"variation": simplices.variation, "curvature": mean_angle_defect(intrinsic_triangulation(mesh))}
+            row |= {"variation": simplices.measured[-1], "curvature": mean_angle_defect(intrinsic_triangulation(mesh))}
             yield row | {"chosen": "windows" if domain.simplices is None else "Hopf-Lax"}
 
 

@@ -240,7 +240,7 @@ def test_derivatives_of_lines(hollow):
 def test_halved_tetrahedra():
     mesh = scattered(200)
     halved = MetricSimplices.in_space(mesh).halved()
-    fine = Mesh(halved.V, halved.corners)
+    fine = Mesh(halved.place, halved.corners)
     assert fine.n_vertices == mesh.n_vertices + len(np.unique(np.sort(MetricSimplices.in_space(mesh).edges[0]), axis=0))
     assert fine.n_faces == 8 * mesh.n_faces
     np.testing.assert_allclose(fine.measures.reshape(8, -1), np.tile(mesh.measures / 8, (8, 1)), rtol=1e-7)
@@ -255,7 +255,7 @@ def test_coarse_bodies_with_many_bends():
     body, _ = caves(1, 4)
     fine = MetricSimplices.in_space(body).halved().halved()
     for source in (3, 40):
-        exact = GeodesicSolver(Mesh(fine.V, fine.corners)).distance(source)[: body.n_vertices]
+        exact = GeodesicSolver(Mesh(fine.place, fine.corners)).distance(source)[: body.n_vertices]
         solver = GeodesicSolver(body)
         found = solver.distance(source)
         error = np.delete(found / np.where(exact > 0, exact, 1) - 1, source)

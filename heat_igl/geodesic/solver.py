@@ -256,7 +256,7 @@ class GeodesicSolver(BatchedSolver):
             if domain.simplices is not None:
                 from heat_igl.sweep import HopfLaxEngine, LineEngine
 
-                if domain.simplices.V is not None:
+                if domain.simplices.is_in_space:
                     return distance_plan("tetrahedra", method, tolerance), LineEngine(domain.simplices)
                 chosen = distance_plan("varying metric" if domain.surface else "separate simplices", method, tolerance)
                 if chosen.engine == "hopf-lax":

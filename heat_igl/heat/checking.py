@@ -218,7 +218,7 @@ class Comparisons:
     def _made(self) -> Engine:
         domain, surface = self._domain, self._domain.surface
         if surface is None and domain.simplices is not None:
-            return (HopfLaxEngine if domain.simplices.V is None else LineEngine)(domain.simplices)
+            return (LineEngine if domain.simplices.is_in_space else HopfLaxEngine)(domain.simplices)
         triangles = OperatorTriangles(domain)
         sweep = SweepEngine(triangles)
         if sweep_plan(sweep.measures, _BY_SWEEP).engine == "sweep":
@@ -258,7 +258,7 @@ class Checker:
     def __init__(self, domain: Operators, V: FloatArray | None) -> None:
         surface, simplices, referenced = domain.source_surface, domain.simplices, domain.referenced[: domain.n_given]
         if V is None and simplices is not None:
-            V = simplices.spread
+            V = simplices.least * simplices.place
         self._V = None if V is None else np.ascontiguousarray(V, np.float64)
         self._surface, self._F = surface, None if surface is None else surface.given_faces
         self._referenced, self._uses_all = referenced, bool(referenced.all())

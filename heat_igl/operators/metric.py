@@ -285,7 +285,7 @@ def _unfolded(mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, 
     """The operators of triangles with the lengths `sides` (m, 3), and with `simplices` where these are nearer."""
     domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
     if simplices is not None and not hopf_lax_is_nearer(
-        simplices.variation, mean_angle_defect(intrinsic_triangulation(mesh), True)
+        simplices.measured[-1], mean_angle_defect(intrinsic_triangulation(mesh), True)
     ):
         simplices = None
     return replace(domain, simplices=simplices)
@@ -300,13 +300,12 @@ def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None =
 def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, root: FloatArray, laplacian: Laplacian) -> Operators:
     """The operators of simplices with a metric (n, 3, 3) at each vertex, as `operators_in_metric`."""
     simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
-    mean = g[mesh.F].mean(axis=1)
     if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, simplices, mean)
+        return _TetrahedronOperators(mesh, simplices, g)
     axes = plane_axes(mesh)
-    inside = axes @ mean @ np.swapaxes(axes, 1, 2)
-    sides = simplices.measured[1][:, ::-1]  # opposite each corner
-    if _keeps_shape(sides, np.sqrt(simplices.measured[0][:, ::-1])):
+    inside = axes @ g[mesh.F].mean(axis=1) @ np.swapaxes(axes, 1, 2)
+    sides = simplices.edges[1].reshape(-1, 3)[:, ::-1]  # opposite each corner
+    if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1])):
         return _unfolded(mesh, sides, simplices, laplacian)
     # For heat: what each face says alone.
     domain = operators_in_metric(mesh, inside, least, None, laplacian)
@@ -360,7 +359,7 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
 
 
 class _TetrahedronOperators(Operators):
-    """The operators of tetrahedra with a metric g (m, 3, 3) on each, made on first use: `simplices` need none."""
+    """The operators of tetrahedra in a metric, made on first use: `simplices` need none."""
 
     def __init__(self, mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> None:
         vars(self).update(_of=(mesh, simplices, g), simplices=simplices, is_surface=False)
@@ -388,8 +387,9 @@ class _TetrahedronOperators(Operators):
 
 
 def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Operators:
-    """The operators of tetrahedra with a metric g (m, 3, 3) on each, for heat, and `simplices` for distance."""
+    """The operators of tetrahedra with a metric on each or at each vertex for heat, and `simplices` for distance."""
     m, n = mesh.n_faces, mesh.n_vertices
+    g = g if len(g) == m else g[mesh.F].mean(axis=1)
     # Each in a space of its own: edges times C have the lengths of the metric C C^T.
     corners = mesh.V[mesh.F]
     corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)

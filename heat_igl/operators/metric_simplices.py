@@ -26,21 +26,18 @@ class MetricSimplices:
 
     Attributes
     ----------
-    corners : (m, p + 1) int64
+    corners : (m, p + 1) int64 or int32
         Vertices of each triangle (p = 2) or tetrahedron (p = 3).
-    lengths : (m, pairs) float64
-        Distances between the corners of each, pairs in the order of `np.tril_indices`; empty if they are those between
-        positions `V` or in a metric.
     n : int
         Number of vertices.
-    V : (n, 3) float64 or None
-        Positions, if lengths are the distances between them.
-    place : (n, 3) float64 or None
+    place : (n, 3) float64
         Positions in the space in which the metric is given.
     least : float
         Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
+    lengths : (m, pairs) float64 or None
+        Distances between the corners, pairs in the order of `np.tril_indices`, if not those in `tensors`.
     tensors : (m, 1, 3, 3) float64 or None
-        A metric of each simplex, unless there are velocities.
+        A metric of each simplex; lengths are distances in space if there are neither tensors nor velocities.
     velocity : (k, 6) float64 or None
         Inverse roots of metrics; across a triangle it is the mean in its plane. Of the symmetric matrix the entries on
         and above the diagonal, row by row.
@@ -51,12 +48,11 @@ class MetricSimplices:
         derivatives by them.
     """
 
-    corners: IntArray
-    lengths: FloatArray
+    corners: AnyArray
     n: int
-    V: FloatArray | None = None
-    place: FloatArray | None = None
+    place: FloatArray
     least: float = 1.0
+    lengths: FloatArray | None = None
     tensors: FloatArray | None = None
     velocity: FloatArray | None = None
     rows: AnyArray | None = None
@@ -65,7 +61,7 @@ class MetricSimplices:
     @classmethod
     def in_space(cls, mesh: Mesh) -> MetricSimplices:
         """The faces of a mesh, by the positions of its vertices."""
-        return cls(mesh.F, np.empty(0), mesh.n_vertices, mesh.V, mesh.V, is_given=True)
+        return cls(mesh.F, mesh.n_vertices, mesh.V, is_given=True)
 
     @classmethod
     def in_metric(
@@ -99,14 +95,15 @@ class MetricSimplices:
             velocity, rows, fitted = _at_corners(mesh, W[:, 0][:, *_ABOVE], planes)
             least = min(least, fitted)
         if velocity is None:
-            return cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, g[:, None], is_given=p == 3)
+            return cls(mesh.F, mesh.n_vertices, mesh.V, least, None, g[:, None], is_given=p == 3)
         if across is not None:
             if not at_vertices:
                 inside = (np.eye(3) - across) @ _symmetric(velocity[rows]) @ (np.eye(3) - across)
                 velocity = _with_normal(inside, across)[..., *_ABOVE]
             rows = np.arange(mesh.F.size, dtype=np.int32).reshape(mesh.F.shape)
         velocity = np.ascontiguousarray(velocity).reshape(-1, 6)
-        return cls(mesh.F, np.empty(0), mesh.n_vertices, None, mesh.V, least, None, velocity, rows, at_vertices)
+        corners = rows if p == 3 and at_vertices else mesh.F
+        return cls(corners, mesh.n_vertices, mesh.V, least, None, None, velocity, rows, at_vertices)
 
     @classmethod
     def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
@@ -116,28 +113,21 @@ class MetricSimplices:
         a, b, c = sides.T**2
         products = np.stack([c, (b + c - a) / 2, (b + c - a) / 2, b], axis=1).reshape(-1, 2, 2)
         tensors = across @ products @ np.swapaxes(across, 1, 2)
-        return cls(F, sides[:, ::-1], len(V), None, V, least, tensors[:, None])
+        return cls(F, len(V), V, least, sides[:, ::-1], tensors[:, None])
 
     @cached_property
     def measured(self) -> tuple[Any, ...]:
         """What `lengths_in_velocity` returns, or the same of one metric for each simplex."""
         if self.velocity is not None:
-            corners, V = np.ascontiguousarray(self.corners, np.int32), np.ascontiguousarray(self.place)
-            return tuple(lengths_in_velocity(corners, V, self.velocity, self.rows))
+            corners = np.ascontiguousarray(self.corners, np.int32)
+            return tuple(lengths_in_velocity(corners, self.place, self.velocity, self.rows))
         lengths = self.lengths
-        if not len(lengths):
-            if self.tensors is None or self.place is None:
-                raise ValueError("these simplices have neither lengths nor a metric")
+        if lengths is None:
             one, other = np.tril_indices(self.corners.shape[1], -1)
             e = self.place[self.corners[:, one]] - self.place[self.corners[:, other]]
-            lengths = np.sqrt(((e @ self.tensors[:, 0]) * e).sum(axis=2))
+            lengths = np.sqrt(((e if self.tensors is None else e @ self.tensors[:, 0]) * e).sum(axis=2))
         mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths))
-        return mean, lengths, mean.max(axis=1), one_each, 0 * one_each, None, 0.0
-
-    @property
-    def variation(self) -> float:
-        """How far lengths of edges differ between the metrics of the corners of a simplex: mean square of the share."""
-        return float(self.measured[6])
+        return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0.0
 
     def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:
         """The tensors (..., 3, 3) of chosen simplices (...) at corners (...)."""
@@ -148,18 +138,27 @@ class MetricSimplices:
         W = _symmetric(self.velocity[self.rows[chosen, corner]])
         return np.asarray(np.linalg.inv(W @ W))
 
-    @cached_property
-    def spread(self) -> FloatArray | None:
-        """Positions (n, 3) so far apart that no path is shorter than the line; None if none are known."""
-        return None if self.place is None else np.ascontiguousarray(self.least * self.place, np.float64)
+    @property
+    def is_in_space(self) -> bool:
+        """Whether lengths are distances between the positions."""
+        return self.tensors is None and self.velocity is None
 
     @property
     def edges(self) -> tuple[IntArray, FloatArray]:
         """Edges (e, 2) of each simplex one after the other, and their lengths (e,) there."""
-        ends = self.corners[:, np.stack(np.tril_indices(self.corners.shape[1], -1), axis=1)].reshape(-1, 2)
-        if self.V is not None:
-            return ends, np.linalg.norm(self.V[ends[:, 0]] - self.V[ends[:, 1]], axis=1)
-        return ends, self.measured[1].ravel()
+        one, other = np.tril_indices(self.corners.shape[1], -1)
+        ends = self.corners[:, np.stack([one, other], axis=1)]
+        e = self.place[ends[:, :, 0]] - self.place[ends[:, :, 1]]
+        if self.is_in_space:
+            lengths = np.linalg.norm(e, axis=2)
+        elif self.velocity is None:
+            lengths = np.sqrt(self.measured[1])
+        else:
+            # Simpson's rule, with the geometric mean of both ends in the middle.
+            inverse = _symmetric(self.measured[0][self.rows])
+            a, b = (np.linalg.norm(np.einsum("mkxy,mky->mkx", inverse[:, k], e), axis=2) for k in (one, other))
+            lengths = (a + 4 * np.sqrt(a * b) + b) / 6
+        return ends.reshape(-1, 2), lengths.ravel()
 
     def halved(self) -> MetricSimplices:
         """Tetrahedra in space, each cut into eight at the middles of the edges; the vertices keep their numbers.
@@ -167,10 +166,10 @@ class MetricSimplices:
         Raises
         ------
         ValueError
-            If these are triangles, or their positions are not known.
+            If these are triangles, or in a metric.
         """
-        if self.V is None or self.corners.shape[1] != 4:
-            raise ValueError("only tetrahedra in space can be halved: give their positions V")
+        if not self.is_in_space or self.corners.shape[1] != 4:
+            raise ValueError("only tetrahedra in space can be halved")
         ends, middle = self._middles()
         ab, ac, bc, ad, bd, cd = self.n + middle.reshape(-1, 6).T
         a, b, c, d = self.corners.T
@@ -179,7 +178,7 @@ class MetricSimplices:
         parts = [(a, ab, ac, ad), (ab, b, bc, bd), (ac, bc, c, cd), (ad, bd, cd, d)]
         parts += [(ac, bd, one, other) for one, other in around]
         corners = np.concatenate([np.stack(part, axis=1) for part in parts])
-        return MetricSimplices.in_space(Mesh(np.concatenate([self.V, self.V[ends].mean(axis=1)]), corners))
+        return MetricSimplices.in_space(Mesh(np.concatenate([self.place, self.place[ends].mean(axis=1)]), corners))
 
     def halfway(self) -> sp.csr_array:
         """The weights (n + e, n) of the vertices in those of `halved`."""

@@ -37,9 +37,6 @@ class HopfLaxEngine(SimplexEngine):
 
     def __init__(self, simplices: MetricSimplices) -> None:
         super().__init__(simplices)
-        mean, _, widest, slack, growth, inverse, _ = simplices.measured
-        place = np.ascontiguousarray(simplices.place)
-        self._in_metric = (simplices.velocity, inverse, simplices.rows, mean, widest, slack, growth, place)
         if self.turning > MOST_TURNING:
             warn_caller(
                 "the metric turns farther than the mesh resolves: over an edge, the ratio of its lengths in two "
@@ -55,15 +52,12 @@ class HopfLaxEngine(SimplexEngine):
         From a sample of the simplices: between the first corner of one, and a simplex that it meets in another, with
         planes of triangles turned into each other. It is 1 where tensors differ by a factor alone, as those of speeds.
         """
-        simplices = self._simplices
-        corners, place = simplices.corners, simplices.place
-        if place is None:
-            return 1.0
+        corners, place = self._simplices.corners, self._simplices.place
         size = corners.shape[1]
         chosen = np.arange(0, len(corners), len(corners) // _SAMPLE + 1)
         one = np.repeat(chosen, size)
         other, corner = np.divmod(self._incident[self._first[corners[chosen]]].ravel(), size)
-        first, two = simplices.metric(one, 0), simplices.metric(other, corner)
+        first, two = self._simplices.metric(one, 0), self._simplices.metric(other, corner)
         if size == 3:
             x, y = (plane_axes(Mesh(place, corners[k])) for k in (one, other))
             here, there = (np.cross(axes[:, 0], axes[:, 1]) for axes in (x, y))
@@ -83,10 +77,16 @@ class HopfLaxEngine(SimplexEngine):
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:  # noqa: ARG002
         """Lower distance to that of second order; returns the rest of what `HopfLax.settle` finds."""
-        self._along_edges(distance, label)
+        return self._scheme.settle(distance, label, offset)
+
+    def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
+        self._scheme.shorten(distance, label)
+
+    @property
+    def _scheme(self) -> Any:
         kernel: Any = HopfLax
-        scheme = kernel(self._corners, self._first, self._incident, *self._in_metric)
-        return scheme.settle(distance, label, offset)
+        velocity = self._simplices.velocity, self._simplices.rows, *self._simplices.measured[:-1]
+        return kernel(self._corners, self._first, self._incident, *velocity, self._simplices.place)
 
     def derivative(self, sources: SourceSet) -> FixedPointDerivative:
         """The distance from source vertices with its derivative."""

@@ -42,7 +42,7 @@ class LineEngine(SimplexEngine):
 
     def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
         super().__init__(simplices)
-        self._V = np.ascontiguousarray(simplices.place)
+        self._V = simplices.place
         self._is_small = simplices.n <= SMALL_BODY
         is_refined = self._is_small and not is_halved and len(self.reflex_edges[0]) > 0
         self._finer = LineEngine(simplices.halved(), is_halved=True) if is_refined else None

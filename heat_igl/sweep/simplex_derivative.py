@@ -445,14 +445,11 @@ class FixedPointDerivative(SimplexDerivative):
 
     def _inputs(self) -> _Inputs:
         simplices, facet, distance = self._simplices, self._vertices[:, 1:], self._state[:, 0]
-        place = simplices.place
-        if place is None:
-            raise ValueError("these simplices have no positions")
         # A metric that is constant in the simplex is one input for all corners.
         corner = self._corner if simplices.velocity is not None else self._corner[:, :1]
         tensors = simplices.metric(self._simplex[:, None], corner)
         start = self._sources.vertex_offset[self._first]
-        return _Inputs(distance[facet], self._state[facet, 1:], place[self._vertices], tensors, start)
+        return _Inputs(distance[facet], self._state[facet, 1:], simplices.place[self._vertices], tensors, start)
 
     def _derivatives(self, name: str) -> Iterator[tuple[tuple[int, ...], FloatArray]]:
         """For each entry of an input: its index, and the derivative (k, 4) of distances and slopes by this entry."""

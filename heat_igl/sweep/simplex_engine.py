@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.kernels.mesh import checking, incidence
+from heat_igl.kernels.mesh import incidence
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine
@@ -55,20 +54,13 @@ class SimplexEngine(Engine):
         distance[sources.vertices], label[sources.vertices] = sources.vertex_offset, np.arange(len(sources.vertices))
         return distance, label
 
-    @cached_property
-    def _paths(self) -> checking.EdgePaths:
-        pairs, lengths = self._simplices.edges
-        return checking.EdgePaths(pairs.astype(np.int32), np.ascontiguousarray(lengths), self._simplices.n)
-
     def _keep_bounds(self, sources: SourceSet, distance: FloatArray, label: AnyArray) -> None:
         """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""
         # In place of a value that is no number, a path along edges is found.
         distance[np.isnan(distance)] = np.inf
-        raise_to_lines(distance, self._simplices.spread, None, sources)
+        raise_to_lines(distance, self._simplices.least * self._simplices.place, None, sources)
         self._along_edges(distance, label)
 
+    @abstractmethod
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         """Lower distance to paths along edges."""
-        labels = label.astype(np.int64)
-        self._paths.shorten(distance, labels)
-        label[:] = labels

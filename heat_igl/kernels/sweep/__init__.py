@@ -14,8 +14,8 @@ in the plane of their triangle; the distance of v is that of the straight line t
 *Hopf-Lax formula* (`heat_igl.sweep.hopf_lax`). The distance of a corner v of a simplex is the least of
 T(x) + |v - x| over the facet opposite, with T the distance on the facet and |v - x| in the metric of the simplex.
 
-Distances begin with those along edges. `hopf_lax` visits vertices in rounds, each after those it depends on
-(`dependencies`), until no distance changes. In `simplex_updates`, the least value with T linear has a closed form, and
-second differences of the square of T are found from the slopes of distance at the corners; `facets` has the least value
-with these, `simplex_metrics` lengths in a velocity that is linear.
+Distances begin with those along edges. `hopf_lax` visits vertices from near to far, then in rounds, each after those it
+depends on, until no distance changes. In `simplex_updates`, the least value with T linear has a closed form, and second
+differences of the square of T are found from the slopes of distance at the corners; `facets` has the least value with
+these, `simplex_metrics` lengths in a velocity that is linear.
 """

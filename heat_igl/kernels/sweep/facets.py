@@ -25,21 +25,17 @@ class Facet:
 
     def dual(self, k: cython.int, e: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """The square of a slope in the inverse metric: e at corner k - 1, or that which rises by e if q = 1."""
+        w: cython.double[3]
         if self.q > 1:
-            w: cython.double[3]
             multiply(cython.address(self.W[k][0]), e, w)
             return w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-        m = cython.address(self.product[0])
-        if self.p == 2:
-            return (m[4] * e[0] * e[0] - 2.0 * m[1] * e[0] * e[1] + m[0] * e[1] * e[1]) / (m[0] * m[4] - m[1] * m[1])
-        # Cofactors.
-        a: cython.double = m[4] * m[8] - m[5] * m[5]
-        b: cython.double = m[5] * m[2] - m[1] * m[8]
-        c: cython.double = m[1] * m[5] - m[4] * m[2]
-        own: cython.double = a * e[0] * e[0]
-        own += (m[0] * m[8] - m[2] * m[2]) * e[1] * e[1] + (m[0] * m[4] - m[1] * m[1]) * e[2] * e[2]
-        mixed: cython.double = b * e[0] * e[1] + c * e[0] * e[2] + (m[1] * m[2] - m[0] * m[5]) * e[1] * e[2]
-        return (own + 2.0 * mixed) / (m[0] * a + m[1] * b + m[2] * c)
+        m: cython.double[6]
+        inverse: cython.double[6]
+        m[0], m[1], m[2], m[3] = self.product[0], self.product[1], self.product[2], self.product[4]
+        m[4], m[5] = self.product[5], self.product[8] if self.p == 3 else 1.0
+        invert(m, inverse)
+        multiply(inverse, e, w)
+        return e[0] * w[0] + e[1] * w[1] + e[2] * w[2]
 
     def along_edges(self) -> cython.double:
         """The least value along an edge to v; sets `share`."""

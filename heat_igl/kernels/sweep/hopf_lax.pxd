@@ -1,5 +1,4 @@
 from heat_igl.kernels.priority_queue cimport PriorityQueue
-from heat_igl.kernels.sweep.dependencies cimport Dependencies
 from heat_igl.kernels.sweep.simplex_updates cimport SimplexUpdate
 
 cdef extern from *:
@@ -14,7 +13,6 @@ cdef extern from *:
 
 cdef class HopfLax:
     cdef SimplexUpdate update
-    cdef Dependencies dependencies
     cdef PriorityQueue waiting
     # Visits from near to far that are left.
     cdef Py_ssize_t left
@@ -31,8 +29,16 @@ cdef class HopfLax:
     cdef double[::1] step
     # What each vertex rose though those at its place did not, and how far T is of second order for it.
     cdef double[::1] risen, weight
+    # Depth-first search has not seen a vertex, has it open, or is done with it; sums of steps over the open ones.
+    cdef int[::1] order, stack
+    cdef unsigned char[::1] state
+    cdef double[::1] sum
 
+    cdef bint is_longer(self, int s, int c, int i) noexcept nogil
+    cdef void wait(self, int v) noexcept nogil
     cdef void sharpen(self) noexcept nogil
     cdef void renew(self, int v) noexcept nogil
     cdef void hand_on(self, int v, double old, double change) noexcept nogil
     cdef void visit(self, int v) noexcept nogil
+    cdef void arrange(self) noexcept nogil
+    cdef void open_circle(self, int u, int n_open) noexcept nogil

@@ -17,9 +17,8 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
-from cython.cimports.heat_igl.kernels.sweep.dependencies import Dependencies
 from cython.cimports.heat_igl.kernels.sweep.hopf_lax import RISEN, SETTLED
-from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, SimplexUpdate
+from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, SimplexUpdate, edge_length
 from cython.cimports.libc.math import INFINITY, fabs
 
 from heat_igl.kernels.signals import raise_caught
@@ -44,40 +43,74 @@ class HopfLax:
         self.corners, self.first, self.incident = corners, first, incident
         self.update = SimplexUpdate(corners, *in_metric)
 
+    def shorten(self, d: cython.double[::1], label: cython.int[::1]) -> None:
+        """Lower distances `d` (n,) to paths along edges, in place; labels (n,) are handed on (Dijkstra 1959)."""
+        size: cython.int = self.corners.shape[1]
+        self.d, self.low, self.waiting = d, np.min(d), PriorityQueue(len(d))
+        with cython.nogil:
+            for s in range(self.corners.shape[0]):
+                for c in range(size):
+                    for i in range(size):
+                        if self.is_longer(s, c, i):
+                            self.wait(self.corners[s, c])
+            while self.waiting.count > 0:
+                v: cython.int = cython.cast(cython.int, self.waiting.first())
+                self.waiting.set_key(v, 0.0)
+                for k in range(self.first[v], self.first[v + 1]):
+                    s: cython.int = self.incident[k] // size
+                    c: cython.int = self.incident[k] % size
+                    for i in range(size):
+                        if self.is_longer(s, c, i):
+                            u: cython.int = self.corners[s, i]
+                            d[u] = d[v] + edge_length(self.update, s, c, i)
+                            label[u] = label[v]
+                            self.wait(u)
+
+    def is_longer(self, s: cython.int, c: cython.int, i: cython.int) -> cython.bint:
+        """Whether corner i of simplex s is farther away than by the edge from corner c."""
+        near: cython.double = self.d[self.corners[s, c]]
+        far: cython.double = self.d[self.corners[s, i]]
+        # Not by rounding, which would pass along many edges.
+        return near < far and near + edge_length(self.update, s, c, i) < far * (1 - 1e-12)
+
+    def wait(self, v: cython.int) -> cython.void:
+        """Let v wait, the nearest first."""
+        self.waiting.set_key(v, 1.0 / (self.d[v] - self.low))
+
     def settle(self, d, label, offset):
-        """Change distances along edges to those of second order, in place.
+        """Lower distances, first to those along edges, then to those of second order, in place.
 
         Parameters
         ----------
         d, label : (n,) float64, (n,) int32
-            Distances along edges, and the source of each, -1 for none; changed.
+            Distances, ``inf`` but at the sources, and the source of each vertex, -1 for none; changed.
         offset : (k,) float64
             Of each source.
 
         Returns
         -------
-        facet : (n,) int32
-            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1.
-        place : (n, p) float64
-            The shares of the other corners, in their order, at the best place on that facet.
+        facet, place : (n,) int32, (n, p) float64
+            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1, and
+            the shares of the other corners, in their order, at the best place on that facet.
         slope, is_sloped : (n, 3) float64, (n,) uint8
             The derivative of distance by the position of each vertex, and whether it is known.
         weight : (n,) float64
             How far T is of second order for a vertex: from 1 to 0, where T is linear.
         """
+        self.shorten(d, label)
         n, update = len(d), self.update
         facet, place, weight = np.full(n, -1, np.int32), np.zeros((n, update.p)), np.ones(n)
         slope, is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
         # Nearer than a source to itself is another one.
         fixed = d == np.append(offset, np.inf)[label]
         step, pending = np.zeros(n), np.where(np.isfinite(d) & ~fixed, np.inf, 0.0)
-        self.d, self.label, self.low, self.pending = d, label, np.min(d), pending
+        self.label, self.pending = label, pending
         self.facet, self.place, self.step, self.weight = facet, place, step, weight
-        self.risen, self.n_visits = np.zeros(n), np.zeros(n, np.int32)
-        self.fixed, self.waiting = fixed.view(np.uint8), PriorityQueue(n)
+        self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
+        self.fixed = fixed.view(np.uint8)
         update.d, update.label, update.low, update.offset = d, label, self.low, offset
         update.slope, update.is_sloped, update.weight = slope, is_sloped, weight
-        self.dependencies = Dependencies(self.corners, facet, place, step, weight, pending)
+        self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
         # Changes add up along a path.
         self.settled = SETTLED * n ** (-1.0 / update.p)
         with cython.nogil:
@@ -86,16 +119,13 @@ class HopfLax:
         return facet, place, slope, is_sloped, weight
 
     def sharpen(self) -> cython.void:
-        """Second order, from near to far, then in rounds: each vertex after those it has its distance from.
-
-        From near to far, changes are handed on before others depend on them. Where metrics are long in one direction,
-        distances depend on larger ones: after two visits per vertex that order is given up.
-        """
+        """Second order, from near to far, then in rounds: each vertex after those it has its distance from."""
         v: cython.int
         is_settled: cython.bint = False
         for v in range(self.d.shape[0]):
             if self.pending[v] > 0.0:
-                self.waiting.set_key(v, 1.0 / (self.d[v] - self.low))
+                self.wait(v)
+        # Where metrics are long in one direction, distances depend on larger ones, and this order takes too long.
         self.left = 2 * self.d.shape[0]
         while self.waiting.count > 0 and self.left > 0:
             if self.left % ASK == 0 and is_interrupted():
@@ -107,9 +137,9 @@ class HopfLax:
         self.left = 0
         while not is_settled and not is_interrupted():
             is_settled = True
-            self.dependencies.arrange()
+            self.arrange()
             for at in range(self.d.shape[0]):
-                v = self.dependencies.order[at]
+                v = self.order[at]
                 # Where the metric turns far within a simplex, distances may go in circles: more so each time.
                 if self.pending[v] > self.settled * self.n_visits[v]:
                     is_settled = False
@@ -155,7 +185,7 @@ class HopfLax:
                 ):
                     self.pending[u] = most
                     if self.left > 0:
-                        self.waiting.set_key(u, 1.0 / (self.d[u] - self.low))
+                        self.wait(u)
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it.
@@ -202,3 +232,54 @@ class HopfLax:
                 most = i
         self.label[v] = self.label[self.corners[s, self.update.side[most]]]
         self.update.find_slope(s, c)
+
+    def arrange(self) -> cython.void:
+        """Order vertices topologically: each behind the corners that have a share of its place, but for circles.
+
+        Vertices of a circle have their distances from each other. What each adds to T linear, the step, may be less
+        than 0 by the second order. If it sums to less than 0 around a circle, its vertices lower each other for ever.
+        """
+        v: cython.int
+        size: cython.int = self.corners.shape[1]
+        n_done: cython.int = 0
+        so_far: cython.double = 0.0
+        self.state[:] = 0
+        for root in range(self.order.shape[0]):
+            n_open: cython.int = 1
+            self.stack[0] = root
+            while n_open > 0:
+                v = self.stack[n_open - 1]
+                if self.state[v] == 0 and self.facet[v] >= 0:
+                    self.state[v] = 1
+                    so_far += self.step[v]
+                    self.sum[v] = so_far
+                    k: cython.int = 0
+                    for c in range(size):
+                        if c == self.facet[v] % size:
+                            continue
+                        u: cython.int = self.corners[self.facet[v] // size, c]
+                        if self.place[v, k] > 0.0:
+                            if self.state[u] == 0:
+                                self.stack[n_open] = u
+                                n_open += 1
+                            elif self.state[u] == 1 and self.sum[v] - self.sum[u] + self.step[u] < 0.0:
+                                self.open_circle(u, n_open)
+                        k += 1
+                    continue
+                n_open -= 1
+                if self.state[v] == 1:
+                    so_far = self.sum[v] - self.step[v]
+                if self.state[v] < 2:
+                    self.state[v] = 2
+                    self.order[n_done] = v
+                    n_done += 1
+
+    def open_circle(self, u: cython.int, n_open: cython.int) -> cython.void:
+        """Halve the second order of vertices that depend on u and on which u depends: those open above it."""
+        w: cython.int = -1
+        while w != u:
+            n_open -= 1
+            w = self.stack[n_open]
+            if self.state[w] == 1:
+                self.weight[w] *= 0.5
+                self.pending[w] = INFINITY

@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.sweep.facets import gradient, invert, mean_velocity, multiply, pair, squares_of
+from cython.cimports.heat_igl.kernels.sweep.facets import gradient, invert, mean_velocity, pair, squares_of
 from cython.cimports.libc.math import sqrt
 
 
@@ -16,24 +16,20 @@ def lengths_in_velocity(
 
     Returns
     -------
-    mean, lengths : (m, pairs) float64
-        Squared distances between the corners, in the metric of the centre, and lengths of the edges by Simpson's rule,
-        with the geometric mean of both ends in the middle.
-    widest, slack, growth, inverse
-        As `HopfLax` takes them.
+    inverse, mean, widest, slack, growth
+        As `SimplexUpdate` takes them, with `mean` in the metric of the centre.
     variation : float
         Of triangles: how far the lengths of edges differ between the metrics of the corners, mean square of the share.
     """
     size: cython.int = corners.shape[1]
     n_pairs: cython.int = size * (size - 1) // 2
     m = corners.shape[0]
-    found = *np.zeros((2, m, n_pairs)), np.zeros(m), np.ones(m), np.zeros(m), np.zeros_like(velocity)
-    mean: cython.double[:, ::1] = found[0]
-    lengths: cython.double[:, ::1] = found[1]
+    found = np.zeros_like(velocity), np.zeros((m, n_pairs)), np.zeros(m), np.ones(m), np.zeros(m)
+    inverse: cython.double[:, ::1] = found[0]
+    mean: cython.double[:, ::1] = found[1]
     widest: cython.double[::1] = found[2]
     slack: cython.double[::1] = found[3]
     growth: cython.double[::1] = found[4]
-    inverse: cython.double[:, ::1] = found[5]
     variation: cython.double = 0.0
     squares: cython.double[24]
     here: cython.double[6]
@@ -42,7 +38,6 @@ def lengths_in_velocity(
     I: cython.double[6]
     E: cython.double[12]
     rise: cython.double[4]
-    steep: cython.double[3]
     with cython.nogil:
         for i in range(velocity.shape[0]):
             invert(cython.address(velocity[i, 0]), cython.address(inverse[i, 0]))
@@ -61,8 +56,8 @@ def lengths_in_velocity(
             invert(W, I)
             squares_of(I, e, n_pairs, cython.address(mean[s, 0]))
             gradient(E + 3, rise + 1, size - 1, here)
-            multiply(W, here, steep)
-            growth[s] = sqrt(steep[0] * steep[0] + steep[1] * steep[1] + steep[2] * steep[2]) / mean_velocity(W)
+            squares_of(W, here, 1, cython.address(growth[s]))
+            growth[s] = sqrt(growth[s]) / mean_velocity(W)
             for i in range(size):
                 squares_of(cython.address(inverse[rows[s, i], 0]), e, n_pairs, squares + 6 * i)
                 for k in range(n_pairs):
@@ -72,16 +67,12 @@ def lengths_in_velocity(
                         W[k] = 0.5 * (velocity[rows[s, i], k] + velocity[rows[s, j], k])
                     invert(W, I)
                     squares_of(I, e, n_pairs, here)
-                    at: cython.int = pair(i, j)
-                    one: cython.double = sqrt(squares[6 * i + at])
-                    two: cython.double = sqrt(squares[6 * j + at])
-                    lengths[s, at] = (one + 4.0 * sqrt(one * two) + two) / 6.0
                     for k in range(n_pairs):
                         if here[k] < slack[s] * mean[s, k]:
                             slack[s] = here[k] / mean[s, k]
             slack[s] = sqrt(slack[s])
             for k in range(3 if size == 3 else 0):
-                one = sqrt(min(squares[k], squares[6 + k], squares[12 + k]))
-                two = sqrt(max(squares[k], squares[6 + k], squares[12 + k]))
+                one: cython.double = sqrt(min(squares[k], squares[6 + k], squares[12 + k]))
+                two: cython.double = sqrt(max(squares[k], squares[6 + k], squares[12 + k]))
                 variation += (two - one) * (two - one) / (3.0 * m * mean[s, k])
     return *found, variation

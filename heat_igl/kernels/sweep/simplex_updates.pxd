@@ -1,4 +1,6 @@
-from heat_igl.kernels.sweep.facets cimport Facet
+from libc.math cimport sqrt
+
+from heat_igl.kernels.sweep.facets cimport Facet, pair, squares_of
 
 cdef extern from *:
     """
@@ -37,3 +39,17 @@ cdef class SimplexUpdate(Facet):
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
     cdef double trust(self, int s, int i) noexcept nogil
     cdef void find_slope(self, int s, int c) noexcept nogil
+
+
+cdef inline double edge_length(SimplexUpdate of, int s, int i, int j) noexcept nogil:
+    # By Simpson's rule from the metrics at both ends, with their geometric mean in the middle.
+    cdef int k
+    cdef double one, two
+    cdef double e[3]
+    if of.q == 1:
+        return sqrt(of.mean[s, pair(i, j)])
+    for k in range(3):
+        e[k] = of.V[of.corners[s, i], k] - of.V[of.corners[s, j], k]
+    squares_of(&of.inverses[of.rows[s, i], 0], e, 1, &one)
+    squares_of(&of.inverses[of.rows[s, j], 0], e, 1, &two)
+    return (sqrt(one) + 4.0 * sqrt(sqrt(one * two)) + sqrt(two)) / 6.0

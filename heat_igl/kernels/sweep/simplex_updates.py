@@ -15,11 +15,11 @@ class SimplexUpdate(Facet):
     ----------
     corners : (m, p + 1) int32
         Vertices of each simplex.
-    velocity, inverse : (k, 6) float64 or None
-        The inverse root of metrics, whose entries on and above the diagonal come row by row, and its inverse. None if
-        each simplex has one metric (q = 1).
-    rows : (m, p + 1) int32 or None
-        If not (q = p + 1), the row of these at each corner; velocity is linear in between.
+    velocity : (k, 6) float64 or None
+        The inverse root of metrics, whose entries on and above the diagonal come row by row. None if each simplex has
+        one metric (q = 1).
+    rows, inverse : (m, p + 1) int32, (k, 6) float64, or None
+        If not (q = p + 1), the row of these at each corner; velocity is linear in between. Its inverse.
     mean : (m, pairs) float64
         Squared distances in one metric for each simplex, in which T is found that is linear; pairs of corners in the
         order of `np.tril_indices`.
@@ -31,7 +31,7 @@ class SimplexUpdate(Facet):
         Positions.
     """
 
-    def __init__(self, corners, velocity, inverse, rows, mean, widest, slack, growth, V):
+    def __init__(self, corners, velocity, rows, inverse, mean, widest, slack, growth, V):
         self.corners, self.velocity, self.inverses, self.rows, self.V = corners, velocity, inverse, rows, V
         self.mean, self.widest, self.slack, self.growths = mean, widest, slack, growth
         self.p, self.q = corners.shape[1] - 1, 1 if rows is None else corners.shape[1]
