@@ -30,7 +30,7 @@ cdef class HopfLax:
     # What each vertex rose though those at its place did not, and how far T is of second order for it.
     cdef double[::1] risen, weight
     # Depth-first search has not seen a vertex, has it open, or is done with it; sums of steps over the open ones.
-    cdef int[::1] order, stack
+    cdef int[::1] roots, order, stack
     cdef unsigned char[::1] state
     cdef double[::1] sum
 

@@ -111,6 +111,7 @@ class HopfLax:
         update.d, update.label, update.low, update.offset = d, label, self.low, offset
         update.slope, update.is_sloped, update.weight = slope, is_sloped, weight
         self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
+        self.roots = np.argsort(d, kind="stable").astype(np.int32)
         # Changes add up along a path.
         self.settled = SETTLED * n ** (-1.0 / update.p)
         with cython.nogil:
@@ -238,15 +239,17 @@ class HopfLax:
 
         Vertices of a circle have their distances from each other. What each adds to T linear, the step, may be less
         than 0 by the second order. If it sums to less than 0 around a circle, its vertices lower each other for ever.
+
+        Of several such orders that by distance is taken, whatever the numbers of vertices and the order of corners.
         """
         v: cython.int
         size: cython.int = self.corners.shape[1]
         n_done: cython.int = 0
         so_far: cython.double = 0.0
         self.state[:] = 0
-        for root in range(self.order.shape[0]):
+        for at in range(self.order.shape[0]):
             n_open: cython.int = 1
-            self.stack[0] = root
+            self.stack[0] = self.roots[at]
             while n_open > 0:
                 v = self.stack[n_open - 1]
                 if self.state[v] == 0 and self.facet[v] >= 0:
@@ -260,7 +263,11 @@ class HopfLax:
                         u: cython.int = self.corners[self.facet[v] // size, c]
                         if self.place[v, k] > 0.0:
                             if self.state[u] == 0:
-                                self.stack[n_open] = u
+                                i: cython.int = n_open
+                                while self.stack[i - 1] != v and self.d[self.stack[i - 1]] < self.d[u]:
+                                    self.stack[i] = self.stack[i - 1]
+                                    i -= 1
+                                self.stack[i] = u
                                 n_open += 1
                             elif self.state[u] == 1 and self.sum[v] - self.sum[u] + self.step[u] < 0.0:
                                 self.open_circle(u, n_open)
