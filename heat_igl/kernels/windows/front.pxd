@@ -18,7 +18,7 @@ cdef void relax(
 ) noexcept nogil
 cdef void take(Search* s, int j, double distance, int root) noexcept nogil
 cdef void tell(Search* s, int v, double distance) noexcept nogil
-cdef void append(Search* s, int t, Window* run, int n, bint in_front, bint mirrored) noexcept nogil
+cdef void append(Search* s, int t, Window* run, int n, int turns, bint mirrored) noexcept nogil
 
 
 # Make a list free again; its room stays with it.
@@ -27,7 +27,7 @@ cdef inline void release(Search* s, int place) noexcept nogil:
     s.lists[place].half_edge = -1
     s.free_list = place
 
-cdef void add(Search* s, int e, Window* run, int n, bint in_front) noexcept nogil
+cdef void add(Search* s, int e, Window* run, int n, int turns) noexcept nogil
 cdef void start_at(Search* s, int v, double offset, int label) noexcept nogil
 cdef void emit_point(Search* s, int p) noexcept nogil
 cdef void emit_segment(Search* s, int i) noexcept nogil

@@ -41,6 +41,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     Window,
     apart,
     at_corner,
+    grown,
     nearest_on,
     reach,
     straight,
@@ -48,36 +49,28 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
 )
 from cython.cimports.heat_igl.kernels.windows.surface import beyond, classify, third, turn
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
-from cython.cimports.libc.stdlib import free, malloc, realloc
+from cython.cimports.libc.stdlib import free
 from cython.cimports.libc.string import memmove
 
 
 def allocate(s: cython.pointer(Search)) -> cython.void:
     """Allocate the memory of a front."""
     s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
-    s.n_all_lists, s.n_all_heap = 256, 1024
+    s.n_all_lists = s.n_all_heap = 0
     s.free_list = -1
     s.failed = s.meets_flat = s.is_shared = False
     s.n_windows = s.n_lists_done = s.n_waiting = 0
-    s.n_nearest = s.n_all_ranked = 0
-    s.ranked = cython.NULL
-    s.lists = cython.cast(cython.pointer(List), malloc(s.n_all_lists * cython.sizeof(List)))
-    s.heap = cython.cast(cython.pointer(Entry), malloc(s.n_all_heap * cython.sizeof(Entry)))
-    if s.lists == cython.NULL or s.heap == cython.NULL:
-        s.failed = True
-    s.to_left = s.to_right = cython.NULL
+    s.n_nearest = s.n_crossed = 0
+    s.lists, s.heap = cython.NULL, cython.NULL
+    s.to_left = s.to_right = s.kept = cython.NULL
     more_room(s, 128)
 
 
 def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
     """Allocate room for n windows on each side of an apex."""
-    s.n_out = 2 * n
-    free(s.to_left)
-    free(s.to_right)
-    s.to_left = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
-    s.to_right = cython.cast(cython.pointer(Window), malloc(s.n_out * cython.sizeof(Window)))
-    if s.to_left == cython.NULL or s.to_right == cython.NULL:
-        s.failed = True
+    room, failed = cython.address(s.n_out), cython.address(s.failed)
+    s.to_left = cython.cast(cython.pointer(Window), grown(s.to_left, room, n, cython.sizeof(Window), failed))
+    s.to_right = cython.cast(cython.pointer(Window), grown(s.to_right, room, n, cython.sizeof(Window), failed))
 
 
 def empty_front(s: cython.pointer(Search)) -> cython.void:
@@ -86,8 +79,10 @@ def empty_front(s: cython.pointer(Search)) -> cython.void:
         if s.lists[i].half_edge >= 0:
             s.slot[s.lists[i].half_edge] = -1
     s.n_lists = s.n_heap = 0
-    s.n_waiting = 0
+    s.n_waiting = s.n_crossed = 0
     s.free_list = -1
+    free(s.kept)
+    s.kept = cython.NULL
 
 
 def free_front(s: cython.pointer(Search)) -> cython.void:
@@ -98,20 +93,15 @@ def free_front(s: cython.pointer(Search)) -> cython.void:
     free(s.heap)
     free(s.to_left)
     free(s.to_right)
-    free(s.ranked)
 
 
 def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cython.void:
     """Add to the queue, a binary heap."""
     if s.n_heap == s.n_all_heap:
-        more: cython.pointer(Entry) = cython.cast(
-            cython.pointer(Entry), realloc(s.heap, 2 * s.n_all_heap * cython.sizeof(Entry))
-        )
-        if more == cython.NULL:
-            s.failed = True
+        more = grown(s.heap, cython.address(s.n_all_heap), s.n_heap + 1, cython.sizeof(Entry), cython.address(s.failed))
+        s.heap = cython.cast(cython.pointer(Entry), more)
+        if s.failed:
             return
-        s.heap = more
-        s.n_all_heap *= 2
     i: cython.int = s.n_heap
     s.n_heap += 1
     while i > 0:
@@ -266,17 +256,11 @@ def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root
 def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> cython.void:
     """Record a distance of vertex v for the search on the other thread."""
     n: cython.int = s.n_news[s.parity]
-    room: cython.int = s.n_all_news[s.parity]
-    if n == room:
-        room = 2 * room + 64
-        more: cython.pointer(Entry) = cython.cast(
-            cython.pointer(Entry), realloc(s.news[s.parity], room * cython.sizeof(Entry))
-        )
-        if more == cython.NULL:
-            s.failed = True
+    if n == s.n_all_news[s.parity]:
+        more = grown(s.news[s.parity], s.n_all_news + s.parity, n + 1, cython.sizeof(Entry), cython.address(s.failed))
+        s.news[s.parity] = cython.cast(cython.pointer(Entry), more)
+        if s.failed:
             return
-        s.news[s.parity] = more
-        s.n_all_news[s.parity] = room
     s.news[s.parity][n].key = distance
     s.news[s.parity][n].what = v
     s.n_news[s.parity] = n + 1
@@ -306,23 +290,6 @@ def _key(
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _has_room(one: cython.pointer(List), n: cython.int) -> cython.bint:
-    """Make room for n more windows of a list; false if memory runs out."""
-    if one.count + n > one.capacity:
-        capacity: cython.int = 2 * (one.count + n) + 4
-        more: cython.pointer(Window) = cython.cast(
-            cython.pointer(Window), realloc(one.windows, capacity * cython.sizeof(Window))
-        )
-        if more == cython.NULL:
-            return False
-        one.windows = more
-        one.capacity = capacity
-    return True
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
 def _mirrored(w: Window, length: cython.double) -> Window:
     """A window in the frame whose origin is the other end of its half-edge."""
     start: cython.double = w.start
@@ -341,7 +308,7 @@ def append(
     t: cython.int,
     run: cython.pointer(Window),
     n: cython.int,
-    in_front: cython.bint,
+    turns: cython.int,
     mirrored: cython.bint,
 ) -> cython.void:
     """Add windows to those that wait at half-edge t."""
@@ -351,6 +318,7 @@ def append(
     bulge: cython.double = s.bulge[t]
     lowest: cython.double = INFINITY
     is_new: cython.bint = place < 0
+    turns = -turns if mirrored else turns
     if is_new:
         place = _free_list(s)
         if place < 0:
@@ -358,12 +326,16 @@ def append(
         s.lists[place].half_edge = t
         s.lists[place].count = 0
         s.lists[place].key = INFINITY
+        s.lists[place].turns = turns
     one: cython.pointer(List) = cython.address(s.lists[place])
-    if not _has_room(one, n):
-        s.failed = True
-        return
+    if one.count + n > one.capacity:
+        room: cython.p_int = cython.address(one.capacity)
+        more = grown(one.windows, room, one.count + n, cython.sizeof(Window), cython.address(s.failed))
+        one.windows = cython.cast(cython.pointer(Window), more)
+        if s.failed:
+            return
     to = one.windows + one.count
-    if in_front != mirrored:
+    if turns > 0:
         to = one.windows
         if one.count > 0:
             memmove(to + n, to, one.count * cython.sizeof(Window))
@@ -378,6 +350,8 @@ def append(
             release(s, place)
             return
         s.slot[t] = place
+    if not is_new:
+        one.turns = max(min(turns, one.turns), 0) + min(max(turns, one.turns), 0)
     one.count += n
     s.n_windows += n
     s.n_waiting += n
@@ -394,16 +368,12 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
     if place >= 0:
         s.free_list = s.lists[place].count
         return place
-    if s.n_lists == s.n_all_lists:
-        more: cython.pointer(List) = cython.cast(
-            cython.pointer(List), realloc(s.lists, 2 * s.n_all_lists * cython.sizeof(List))
-        )
-        if more == cython.NULL:
-            s.failed = True
-            return -1
-        s.lists = more
-        s.n_all_lists *= 2
     place = s.n_lists
+    if s.n_lists == s.n_all_lists:
+        more = grown(s.lists, cython.address(s.n_all_lists), place + 1, cython.sizeof(List), cython.address(s.failed))
+        s.lists = cython.cast(cython.pointer(List), more)
+        if s.failed:
+            return -1
     s.n_lists += 1
     if place == s.n_made_lists:
         s.n_made_lists += 1
@@ -413,7 +383,7 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
 
 
 def add(
-    s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int, in_front: cython.bint
+    s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int, turns: cython.int
 ) -> cython.void:
     """Add windows that cross half-edge e out of its face; their frame runs from the head of e to its tail."""
     t: cython.int = s.twin[e]
@@ -422,28 +392,20 @@ def add(
         if n == 0:
             return
     if t >= 0:
-        append(s, t, run, n, in_front, not s.aligned[e])
+        append(s, t, run, n, turns, not s.aligned[e])
     elif t == -2:
         t = s.ring[e]
         while t != e:
-            append(s, t, run, n, in_front, s.vertex[next_half_edge(t)] == s.vertex[next_half_edge(e)])
+            append(s, t, run, n, turns, s.vertex[next_half_edge(t)] == s.vertex[next_half_edge(e)])
             t = s.ring[t]
 
 
 def start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, label: cython.int) -> cython.void:
     """Make vertex v a source with the given offset."""
-    if s.failed or offset >= s.distance[v]:
-        return
-    if s.distance[v] == INFINITY:
-        s.touched[s.n_touched] = v
-        s.n_touched += 1
-    s.distance[v] = s.upper[v] = offset
-    s.root[v] = v
-    s.label[v] = label
-    s.entered[v] = -1
-    if s.other != cython.NULL:
-        tell(s, v, offset)
-    push(s, offset, s.n_half_edges + v)
+    if not s.failed and offset < s.upper[v]:
+        s.label[v] = label
+        relax(s, v, offset, v, -1, 0.0, -1, 0.0, 0.0)
+        push(s, offset, s.n_half_edges + v)
 
 
 def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
@@ -488,7 +450,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         one.turn_y = (place_y[(c + 1) % 3] - place_y[(c + 2) % 3]) / length
         one.side = one.is_plane = 0
         if one.depth > 0.0:
-            add(s, h, cython.address(one), 1, False)
+            add(s, h, cython.address(one), 1, 0)
     j: cython.int = s.first_target[f] if s.first_target != cython.NULL else -1
     while j >= 0:
         take(s, j, offset + apart(s.length + 3 * f, s.target + 3 * j, at), root)
@@ -556,7 +518,7 @@ def _emit_parallel(
     one.side = 0
     one.is_plane = True
     if one.stop - one.start > NARROW * length:
-        add(s, h, cython.address(one), 1, False)
+        add(s, h, cython.address(one), 1, 0)
 
 
 @cython.cfunc
@@ -586,7 +548,7 @@ def _emit_from_bend(
     one.turn_x, one.turn_y = 0.5 * twice_product(length, right, left) / (length * right), -one.depth / right
     one.side = one.is_plane = 0
     if one.depth > 0.0:
-        add(s, k, cython.address(one), 1, False)
+        add(s, k, cython.address(one), 1, 0)
 
 
 @cython.cfunc

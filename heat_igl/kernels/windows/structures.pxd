@@ -1,4 +1,5 @@
 from libc.math cimport sqrt
+from libc.stdlib cimport realloc
 
 cdef extern from *:
     """
@@ -52,6 +53,7 @@ cdef struct List:
     Window* windows
     int count, capacity
     int half_edge
+    int turns            # faces that all windows crossed last around one end: > 0 around the tail, < 0 around the head
     double key
 
 cdef struct Entry:
@@ -65,23 +67,15 @@ cdef struct Direction:
 
 cdef struct Search:
     # The surface: see `shapes`.
-    int* vertex
-    double* length
-    int* twin
-    unsigned char* aligned
-    int* ring
-    double* double_area
-    double* bulge
+    int *vertex, *twin, *ring
+    double *length, *double_area, *bulge
     int *corner_of_vertex, *next_corner, *n_corners
-    unsigned char* kind
+    unsigned char *aligned, *kind
     bint is_delaunay
     int n, n_half_edges
     # What is found.
-    double* distance
-    int* root
-    int* label
-    int* entered
-    double* crossing
+    double *distance, *crossing
+    int *root, *label, *entered
     int* corner          # NULL unless asked for, as the next
     double* leaving      # two for each vertex
     double* emitted
@@ -91,13 +85,11 @@ cdef struct Search:
     # Sources inside faces.
     int n_points
     int* point_face
-    double* point
-    double* point_offset
+    double *point, *point_offset
     # Segments inside faces.
     int n_segments
     int* segment_face
-    double* segment      # both ends, one after the other
-    double* segment_offset
+    double *segment, *segment_offset  # both ends, one after the other
     # Vertices (goals) and points inside faces (targets) whose distances are requested.
     int n_goals, n_targets, n_found
     int* goal
@@ -120,9 +112,10 @@ cdef struct Search:
     int free_list
     Entry* heap
     int n_heap, n_all_heap
-    Window* to_left
-    Window* to_right
+    Window *to_left, *to_right
     int n_out
+    Window* kept         # two for each half-edge, see `trim_by_kept`, or NULL
+    long long n_crossed  # lists that crossed a face in this search
     bint failed
     long long n_windows, n_lists_done
     double tolerance
@@ -131,7 +124,6 @@ cdef struct Search:
     double last_key      # entries with larger keys cannot change a requested distance
     int n_nearest, n_next
     double* ranked
-    int n_all_ranked
     # Two searches that share a surface exchange these after each round: see `windows`.
     Search* other        # NULL if there is none
     bint is_first
@@ -192,15 +184,18 @@ cdef extern from *:
     // The work per list in addition to its windows, as a number of windows.
     #define PER_LIST 4
     """
-    double ROUNDING
-    double WIDEST
-    double NARROW
-    double SAME
-    double TURNED
-    double OVERLAP
-    double MARGIN
-    double FLATNESS
+    double ROUNDING, WIDEST, NARROW, SAME, TURNED, OVERLAP, MARGIN, FLATNESS
     int PER_LIST
+
+
+# An array moved to where there is room for at least n entries; as it is, and `failed` is set, if memory runs out.
+cdef inline void* grown(void* entries, int* room, int n, size_t n_bytes, bint* failed) noexcept nogil:
+    cdef void* more = realloc(entries, (2 * <size_t> n + 4) * n_bytes)
+    if more == NULL:
+        failed[0] = True
+        return entries
+    room[0] = 2 * n + 4
+    return more
 
 
 # Twice the scalar product of two sides p and q of a triangle, from the three lengths. The squares that are subtracted

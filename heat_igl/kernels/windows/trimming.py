@@ -24,6 +24,7 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     reach,
 )
 from cython.cimports.libc.math import INFINITY, fabs
+from cython.cimports.libc.stdlib import calloc
 from cython.cimports.libc.string import memmove
 
 
@@ -466,6 +467,43 @@ def is_covered(
                 w = windows + k
                 if w.start - 2.0 * NARROW * length <= at <= w.stop + 2.0 * NARROW * length:
                     nearest = min(nearest, w.offset + reach(w, at))
+            for k in range(2):
+                if s.kept != cython.NULL and s.kept[2 * h + k].start <= at <= s.kept[2 * h + k].stop:
+                    nearest = min(nearest, s.kept[2 * h + k].offset + reach(s.kept + 2 * h + k, at))
             if not is_within(nearest, reached, length):
                 return False
     return True
+
+
+@cython.cfunc
+@cython.nogil
+def trim_by_kept(
+    s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int
+) -> cython.int:
+    """Trim windows where one that crossed h before is shorter; returns how many are left.
+
+    Far from the ends of a needle, lines that wind around it reach each half-edge after those of the winding before have
+    crossed, and the ends are too far away to trim them. Of the first list that comes here over a half-edge, the windows
+    next to both ends are kept. As in a list, windows are trimmed only where the kept one is shorter by more than
+    rounding. So of several paths to a point, the shortest is never trimmed, whatever happens to the kept window later.
+    """
+    k: cython.int
+    u: Window
+    if s.kept == cython.NULL:
+        s.kept = cython.cast(cython.pointer(Window), calloc(2 * s.n_half_edges, cython.sizeof(Window)))
+        if s.kept == cython.NULL:
+            s.failed = True
+            return 0
+    kept: cython.pointer(Window) = s.kept + 2 * h
+    if kept.stop == 0.0:
+        kept[0], kept[1] = windows[0], windows[n - 1]
+        return n
+    for j in range(2):
+        k = 0
+        for i in range(n):
+            u = kept[j]
+            if _settle(cython.address(u), windows + i) != 2:
+                windows[k] = windows[i]
+                k += 1
+        n = k
+    return n

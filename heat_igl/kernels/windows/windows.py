@@ -77,10 +77,10 @@ class Front:
         position: cython.const[cython.double][::1] = None,
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
-        emitted, touched = np.full(tables.n, np.inf), np.empty(tables.n, np.int32)
+        emitted, ranked, touched = np.full(tables.n, np.inf), np.empty(tables.n), np.empty(tables.n, np.int32)
         slot = np.full(len(tables.edges.vertex), -1, np.int32)
         # The pointers hold as long as the arrays do.
-        self.arrays = (tables, found, leaving, position, emitted, touched, slot)
+        self.arrays = (tables, found, leaving, position, emitted, ranked, touched, slot)
         edges = tables.edges
         s.vertex, s.twin, s.ring = _ints(edges.vertex), _ints(edges.twin), _ints(edges.ring)
         s.aligned, s.length = _bytes(edges.aligned), _doubles(edges.length)
@@ -91,7 +91,7 @@ class Front:
         s.n, s.n_half_edges = tables.n, len(edges.vertex)
         s.distance, s.root, s.label = _doubles(found.distance), _ints(found.root), _ints(found.label)
         s.entered, s.crossing = _ints(found.entered), _doubles(found.crossing)
-        s.emitted, s.touched, s.slot = _doubles(emitted), _ints(touched), _ints(slot)
+        s.emitted, s.ranked, s.touched, s.slot = _doubles(emitted), _doubles(ranked), _ints(touched), _ints(slot)
         s.upper, s.other = s.distance, cython.NULL
         s.corner = cython.NULL
         if leaving is not None:
@@ -472,14 +472,6 @@ def _narrow(s: cython.pointer(Search)) -> cython.void:
     low: cython.int = 0
     high: cython.int = s.n_touched - 1
     wanted: cython.int = s.n_nearest - 1
-    if s.n_touched > s.n_all_ranked:
-        free(s.ranked)
-        s.n_all_ranked = 2 * s.n_touched
-        s.ranked = cython.cast(cython.p_double, malloc(s.n_all_ranked * cython.sizeof(cython.double)))
-        if s.ranked == cython.NULL:
-            s.n_all_ranked = 0
-            s.failed = True
-            return
     for i in range(s.n_touched):
         s.ranked[i] = s.distance[s.touched[i]]
     # Quickselect, Hoare 1961.
@@ -633,7 +625,7 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
     n: cython.int = one.count
     for i in range(n):
         o.label[one.windows[i].root] = s.label[one.windows[i].root]
-    append(o, h, one.windows, n, False, False)
+    append(o, h, one.windows, n, one.turns, False)
     o.n_windows -= n
     s.n_waiting -= n
     s.slot[h] = -1
