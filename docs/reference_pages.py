@@ -40,6 +40,8 @@ GROUPS = {
 MODULES = {
     "heat_igl.compat.igl": "libigl's functions for distance",
     "heat_igl.compat.potpourri3d": "potpourri3d's classes and functions",
+    "heat_igl.compat.gdist": "gdist's functions",
+    "heat_igl.compat.pygeodesic": "pygeodesic's class",
     "heat_igl.sampling": "samples of a surface",
     "heat_igl.heat.steps": "the three steps of the heat method, each alone",
     "heat_igl.operators": "the operators of every kind of domain",
