@@ -34,17 +34,20 @@ from heat_igl.typing import AnyArray as IntArray  # of 32 bits too
 from heat_igl.typing import BoolArray, FloatArray
 
 # Pieces with more vertices than this, and than this share of all, are cut one at a time, and their parts are dissected
-# in parallel; smaller pieces are dissected by one thread.
+# in parallel; smaller pieces are dissected by one thread. On six surfaces and a box, on one thread, 500 takes 1.05 to
+# 1.25 of the time, and 30000 0.93; a share of 1/256 takes as long. Entries of the factor are the same.
 _LARGE = 3000
 _SHARE = 1 / 64
-# Small components are dissected together, up to this many vertices at a time.
+# Small components are dissected together, up to this many vertices at a time: 4000 of 12 vertices take 6 times as long
+# with 16, 1.9 with 64, and 0.75 with 1024; 60 of 642 as long with all.
 _TOGETHER = 256
 
 # The number of pieces of the tree that are solved in parallel, roughly; and the fewest entries of a piece, so that it
-# is worth a thread.
+# is worth a thread. On one thread, 2 and 24 pieces and such of 300 000 entries take as long, within 10 %.
 _PIECES = 6
 _SMALLEST_PIECE = 1_500_000
-# A pivot that has shrunk to less than this share of the diagonal is rounding.
+# A pivot that has shrunk to less than this share of the diagonal is rounding. From 1e-16 to 1e-8 heat matrices of 80
+# shapes pass; of their Laplacians, which are singular, two do up to 1e-13.
 _SINGULAR = 1e-13
 # Peak memory of a factorization over that of its entries: 1.2 to 1.3 on surfaces of 40k to 160k vertices, 1.4 in a box
 # of 30k, with one row per vertex or two.

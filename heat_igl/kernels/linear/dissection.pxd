@@ -1,9 +1,12 @@
+# Entries are those of factors of six surfaces of 3k to 41k vertices and a box of 11k; time is that of the dissection.
 cdef enum:
-    # Thresholds tried per piece.
+    # Thresholds tried per piece. 16: up to 4 % more entries; 128: as many, within 2 %.
     BUCKETS = 64
-    # Pieces of so few vertices are eliminated together.
+    # Pieces of so few vertices are eliminated together. 1: 2 to 5 % fewer entries, in 1.08 of the time; 8: 3 to 13 %
+    # more.
     LEAF = 4
-    # Rounds of averaging that straighten the cuts, and the size up to which it does not matter.
+    # Rounds of averaging that straighten the cuts, and the size up to which it hardly matters. 0: up to 5 % more
+    # entries; 4 and 8: as many, within 2 %, in 1.1 and 1.2 of the time. Size 30: .4 % fewer, in 1.05; 400: 1 % more.
     SMOOTHING = 2
     ROUGH = 100
     # The two parts of a piece are 0 and 1.
