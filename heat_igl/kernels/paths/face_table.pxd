@@ -1,7 +1,7 @@
 cdef extern from *:
     """
-    // A point nearer to a vertex than this, in edge lengths, is at the vertex. From 1e-12 to 1e-7 the paths and loops of
-    // shortening.py have the same bits.
+    // A point nearer to a vertex than this, in edge lengths, is at the vertex. From 1e-12 to 1e-7 the paths and loops
+    // of shortening.py have the same bits.
     #define SNAP 1e-9
     """
     double SNAP
