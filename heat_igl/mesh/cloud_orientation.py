@@ -62,17 +62,18 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
         weight = ((1 - folds) / 2) ** _POWER
         # Triangles without a fold join first, but for those around a surface with one side. A wrong join between sheets
         # bends where it begins; along its flat edges alone it would join them once and for all.
-        is_bent = np.zeros(len(F), bool)
-        is_bent[pairs[folds >= _FLAT]] = True
-        is_flat = ~is_bent[pairs].any(axis=1)
-        sheet, is_turned = _parts(pairs[is_flat], runs_alike[is_flat], len(F))
+        a, b = pairs.T
+        is_bent, bent = np.zeros(len(F), bool), folds >= _FLAT
+        is_bent[a[bent]] = is_bent[b[bent]] = True
+        is_flat = ~(is_bent.take(a) | is_bent.take(b))
+        sheet, is_turned = _parts(pairs.compress(is_flat, axis=0), runs_alike[is_flat], len(F))
         group = np.where(sheet[0] == sheet[1], 2 * len(F) + np.arange(len(F)), sheet.min(axis=0))
         group = (np.cumsum(np.bincount(group) > 0) - 1)[group]
         is_turned &= sheet[0] != sheet[1]
-        wants_one = runs_alike != (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]])
-        ends = group[pairs].astype(np.int32)
+        wants_one = runs_alike != (is_turned.take(a) != is_turned.take(b))
+        ends = group.astype(np.int32).take(pairs)
         is_turned ^= turned_groups(ends, np.where(wants_one, -weight, weight), np.bincount(group))[group]
-        contradicts = (is_turned[pairs[:, 0]] != is_turned[pairs[:, 1]]) != runs_alike
+        contradicts = (is_turned.take(a) != is_turned.take(b)) != runs_alike
     return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts]
 
 
@@ -92,7 +93,8 @@ def _parts(pairs: IntArray, runs_alike: BoolArray, m: int) -> tuple[IntArray, Bo
 def _folds(P: FloatArray, F: IntArray, pairs: IntArray, runs_alike: BoolArray) -> FloatArray:
     """Cosine (k,) of the angle between neighbours around their edge: -1 where they are flat, 1 where they fold back."""
     normal = igl.per_face_normals(P, F, np.zeros(3))
-    return np.asarray(np.einsum("kx,kx->k", normal[pairs[:, 0]], normal[pairs[:, 1]]) * np.where(runs_alike, 1, -1))
+    ends = (normal.take(end, axis=0) for end in pairs.T)
+    return np.asarray(np.einsum("kx,kx->k", *ends) * np.where(runs_alike, 1, -1))
 
 
 def is_oriented_manifold(surface: Mesh) -> bool:

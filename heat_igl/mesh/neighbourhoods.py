@@ -141,7 +141,7 @@ def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighb
     radius, bent = reach, np.flatnonzero(bend > _SEVERAL_SHEETS)
     if len(bent):
         index, radius = index.copy(), reach.copy()
-        index[bent], radius[bent], axes[bent] = one_sheet(P, index[bent], axes[bent])
+        index[bent], radius[bent], axes[bent] = one_sheet(P, index.take(bent, axis=0), axes.take(bent, axis=0))
     return Neighbourhoods(index, radius, reach, axes)
 
 
