@@ -20,7 +20,7 @@ layers and faces: Delaunay triangles of random points, rotated, against shortest
 each edge of a border, or on all; mean and largest error, also with half as many points, and per face of fim-python.
 grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels as rows, at their centres, from one of
 them, beside scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and
-largest error in percent, and seconds of one query with its preparation.
+largest error in percent, and seconds of one query with its preparation; of the default also its memory.
 smooth: a twisted cylinder and discs, and a cube with a speed that grows linearly, with tensors per simplex and at the
 vertices, times over those of fim-python, which takes those per simplex; "turning" is what `MOST_TURNING` is asked of.
 choice: what `hopf_lax_is_nearer` compares, and mean errors in closed form or against triangles cut into 4 or 16.
@@ -49,6 +49,7 @@ from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.mesh import PolygonFans
 from heat_igl.operators import MetricSimplices, Operators
 from heat_igl.operators.suitability import mean_angle_defect
+from heat_igl.runtime.memory import PeakMemory
 from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine, LineEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -491,7 +492,9 @@ def on_grids(options: argparse.Namespace, _: Random) -> Iterator[Row]:
         truth = np.where(mask, exact(V, int(np.ravel_multi_index(source, mask.shape))).reshape(mask.shape), 0)
         row: Row = {"grid": f"{name}, {' x '.join(map(str, mask.shape))}"}
         for method, query in GRIDS.items():
-            row[method] = timed(truth, query, mask, speed, source)
+            with PeakMemory() as peak:
+                row[method] = timed(truth, query, mask, speed, source)
+            row[method]["kB"] = (peak.bytes or np.nan) / 1e3 / mask.sum()
         yield row
 
 
@@ -702,7 +705,8 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
     "faces": (on_faces, {"metric per face": "{case}"} | mean_and_largest(
         default="default", fim="fim-python", **HALF
     )),
-    "grids": (on_grids, {"grid": "{grid}"} | errors_and("s", default="default", fmm="scikit-fmm", konal="pykonal")),
+    "grids": (on_grids, {"grid": "{grid}"} | errors_and("s", default="default", fmm="scikit-fmm", konal="pykonal")
+        | {"default, kB per cell": "{default[kB]:.1f}"}),
     "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}", "turning": "{turning:.2g}",
         "fim-python, %": "{fim[mean]:.2g} and {fim[largest]:.2g}",
         **errors_and("time", face="per simplex", vertex="at the vertices"),
