@@ -19,7 +19,7 @@ from heat_igl.sweep.simplex_derivative import SimplexDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-# Rounds of lines, ways that bend, and edges; two, unless the body touches itself.
+# Rounds of lines and ways that bend, with several sources in a small body.
 _MOST_ROUNDS = 5
 # How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
 _BESIDE, _BESIDE_OF_FEW = 1.0, 2.0
@@ -58,14 +58,16 @@ class LineEngine(SimplexEngine):
         body: Any = Body
         return body(self._corners, self._first, self._incident, self._V)
 
-    def _order(self, vertices: AnyArray, straight: bool = False) -> AnyArray:
-        """All vertices, from near to far: by the straight line from the only source, or by edges."""
-        if straight:
+    def _from_near(self, vertices: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """All vertices from near to far in space, and the source (n,) that each looks for first, -1 for none."""
+        if len(vertices) == 1:
             far = np.sqrt(sum((x - x[vertices[0]]) ** 2 for x in self._V.T))
+            nearest = np.full(len(far), 0 if self._is_small else -1)
         else:
-            far = np.where(np.isin(np.arange(len(self._V)), vertices), 0.0, np.inf)
-            self._along_edges(far, np.zeros(len(far), np.int32))
-        return np.argsort(far, kind="stable").astype(np.int32)
+            from scipy.spatial import cKDTree
+
+            far, nearest = cKDTree(self._V[vertices]).query(self._V)
+        return np.argsort(far, kind="stable").astype(np.int32), nearest.astype(np.int32)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from; on small bodies also by halved tetrahedra."""
@@ -113,49 +115,22 @@ class LineEngine(SimplexEngine):
     ) -> tuple[AnyArray, AnyArray]:
         """As `_lower`; returns edges (e, 2), and the edge (n,) around which the way to each vertex bends last."""
         begin = distance.copy()
-        order = self._order(vertices, straight=len(vertices) == 1)
+        order, nearest = self._from_near(vertices)
         edges, outward, wall = self.reflex_edges
-        if len(edges):
-            rank = np.empty(len(order), np.int64)
-            rank[self._order(vertices)] = np.arange(len(order))
-            near = np.argsort(rank[edges].max(axis=1), kind="stable")
-            edges, outward, wall = edges[near], outward[near], wall[near]
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
         turns = np.isin(vertices, edges).astype(np.uint8)
         beside = _BESIDE_OF_FEW if self._is_small else _BESIDE
-        is_continued = False
-        for round_ in range(_MOST_ROUNDS):
-            before = distance.copy()
-            guess = self._nearest(vertices)
+        is_repeated = self._is_small and len(edges) > 0 and len(vertices) > 1
+        for _round in range(_MOST_ROUNDS if is_repeated else 1):
+            before, guess = distance.copy(), nearest.copy()
             look_around(order, self._body, vertices, offset, turns, len(edges) > 0, guess, distance, begin, label)
             is_seen = distance < before
+            if not is_seen.any():
+                break
             way[is_seen] = _STRAIGHT
-            if round_ and not is_seen.any() and not is_continued:
-                break
-            if len(edges):
-                bend_around(edges, outward, wall, self._body, beside, vertices, offset, distance, begin, label, way)
-            # Behind a point or an edge at which tetrahedra touch, no line continues.
-            is_continued = self._continue_along_edges(distance, begin, label)
-            if not is_continued and not (self._is_small and len(edges) and len(vertices) > 1):
-                break
+            bend_around(edges, outward, wall, self._body, beside, vertices, offset, distance, begin, label, way)
         return edges, way
-
-    def _nearest(self, vertices: AnyArray) -> AnyArray:
-        """The source (n,) that each vertex looks for first: the nearest in space, or -1 for those of its neighbours."""
-        if len(vertices) == 1:
-            return np.full(self._simplices.n, 0 if self._is_small else -1, np.int32)
-        from scipy.spatial import cKDTree
-
-        return np.asarray(cKDTree(self._V[vertices]).query(self._V)[1], np.int32)
-
-    def _continue_along_edges(self, distance: FloatArray, begin: FloatArray, label: AnyArray) -> bool:
-        """Give vertices that nothing has reached a distance along edges; returns whether there were any."""
-        unreached = np.isinf(distance)
-        if not unreached.any():
-            return False
-        self._body.along_edges(distance, label, begin)
-        return bool(np.isfinite(distance[unreached]).any())
 
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         """As of all engines, without a list of edges: voxels have seven times as many as vertices."""

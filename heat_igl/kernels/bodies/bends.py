@@ -3,18 +3,24 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, Body, Line, Ray
+from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
+from cython.cimports.libc.stdlib import free, realloc
 
-# Share of the longest edge at a vertex by which a way to it may be too long, and the search still goes on behind it.
-_SLACK = cython.declare(cython.double, 0.2)
 # Share of that edge by which a vertex may lie below the plane of a wall and still be on it.
 _LEVEL = cython.declare(cython.double, 1e-6)
 # Share of an edge by which the fitted distance may be wrong at its quarters.
 _MISFIT = cython.declare(cython.double, 1e-3)
 # Change of the slope along an edge below which a front is straight there.
 _STRAIGHT_FRONT = cython.declare(cython.double, 1e-7)
-# Rounds over the edges around which ways bend.
-_MOST_ROUNDS = cython.declare(cython.int, 50)
+# Share of the longest edge at a vertex that sees a source by which a way around an edge that it passes on is longer.
+_SLACK = cython.declare(cython.double, 0.02)
+# Times that distance along an edge is found.
+_MOST_FITS = cython.declare(cython.int, 50)
+# No edge, and no way.
+_NONE = cython.declare(cython.int, -3)
+
+_Offer = cython.struct(edge=cython.int, fit=cython.int, next=cython.int, asked=cython.int, value=cython.double)
 
 
 def bend_around(
@@ -34,18 +40,20 @@ def bend_around(
 
     A shortest way bends at edges of the body with more than half a turn inside, and nowhere else. Along such an edge,
     distance is that from a point beside it, turned into one plane; behind the edge, the plane is turned again. So an
-    edge whose ends know their distances is a source: vertices around it are searched as far as they see the edge,
-    and its ways are the shortest.
+    edge whose ends know their distances is a source. It is a candidate for the vertices around it, and for the
+    neighbours of those to which the way around it is the shortest.
 
-    The edges (e, 2) int32 are those of the `body` around which ways bend, roughly from near to far. `outward` (e, 3) is
-    the direction out of the body at each, halfway between the two walls, zero where more than two meet, and `wall` (e,)
-    the cosine of the angle between that direction and the walls. A vertex may lie `beside` the part of the body that an
-    edge hides, by this share of its longest edge, and the search still goes on behind it: a larger one finds more of
-    what is hidden in coarse bodies, and takes time. `way` (n,) int32 is the edge around which the way to each vertex
-    bends last, -1 on straight ways, -2 where it is not known. The other arguments are those of `sight.look_around`;
-    `d`, `begin`, `label` and `way` are changed.
+    Vertices wait in the order of their first candidates. Before the line to the first edge is followed, edges that
+    share an end with it become candidates, and if it is hidden, those at the triangle that hides it.
 
-    Returns the number of times that vertices were searched around an edge.
+    The edges (e, 2) int32 are those of the `body` around which ways bend. `outward` (e, 3) is the direction out of the
+    body at each, halfway between the two walls, zero where more than two meet, and `wall` (e,) the cosine of the angle
+    between that direction and the walls. A vertex may lie `beside` the part of the body that an edge hides, by this
+    share of its longest edge, and the edge still is a candidate. `way` (n,) int32 is the edge around which the way to
+    each vertex bends last, -1 on straight ways, -2 where it is not known. The other arguments are those of
+    `sight.look_around`; `d`, `begin`, `label` and `way` are changed.
+
+    Returns the number of times that distance along an edge was found.
     """
     n, e = body.positions.shape[0], edges.shape[0]
     ends = np.asarray(body.positions)[np.asarray(edges)]
@@ -55,35 +63,43 @@ def bend_around(
     one.length, one.tangent = lengths, (ends[:, 1] - ends[:, 0]) / lengths[:, None]
     one.at, one.before, one.has_before = np.full((e, 5), np.inf), np.zeros((e, 3)), np.zeros(e, np.uint8)
     one.start, one.along, one.height, one.fits = np.zeros(e), np.zeros(e), np.zeros(e), np.zeros(e, np.uint8)
-    one.seen, one.lit, one.queue = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
-    one.line.lit = one.reverse.lit = cython.address(one.lit[0])
-    one.reverse.stamp = -2
-    with cython.nogil:
-        for _rounds in range(_MOST_ROUNDS):
-            before: cython.int = one.stamp
+    one.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
+    one.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
+    one.n_fits, one.newest, one.waiting = np.zeros(e, np.int32), np.full(n, _NONE, np.int32), PriorityQueue(n)
+    one.offered_to = np.full(e, _NONE, np.int32)
+    one.line.lit = cython.address(one.way[0])
+    is_shorter = np.ones(n, bool)
+    while is_shorter.any():
+        with cython.nogil:
             for i in range(e):
-                if one.is_stale(i):
-                    one.stamp, one.sought = one.stamp + 1, i
-                    one.fit(i)
-                    one.search(i)
-            if one.stamp == before:
-                break
-    return one.stamp
+                one.begin_around(i)
+            while one.waiting.count > 0:
+                one.ask(one.waiting.first())
+        # Behind a point or an edge at which tetrahedra touch, no line continues.
+        before = np.array(d)
+        if np.isinf(before).any():
+            body.along_edges(d, label, begin)
+        is_shorter = np.asarray(d) < before
+        np.asarray(way)[is_shorter] = -2
+    return int(np.sum(one.n_fits))
 
 
 @cython.final
 @cython.cclass
 class _Bends(Ray):
-    """Edges of a body around which ways bend, the ways, and the search around an edge.
+    """Edges of a body around which ways bend, the ways, and the edges that are candidates for them.
 
     Distance along an edge that `fits` is ``start + |(x - along, height)|``, x along the edge; at its ends, the quarters
     and the middle it is `at`. `before` is the point from which the way comes to the middle, if it `has_before`.
 
-    Of the way that was last asked for, `bend` (3,) is the point at which it bends last, `share` the place of this point
-    along the edge, and `beyond` by how much the way would miss the edge on a line through it.
+    Of the way that was last asked for, `bend` (3,) is the point at which it bends last, and `share` the place of this
+    point along the edge.
 
-    Of the search around the edge `sought`, `stamp` is the number; `seen` (n,) has the last search that came to each
-    vertex, and `lit` (n,) the last in which it saw the edge. `line` goes to the edge, and `reverse` from it.
+    The edges that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has the
+    number of fits of its edge (`n_fits`) when it was made, whether it has been `asked` for, and the value of the way,
+    `INFINITY` once the line has been followed. `offered_to` is the vertex whose list was last read or written for it.
+    The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`, and `sought` is
+    the edge to which the `line` goes.
     """
 
     edges: cython.const[cython.int][:, ::1]
@@ -101,25 +117,21 @@ class _Bends(Ray):
     way: cython.int[::1]
     bend: cython.double[3]
     share: cython.double
-    beyond: cython.double
     sought: cython.int
-    stamp: cython.int
-    seen: cython.int[::1]
-    lit: cython.int[::1]
-    queue: cython.int[::1]
+    n_fits: cython.int[::1]
+    at_end: cython.int[::1]
+    first_at_end: cython.int[::1]
+    newest: cython.int[::1]
+    offered_to: cython.int[::1]
+    offers: cython.pointer[_Offer]
+    n_offers: cython.int
+    n_most: cython.int
+    waiting: PriorityQueue
     beside: cython.double
     line: Line
-    reverse: Line
 
-    @cython.cfunc
-    @cython.nogil
-    def is_stale(self, i: cython.int) -> cython.bint:
-        """Whether the ends of an edge have distances, and others than when it was fitted."""
-        to_a: cython.double = self.d[self.edges[i, 0]]
-        to_b: cython.double = self.d[self.edges[i, 1]]
-        if to_a == INFINITY or to_b == INFINITY:
-            return False
-        return self.at[i, 0] > to_a * (1 + GAIN) or self.at[i, 4] > to_b * (1 + GAIN)
+    def __dealloc__(self):
+        free(self.offers)
 
     @cython.cfunc
     @cython.nogil
@@ -139,8 +151,9 @@ class _Bends(Ray):
                 x[k] = self.body.positions[a, k] + 0.25 * j * self.length[i] * self.tangent[i, k]
             from_a: cython.double = self.value(a, x)
             from_b: cython.double = self.value(b, x)
-            a_is_seen: cython.bint = a_reaches or self.is_lit_from(a, x, 0.25 * j)
-            b_is_seen: cython.bint = b_reaches or self.is_lit_from(b, x, 0.25 * j)
+            self.share = 0.25 * j
+            a_is_seen: cython.bint = a_reaches or self.is_lit_from(a, x)
+            b_is_seen: cython.bint = b_reaches or self.is_lit_from(b, x)
             if a_is_seen and b_is_seen:
                 self.at[i, j] = min(from_a, from_b)
             elif a_is_seen:
@@ -201,16 +214,14 @@ class _Bends(Ray):
         value: cython.double = self.d[v]
         if self.way[v] == -1:
             source, value = self.sources[self.label[v]], self.offset[self.label[v]]
-        squared: cython.double = 0.0
         for k in range(3):
             self.bend[k] = self.body.positions[source, k]
-            squared += (x[k] - self.bend[k]) * (x[k] - self.bend[k])
-        return value + sqrt(squared)
+        return value + self.body.away(source, x)
 
     @cython.cfunc
     @cython.nogil
     def around(self, i: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """Length of the way to a point that bends around an edge last; sets `bend`, `share` and `beyond`."""
+        """Length of the way to a point that bends around an edge last; sets `bend` and `share`."""
         away: cython.double = 0.0
         along: cython.double = 0.0
         for k in range(3):
@@ -219,14 +230,12 @@ class _Bends(Ray):
             along += off * self.tangent[i, k]
         squared: cython.double = max(away - along * along, 0.0)
         best: cython.double = INFINITY
-        self.beyond = 0.0
         if self.fits[i]:
             height: cython.double = sqrt(squared)
             both: cython.double = height + self.height[i]
             self.share = self.along[i]
             if both > 0:
                 self.share = (self.along[i] * height + along * self.height[i]) / both
-            self.beyond = max(-self.share, self.share - self.length[i], 0.0)
             self.share = min(max(self.share / self.length[i], 0.0), 1.0)
             if 0 < self.share < 1:
                 best = self.start[i] + sqrt((along - self.along[i]) * (along - self.along[i]) + both * both)
@@ -244,92 +253,137 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def is_lit_from(
-        self, v: cython.int, x: cython.pointer[cython.const[cython.double]], share: cython.double
-    ) -> cython.bint:
-        """Whether the source from which the way to v is straight sees a point of the edge."""
-        if self.way[v] != -1:
-            return False
-        self.share = share
-        self.aim_at_edge(x)
-        source: cython.int = self.sources[self.label[v]]
-        return self.is_near(cython.address(self.line), source) or self.follows(cython.address(self.line), source)
+    def is_lit_from(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
+        """Whether the source from which the way to v is straight sees the point of the edge at `share`."""
+        return self.way[v] == -1 and self.is_seen_by(self.sources[self.label[v]], x, _NONE)
 
     @cython.cfunc
     @cython.nogil
-    def aim_at_edge(self, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
-        """Make a point of the edge `sought`, at `share`, the goal of `line`."""
-        self.line.goal, self.line.stamp = x, self.stamp
-        self.line.goal_a = self.edges[self.sought, 1 if self.share > 1 - NUDGE else 0]
-        self.line.goal_b = self.edges[self.sought, 0 if self.share < NUDGE else 1]
+    def is_seen_by(self, v: cython.int, x: cython.pointer[cython.const[cython.double]], lit: cython.int) -> cython.bint:
+        """Whether the line from v to a point of the edge `sought`, at `share`, stays in the tetrahedra.
 
-    @cython.cfunc
-    @cython.nogil
-    def is_seen_by(self, v: cython.int) -> cython.bint:
-        """Whether the line from v to the `bend` on the edge `sought`, at `share`, stays in the tetrahedra.
-
-        To a vertex, it is followed from both ends until they meet: most lines that are hidden are so near an end.
+        It does if it passes between three vertices whose ways bend around the edge `lit`.
         """
-        self.aim_at_edge(self.bend)
         line: cython.pointer[Line] = cython.address(self.line)
-        reverse: cython.pointer[Line] = cython.address(self.reverse)
-        a: cython.int = line.goal_a
-        if self.is_near(line, v):
-            return True
-        if a != line.goal_b:
-            return self.follows(line, v)
-        reverse.goal, reverse.goal_a, reverse.goal_b = cython.address(self.body.positions[v, 0]), v, v
-        back: cython.int = self.cone(reverse, a)
-        if back < 0:
-            return self.begins(reverse, a, 0) >= 0 and self.follows(line, v)
-        begin: cython.int = self.cone(line, v)
-        if begin < 0:
-            return self.follows(line, v)
-        return self.enters(line, begin, -1, -1) and self.enters(reverse, back, -1, -1) and self.meets(line, reverse)
+        line.goal, line.stamp = x, lit
+        line.goal_a = self.edges[self.sought, 1 if self.share > 1 - NUDGE else 0]
+        line.goal_b = self.edges[self.sought, 0 if self.share < NUDGE else 1]
+        return self.is_near(line, v) or self.follows(line, v)
 
     @cython.cfunc
     @cython.nogil
-    def search(self, i: cython.int) -> cython.void:
-        """Give the vertices around an edge their ways around it, as far as they see it and may need it."""
-        stamp: cython.int = self.stamp
-        a: cython.int = self.edges[i, 0]
-        b: cython.int = self.edges[i, 1]
-        self.seen[a] = self.seen[b] = self.lit[a] = self.lit[b] = stamp
-        size: cython.int = self.push_around(a, 0, stamp)
-        size = self.push_around(b, size, stamp)
-        next_one: cython.int = 0
-        while next_one < size:
-            u: cython.int = self.queue[next_one]
-            next_one += 1
-            value: cython.double = self.around(i, cython.address(self.body.positions[u, 0]))
-            old: cython.double = self.d[u]
-            is_better: cython.bint = value < old * (1 - GAIN)
-            # Farther along, ways are shorter around another edge.
-            if not is_better and (self.beyond > self.body.reach[u] or value > old + _SLACK * self.body.reach[u]):
-                continue
-            if not self.is_hidden_from_before(i, u):
-                continue
-            # A vertex that gains nothing may lie between those that do.
-            if is_better:
-                if not self.is_seen_by(u):
-                    continue
-                self.lit[u] = stamp
-                self.d[u], self.way[u] = value, i
-                self.begin[u] = value - self.away(u, self.bend)
-                self.label[u] = self.label[a if self.share < 0.5 else b]
-            size = self.push_around(u, size, stamp)
+    def begin_around(self, i: cython.int) -> cython.void:
+        """Make an edge whose ends have distances, and shorter ones than before, a candidate for those around them."""
+        to_a: cython.double = self.d[self.edges[i, 0]]
+        to_b: cython.double = self.d[self.edges[i, 1]]
+        is_new: cython.bint = self.at[i, 0] > to_a * (1 + GAIN) or self.at[i, 4] > to_b * (1 + GAIN)
+        if is_new and max(to_a, to_b) < INFINITY and self.n_fits[i] < _MOST_FITS:
+            self.sought, self.offered_to[i] = i, _NONE
+            self.fit(i)
+            self.n_fits[i] += 1
+            self.offer_around(i, self.edges[i, 0])
+            self.offer_around(i, self.edges[i, 1])
 
     @cython.cfunc
     @cython.nogil
-    def push_around(self, v: cython.int, size: cython.int, stamp: cython.int) -> cython.int:
-        """Put the neighbours of v that the search has not come to at the end of the queue; returns its size."""
-        for k in range(self.body.first_neighbour[v], self.body.first_neighbour[v + 1]):
-            u: cython.int = self.body.neighbours[k]
-            if self.seen[u] != stamp:
-                self.seen[u] = stamp
-                self.queue[size] = u
-                size += 1
-        return size
+    def offer_around(self, i: cython.int, u: cython.int) -> cython.void:
+        """Make an edge a candidate for the neighbours of u to which it is none."""
+        for m in range(self.body.first_neighbour[u], self.body.first_neighbour[u + 1]):
+            v: cython.int = self.body.neighbours[m]
+            if self.d[v] < INFINITY and self.around(i, cython.address(self.body.positions[v, 0])) >= self.most(v):
+                continue
+            k: cython.int = self.newest[v]
+            while k >= 0 and (self.offers[k].edge != i or self.offers[k].fit != self.n_fits[i]):
+                k = self.offers[k].next
+            if k < 0:
+                self.offer(i, v)
+
+    @cython.cfunc
+    @cython.nogil
+    def offer_at(self, a: cython.int, v: cython.int) -> cython.void:
+        """Make the edges that end at a candidates for v, whose list has just been read."""
+        for k in range(self.first_at_end[a], self.first_at_end[a + 1]):
+            i: cython.int = self.at_end[k]
+            if self.n_fits[i] > 0 and self.offered_to[i] != v:
+                self.offered_to[i] = v
+                self.offer(i, v)
+
+    @cython.cfunc
+    @cython.nogil
+    def offer(self, i: cython.int, v: cython.int) -> cython.void:
+        """Make an edge a candidate for v, which waits if the way around it would be shorter."""
+        if self.n_offers == self.n_most:
+            self.n_most = 2 * self.n_most + 1024
+            room: cython.size_t = self.n_most * cython.sizeof(_Offer)
+            self.offers = cython.cast(cython.pointer[_Offer], realloc(self.offers, room))
+        one: cython.pointer[_Offer] = cython.address(self.offers[self.n_offers])
+        one.edge, one.fit, one.next, one.asked, one.value = i, self.n_fits[i], self.newest[v], False, INFINITY
+        self.newest[v], self.n_offers = self.n_offers, self.n_offers + 1
+        value: cython.double = self.around(i, cython.address(self.body.positions[v, 0]))
+        is_end: cython.bint = v == self.edges[i, 0] or v == self.edges[i, 1]
+        if not is_end and value < self.most(v) and self.is_hidden_from_before(i, v):
+            one.value = value
+            self.waiting.set_key(v, max(self.waiting.key[v], 1 / value))
+
+    @cython.cfunc
+    @cython.inline
+    @cython.nogil
+    def most(self, v: cython.int) -> cython.double:
+        """What a way to v is to be shorter than; a vertex that sees a source passes on edges that are no better."""
+        return self.d[v] + _SLACK * self.body.reach[v] if self.way[v] == -1 else self.d[v] * (1 - GAIN)
+
+    @cython.cfunc
+    @cython.nogil
+    def shortest(self, v: cython.int) -> cython.int:
+        """The candidate of v around which the way is the shortest, of equal ones the oldest; v waits for its turn."""
+        least: cython.double = INFINITY
+        best: cython.int = _NONE
+        k: cython.int = self.newest[v]
+        while k >= 0:
+            one: cython.pointer[_Offer] = cython.address(self.offers[k])
+            if one.fit == self.n_fits[one.edge]:
+                self.offered_to[one.edge] = v
+                if one.value < self.most(v) and one.value <= least * (1 + GAIN):
+                    best, least = k, one.value
+            k = one.next
+        self.waiting.set_key(v, 1 / least)
+        return best
+
+    @cython.cfunc
+    @cython.nogil
+    def ask(self, v: cython.int) -> cython.void:
+        """Give v the way around its first candidate if the line is clear, and offer the edge to the neighbours."""
+        k: cython.int = self.shortest(v)
+        if k < 0:
+            return
+        i: cython.int = self.offers[k].edge
+        value: cython.double = self.offers[k].value
+        if value >= self.d[v] * (1 - GAIN):
+            self.offers[k].value = INFINITY
+            self.offer_around(i, v)
+            self.shortest(v)
+            return
+        if not self.offers[k].asked:
+            self.offers[k].asked = True
+            self.offer_at(self.edges[i, 0], v)
+            self.offer_at(self.edges[i, 1], v)
+            if self.waiting.key[v] * value > 1 + GAIN:
+                return
+        self.offers[k].value = INFINITY
+        self.around(i, cython.address(self.body.positions[v, 0]))
+        self.sought = i
+        if not self.is_seen_by(v, self.bend, i):
+            for c in range(1, 4):
+                self.offer_at(self.body.cells[self.line.t, (self.line.out + c) & 3], v)
+            self.shortest(v)
+            return
+        self.d[v], self.way[v] = value, i
+        self.begin[v] = value - self.body.away(v, self.bend)
+        self.label[v] = self.label[self.edges[i, 0 if self.share < 0.5 else 1]]
+        self.offer_around(i, v)
+        for m in range(self.first_at_end[v], self.first_at_end[v + 1]):
+            self.begin_around(self.at_end[m])
+        self.shortest(v)
 
     @cython.cfunc
     @cython.nogil

@@ -43,6 +43,7 @@ cdef class Body:
 
     cdef int across(self, int t, int o) noexcept nogil
     cdef int list_around(self, int v, int[::1] mark, int[::1] into, int at) noexcept nogil
+    cdef double away(self, int v, const double* x) noexcept nogil
     cdef double apart(self, int v, int u) noexcept nogil
 
 
@@ -58,11 +59,8 @@ cdef class Ray:
     cdef bint follows(self, Line* line, int v) noexcept nogil
     cdef int begins(self, Line* line, int v, int i) noexcept nogil
     cdef bint is_near(self, Line* line, int v) noexcept nogil
-    cdef double away(self, int v, const double* x) noexcept nogil
     cdef bint arrives_from(self, Line* line, int begin) noexcept nogil
     cdef bint arrives(self, Line* line, int begin, int into, int toward) noexcept nogil
-    cdef bint enters(self, Line* line, int begin, int into, int toward) noexcept nogil
-    cdef bint meets(self, Line* line, Line* reverse) noexcept nogil
     cdef int step(self, Line* line) noexcept nogil
     cdef int cone(self, Line* line, int v) noexcept nogil
     cdef void aim(self, Line* line, int t, int into, double nudge, int toward) noexcept nogil

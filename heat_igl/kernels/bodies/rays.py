@@ -100,13 +100,16 @@ class Body:
                     at += 1
         return at
 
-    def apart(self, v: cython.int, u: cython.int) -> cython.double:
-        """The distance of two vertices in space."""
+    def away(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+        """The distance of v from a point in space."""
         squared: cython.double = 0.0
         for i in range(3):
-            off: cython.double = self.positions[u, i] - self.positions[v, i]
-            squared += off * off
+            squared += (self.positions[v, i] - x[i]) * (self.positions[v, i] - x[i])
         return sqrt(squared)
+
+    def apart(self, v: cython.int, u: cython.int) -> cython.double:
+        """The distance of two vertices in space."""
+        return self.away(v, cython.address(self.positions[u, 0]))
 
     def along_edges(self, d: cython.double[::1], label: cython.int[::1], begin: cython.double[::1]) -> None:
         """Lower distances `d` (n,) to paths along edges, in place; `begin` is where their last edge begins."""
@@ -169,7 +172,7 @@ class Ray:
     def is_near(self, line: cython.pointer[Line], v: cython.int) -> cython.bint:
         """Whether the goal is in a tetrahedron at v."""
         # A point of such a one is at most as far away as a corner.
-        if self.away(v, line.goal) <= self.body.reach[v] * (1 + GAIN):
+        if self.body.away(v, line.goal) <= self.body.reach[v] * (1 + GAIN):
             for k in range(self.body.first[v], self.body.first[v + 1]):
                 has: cython.int = 0
                 for c in range(4):
@@ -177,13 +180,6 @@ class Ray:
                 if has & 3 == 3:
                     return True
         return False
-
-    def away(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """The distance of v from a point in space."""
-        squared: cython.double = 0.0
-        for i in range(3):
-            squared += (self.body.positions[v, i] - x[i]) * (self.body.positions[v, i] - x[i])
-        return sqrt(squared)
 
     def arrives_from(self, line: cython.pointer[Line], begin: cython.int) -> cython.bint:
         """Whether the line that begins in the tetrahedron of a corner arrives."""
@@ -193,37 +189,19 @@ class Ray:
         self, line: cython.pointer[Line], begin: cython.int, into: cython.int, toward: cython.int
     ) -> cython.bint:
         """Whether the line arrives before it leaves the body; it begins and ends as `aim` moves it."""
-        if not self.enters(line, begin, into, toward):
-            return False
-        for _steps in range(_MOST_STEPS):
-            found: cython.int = self.step(line)
-            if found != 0:
-                return found > 0
-        return False
-
-    def enters(
-        self, line: cython.pointer[Line], begin: cython.int, into: cython.int, toward: cython.int
-    ) -> cython.bint:
-        """Begin in the tetrahedron of a corner, and find the side through which the line leaves it."""
         self.aim(line, begin // 4, into, NUDGE, toward)
         for i in range(4):
             k: cython.int = begin // 4 * 4 + ((begin + i) & 3)
             if self.leaves(line, k, 0.0):
-                line.t, line.out = k >> 2, k & 3
-                for j in range(3):
-                    line.x[j] *= line.sign
-                    line.has[j] = _has(line, line.corner[j])
-                return True
-        return False
-
-    def meets(self, line: cython.pointer[Line], reverse: cython.pointer[Line]) -> cython.bint:
-        """Whether two lines between the same points meet, or one arrives, before they leave the body."""
+                break
+        else:
+            return False
+        line.t, line.out = k >> 2, k & 3
+        for i in range(3):
+            line.x[i] *= line.sign
+            line.has[i] = _has(line, line.corner[i])
         for _steps in range(_MOST_STEPS):
-            if line.t == reverse.t:
-                return True
             found: cython.int = self.step(line)
-            if found == 0 and line.t != reverse.t:
-                found = self.step(reverse)
             if found != 0:
                 return found > 0
         return False

@@ -3,7 +3,7 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, Body, Line, Ray
-from cython.cimports.libc.math import INFINITY, sqrt
+from cython.cimports.libc.math import INFINITY
 
 # Sources that a vertex looks for each time, the nearest first, and passes over the vertices that wait.
 _MOST_LOOKS = cython.declare(cython.int, 4)
@@ -134,12 +134,7 @@ class _Sight(Ray):
     @cython.nogil
     def line(self, v: cython.int, label: cython.int) -> cython.double:
         """The value at v along the straight line from a source."""
-        source: cython.int = self.sources[label]
-        squared: cython.double = 0.0
-        for k in range(3):
-            off: cython.double = self.body.positions[v, k] - self.body.positions[source, k]
-            squared += off * off
-        return self.offset[label] + sqrt(squared)
+        return self.offset[label] + self.body.apart(v, self.sources[label])
 
     @cython.cfunc
     @cython.nogil
