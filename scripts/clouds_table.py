@@ -4,6 +4,7 @@
     python scripts/clouds_table.py turns [MESH ...] [--repeats 15]   # errors, and times as ratios
     python scripts/clouds_table.py log-maps MESH ...
     python scripts/clouds_table.py scans [--sizes 1000 5000 20000] [--sources 3]   # noise, outliers, uneven density
+    python scripts/clouds_table.py warnings [--sizes 600] [--seed 10000]   # of how many random clouds, right or wrong
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4, a cylinder of radius 1 and height 3, and a square
 with sides of length 1, or the vertices of meshes; noise is Gaussian in all coordinates. distances: the mean of
@@ -12,7 +13,9 @@ ratios of processor time in turns, of the solver, of the solver with the first q
 of a later query; mean errors, of meshes also that on the restricted Delaunay triangulation, which knows the surface;
 the share of doubtful points, not counting folds, with a star where the cloud warned. log-maps: the median angle to the
 exact one of the mesh in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in percent of
-default / potpourri3d / the shortest path in the graph of 8 neighbours. Needs ``bench``; see docs/clouds_theory.md.
+default / potpourri3d / the shortest path in the graph of 8 neighbours. warnings: of so many random points on random
+surfaces, how many clouds are wrong by more than 5 % in the mean from one source, and silent, and how many are right
+within 2 % and warn, other than of several parts. Needs ``bench``; see docs/clouds_theory.md.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ from scipy.spatial import KDTree
 import heat_igl
 from heat_igl import GeodesicSolver, Mesh, PointCloud, VectorHeatSolver, log_map, shapes, tangent_frames
 from heat_igl.typing import FloatArray, IntArray
+from heat_igl.validation.zoo import FAMILIES
 
 from harness import Query, Row, Table, collected, drawn, mean_error, named, on_sphere, parsed, publish, seconds
 
@@ -81,7 +85,7 @@ def _surface(P: FloatArray) -> tuple[IntArray, str]:
     cloud = PointCloud(P)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        _, doubtful = cloud._made
+        doubtful = cloud._made[1]
     return doubtful, "*" * bool(caught)
 
 
@@ -222,6 +226,38 @@ def turns(options: argparse.Namespace) -> Iterator[Row]:
         yield row | dict(zip(("solver", "both", "later"), np.median(ratios, axis=0), strict=True))
 
 
+def on_random_surface(seed: int) -> tuple[str, FloatArray, FloatArray]:
+    """A family of meshes, random points on the surface of a member, and exact distances from the first."""
+    rng, name = np.random.default_rng(seed), list(FAMILIES)[seed % len(FAMILIES)]
+    mesh = FAMILIES[name](seed)
+    n, area = int(np.exp(rng.uniform(np.log(300), np.log(4000)))), mesh.measures
+    r, s = np.sqrt(rng.random(n)), rng.random(n)
+    at = heat_igl.SurfacePoints(
+        rng.choice(len(area), n, p=area / area.sum()), np.stack([1 - r, r * (1 - s), r * s], axis=1)
+    )
+    first = heat_igl.SurfacePoints(at.faces[:1], at.barycentric[:1])
+    return name, at.positions(mesh), heat_igl.geodesic_distance(mesh, first, targets=at)
+
+
+def warned(options: argparse.Namespace) -> Iterator[Row]:
+    """How many random clouds of each family are wrong and right, and how many of both warn."""
+    counts = {name: np.zeros(4, int) for name in [*FAMILIES, "all"]}
+    for seed in range(options.seed, options.seed + options.sizes[0]):
+        name, P, truth = on_random_surface(seed)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            found = GeodesicSolver(PointCloud(P), method="exact").distance(0)
+        # Between parts both are infinite; one alone is wrong by the whole distance.
+        with np.errstate(invalid="ignore"):
+            error = np.where(found == truth, 0, np.minimum(np.abs(found - truth) / np.minimum(found, truth), 1))
+        parts = any("several parts" in str(warning.message) for warning in caught)
+        wrong, right = np.nanmean(error) > 0.05, np.nanmean(error) < 0.02 and not parts
+        for each in (name, "all"):
+            counts[each] += [wrong, wrong and not caught, right, right and bool(caught)]
+    for name, count in counts.items():
+        yield {"family": name} | dict(zip(("wrong", "silent", "right", "said"), count.tolist(), strict=True))
+
+
 def log_maps(options: argparse.Namespace) -> Iterator[Row]:
     """Median angle and mean error of the vectors of each method, in the planes of the mesh."""
     for vertices, mesh in named(options.meshes).items():
@@ -244,7 +280,9 @@ def log_maps(options: argparse.Namespace) -> Iterator[Row]:
 
 def main(argv: Sequence[str] | None = None) -> None:
     several = {"shapes": [*SHAPES], "sizes": [5000, 50000], "noise": [0.0, 0.01], "methods": [*METHODS]}
-    options = parsed(__doc__, argv, "*", ("distances", "turns", "log-maps", "scans"), sources=6, repeats=15, **several)
+    options = parsed(
+        __doc__, argv, "*", ("distances", "turns", "log-maps", "scans", "warnings"), sources=6, repeats=15, **several
+    )
     head = {"points on": "{points on}", "number": "{number}", "noise": "{noise:g}"}
     scan = "{{{0}[default]:.2g}} / {{{0}[potpourri3d]:.2g}} / {{{0}[graph]:.2g}}{{{0}[warned]}}"
     columns = {
@@ -256,10 +294,19 @@ def main(argv: Sequence[str] | None = None) -> None:
         | {"potpourri3d, %": "{potpourri3d:.2g}", "solver": "{solver:.2f}"}
         | {"solver and first query": "{both:.2f}", "later query": "{later:.2f}"},
         "scans": {"scan": "{scan}", "number": "{number}"} | {shape: scan.format(shape) for shape in options.shapes},
+        "warnings": {
+            "family": "{family}",
+            "wrong": "{wrong}",
+            "silent": "{silent}",
+            "right": "{right}",
+            "said": "{said}",
+        },
         "log-maps": {"vertices of": "{vertices of}"}
         | {f"{m}, degrees, %": f"{{{m}[0]:.2g}}, {{{m}[1]:.2g}}" for m in ("heat", "paths", "potpourri3d")},
     }
-    rows = {"distances": distances, "turns": turns, "scans": scans, "log-maps": log_maps}[options.table](options)
+    rows = {"distances": distances, "turns": turns, "scans": scans, "warnings": warned, "log-maps": log_maps}[
+        options.table
+    ](options)
     publish(options, {options.table: Table(collected(rows), columns[options.table])})
 
 

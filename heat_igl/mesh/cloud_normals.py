@@ -81,12 +81,7 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[Float
 def usable_normals(normals: AnyArray, where: str = "") -> AnyArray | None:
     """The normals (n, 3) of a file or of another library; None if they are all 0, or if some are missing.
 
-    `where` is the beginning of the warning.
-
-    Warns
-    -----
-    AccuracyWarning
-        If some normals, but not all, are 0 or not finite.
+    `where` is the beginning of the warning that some, but not all, are 0 or not finite.
     """
     if normals.dtype.kind not in "iuf" or normals.ndim != 2:
         return normals  # which is an error of the cloud

@@ -49,13 +49,7 @@ def cloud_of_cells(mesh: Any) -> PointCloud | None:
 
 
 def refuse_other_cells(mesh: Any, understood: tuple[str | int, ...]) -> None:
-    """Refuse cells that are neither understood nor points or lines: without them, the domain would have holes.
-
-    Raises
-    ------
-    MeshError
-        If there are such cells.
-    """
+    """A `MeshError` for cells neither understood nor points or lines: without them, the domain would have holes."""
     for kind, rows in mesh.cells_dict.items():
         if len(rows) and kind not in understood and not _is_one_of(kind, _POINTS + _LINES):
             name = kind if isinstance(kind, str) else f"{kind} of VTK"

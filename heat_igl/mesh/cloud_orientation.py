@@ -27,12 +27,10 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
 
     Also returns the points (k,) at edges where neighbours still contradict each other and are not flat.
 
-    Where triangles join sheets wrongly, no orientation may suit all neighbours. Then groups of triangles are joined,
-    two at a time, in the relative orientation that more of the edges between them want, weighted by flatness. The
-    strongest joins for the sizes of the groups come first: a narrow bridge between two sheets is among the last, and
-    does not turn a part of a sheet around, as it may in a spanning tree of the flattest edges (Hoppe et al. 1992). Of
-    each pair that still contradicts, one triangle is left out. All stay where most of these are flat, as on a surface
-    with one side, which that would tear. Then as many neighbours as possible are oriented alike.
+    Where triangles join sheets wrongly, no orientation may suit all neighbours. Then groups are joined, two at a time,
+    in the relative orientation that more of the edges between them want, weighted by flatness, the strongest joins for
+    their sizes first: a narrow bridge between sheets is among the last, and turns no part of a sheet around. Of each
+    pair that still contradicts, one triangle is left out, unless most are flat, as on a surface with one side.
     """
     is_turned, part, pairs, folds = _turned(P, F)
     count, (a, b) = np.bincount(pairs.ravel(), minlength=len(F)), pairs.T
@@ -142,21 +140,9 @@ def two_sided_cover(surface: Mesh) -> Mesh:
             np.stack([a, b + F.size * runs_alike], axis=1),
             np.stack([a + F.size, b + F.size * ~runs_alike], axis=1),
         ]
-    return Mesh(*_numbered(surface, components(np.concatenate(pairs), 2 * F.size)))
-
-
-def on_one_side(faces: IntArray, barycentric: FloatArray, m: int) -> tuple[IntArray, FloatArray]:
-    """Points in the 2 m faces of a cover as points (k,), (k, ..., 3) of the m faces that it covers."""
-    is_other, found = faces >= m, barycentric.copy()
-    found[is_other] = found[is_other][..., [0, 2, 1]]
-    return np.where(is_other, faces - m, faces), found
-
-
-def _numbered(surface: Mesh, fan: IntArray) -> tuple[IntArray, IntArray]:
-    """Positions and faces of the cover, from the label of the fan (6 m,) of each corner of both sides."""
-    n, half = surface.n_vertices, surface.F.size
+    fan = components(np.concatenate(pairs), 2 * F.size)
     first_corner, size = np.unique(fan, return_index=True, return_counts=True)[1:]
-    of_fan, on_other_side = surface.F.ravel()[first_corner % half], np.roll(fan, half)[first_corner]
+    of_fan, on_other_side = F.ravel()[first_corner % F.size], np.roll(fan, F.size)[first_corner]
     # The largest fan of each vertex, of equal ones that of the first face; then the other side of it.
     order = np.lexsort((first_corner, -size, of_fan))
     largest = order[np.diff(of_fan[order], prepend=-1) != 0]
@@ -165,6 +151,14 @@ def _numbered(surface: Mesh, fan: IntArray) -> tuple[IntArray, IntArray]:
     number[on_other_side[largest]] = of_fan[largest] + n
     rest = np.flatnonzero(number < 0)
     number[rest] = 2 * n + np.arange(len(rest))
-    V = np.concatenate([surface.V, surface.V, surface.V[of_fan[rest]]])
     front, back = number[fan].reshape(2, -1, 3)
-    return V, np.concatenate([front, back[:, [0, 2, 1]]])
+    return Mesh(
+        np.concatenate([surface.V, surface.V, surface.V[of_fan[rest]]]), np.concatenate([front, back[:, [0, 2, 1]]])
+    )
+
+
+def on_one_side(faces: IntArray, barycentric: FloatArray, m: int) -> tuple[IntArray, FloatArray]:
+    """Points in the 2 m faces of a cover as points (k,), (k, ..., 3) of the m faces that it covers."""
+    is_other, found = faces >= m, barycentric.copy()
+    found[is_other] = found[is_other][..., [0, 2, 1]]
+    return np.where(is_other, faces - m, faces), found

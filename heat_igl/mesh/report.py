@@ -126,12 +126,15 @@ class CloudReport(MeshReport):
         Points in no triangle of the largest part, from which their distance is ``inf``.
     doubtful_points : (k,) int64
         Points at which the triangles may join sheets that are apart, or tear one: at an edge of two triangles that
-        contradict each other's orientation or fold back, with less than 60 degrees between them; with one and a half
-        turns of triangles around them; or beside another sheet, more than four edges away from a point nearby.
+        contradict each other's orientation or fold back, with less than 60 degrees between them; or more than four
+        edges away from a point nearby, as beside another sheet, or at triangles that bridge a gap, without these.
     n_copies : int
         Points that are copies of earlier ones.
     noise : float
         Root mean square of how far points were moved to smooth them, in the unit of the points; 0 if they were not.
+    tilt : float
+        Degrees between triangles and the tangent planes of their corners, the angle of the mean cosine: near 0 where
+        the points are dense enough for the bends of the surface.
     """
 
     boundary_points: IntArray
@@ -139,6 +142,7 @@ class CloudReport(MeshReport):
     doubtful_points: IntArray
     n_copies: int
     noise: float
+    tilt: float
 
 
 def _shown(value: object) -> str:
