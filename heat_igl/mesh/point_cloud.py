@@ -345,6 +345,6 @@ def _warn_of_noise(way: FloatArray, may_be_sheets: bool, area: float) -> None:
         warn_caller(
             f"the noise of the points is {noise:.2g} across the surface, and as much along it: distances are "
             f"{100 * _ERROR_OF_NOISE * noise / np.sqrt(area):.0f} % off in the mean, between near points by more. Give "
-            "points with less noise, as the means of several scans",
+            "points with less noise, as the means of several scans, or the mesh if this is detail of the surface",
             AccuracyWarning,
         )
