@@ -221,3 +221,23 @@ def test_other_positions_metrics_and_matrices(name):
     labels[[A, B]] = 0, 1
     between = heat_igl.parcel_distances(made, labels)
     np.testing.assert_allclose(between, [[0, exact(name, A)[B]], [exact(name, A)[B], 0]], rtol=1e-4)
+
+
+@table
+def test_curves_along_edges_the_farthest_pair_times_and_errors(name):
+    made, mesh, truth = domain(name), surface(name), exact(name, A)
+    for path in (heat_igl.shortest_paths(made, [B], A)[0], heat_igl.geodesic_path(made, [A, B])):
+        assert path.lengths(mesh).sum() == pytest.approx(truth[B])
+    edge = mesh.F[5, :2]
+    straight = np.linalg.norm(np.diff(mesh.V[edge], axis=0))
+    assert heat_igl.edge_curve(made, edge).lengths(mesh).sum() == pytest.approx(straight)
+    assert heat_igl.curve_on(made, mesh.V[edge]).length >= straight * (1 - 1e-9)
+    farthest, a, b = heat_igl.diameter(GeodesicSolver(made, method="exact"))
+    assert farthest == pytest.approx(exact(name, a)[b])
+    assert farthest == pytest.approx(exact(name, b).max())
+    metric = np.tile(np.eye(3), (made.n_vertices, 1, 1))
+    np.testing.assert_allclose(heat_igl.activation_times(made, metric, [A]), truth, atol=1e-9)
+    faster = GeodesicSolver(heat_igl.speed_operators(made, np.full(mesh.n_faces, 2.0)), method="exact")
+    np.testing.assert_allclose(faster.distance(A), truth / 2, atol=1e-9)
+    errors = heat_igl.geodesic_errors(made, [A, A], [A, B])
+    np.testing.assert_allclose(errors * np.sqrt(mesh.measures.sum()), [0, truth[B]], atol=1e-9)
