@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from heat_igl import GeodesicSolver, distances_within, shapes, write_distances_within
+from heat_igl.kernels import signals
+from heat_igl.operators import MetricSimplices
 from heat_igl.runtime.threads import Pool
+from heat_igl.sweep import HopfLaxEngine, LineEngine
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer signals on this system")
 
@@ -59,6 +62,24 @@ def test_local_queries_end_and_begin_anew(soon):
         soon(lambda: distances_within(mesh, np.pi, np.tile(np.arange(mesh.n_vertices), 3)))
     again = distances_within(mesh, 0.3, [7])
     np.testing.assert_array_equal(again.toarray(), near.toarray())
+
+
+def test_searches_in_bodies_end():
+    """Straight lines are not found, and paths along edges for some vertices only."""
+    mesh = shapes.box(20)
+    speeds = MetricSimplices.in_metric(mesh, np.eye(3) * np.linspace(1, 2, len(mesh.F))[:, None, None], 1.0)
+    lines, along_edges, stop = LineEngine(MetricSimplices.in_space(mesh)), HopfLaxEngine(speeds), threading.Event()
+    one, label = np.full((2, mesh.n_vertices), np.inf), np.full((2, mesh.n_vertices), -1, np.int32)
+    one[:, 0], label[:, 0] = 0, 0
+    stop.set()
+    signals.obey(stop)
+    try:
+        lines._lower(np.zeros(1, np.int32), np.zeros(1), one[0], label[0])
+        along_edges._along_edges(one[1], label[1])
+    finally:
+        signals.obey(None)
+    assert (one[0] > 1.1 * np.linalg.norm(mesh.V - mesh.V[0], axis=1)).sum() > mesh.n_vertices / 2
+    assert 0 < np.isinf(one[1]).sum() < mesh.n_vertices - 1
 
 
 def test_loops_of_an_abandoned_pool_end():

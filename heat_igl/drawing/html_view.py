@@ -167,6 +167,8 @@ def page(
     meta["arrays"] = [
         (name, "float" if array.dtype.kind == "f" else "int", array.size) for name, array in arrays.items()
     ]
+    # Bytes are grouped by significance: adjacent signs and exponents compress best.
+    planes = [np.ascontiguousarray(array).view(np.uint8).reshape(-1, 4).T.tobytes() for array in arrays.values()]
     folder = files("heat_igl.drawing") / "page"
     names = sorted(file.name for file in folder.iterdir() if file.name.endswith(".js"))
     return Page(
@@ -174,7 +176,7 @@ def page(
             title=html.escape(title),
             # Without the character "<", which could end the surrounding script element.
             meta=json.dumps(meta, allow_nan=False).replace("<", "\\u003c"),
-            data=base64.b64encode(_packed(list(arrays.values()))).decode(),
+            data=base64.b64encode(zlib.compress(b"".join(planes), 9)).decode(),
             # One script in the end: view.js, the last by name, uses what the others define.
             scripts="\n".join((folder / name).read_text(encoding="utf8") for name in names),
         )
@@ -213,9 +215,3 @@ def _bytes(table: AnyArray) -> list[list[int]]:
     """Colours (k, 4) between 0 and 1 as red, green and blue up to 255."""
     colours_as_bytes: list[list[int]] = np.rint(255 * table[:, :3]).astype(int).tolist()
     return colours_as_bytes
-
-
-def _packed(arrays: list[AnyArray]) -> bytes:
-    """The arrays, compressed. Bytes are grouped by significance: adjacent signs and exponents compress best."""
-    planes = [np.ascontiguousarray(array).view(np.uint8).reshape(-1, 4).T.tobytes() for array in arrays]
-    return zlib.compress(b"".join(planes), 9)

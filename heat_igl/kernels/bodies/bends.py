@@ -4,8 +4,11 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, Body, Line, Ray
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
+from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 from cython.cimports.libc.stdlib import free, realloc
+
+from heat_igl.kernels.signals import raise_caught
 
 # Share of that edge by which a vertex may lie below the plane of a wall and still be on it.
 _LEVEL = cython.declare(cython.double, 1e-6)
@@ -69,12 +72,19 @@ def bend_around(
     one.offered_to = np.full(e, _NONE, np.int32)
     one.line.lit = cython.address(one.way[0])
     is_shorter = np.ones(n, bool)
+    n_asked: cython.Py_ssize_t = 0
     while is_shorter.any():
         with cython.nogil:
             for i in range(e):
                 one.begin_around(i)
-            while one.waiting.count > 0:
+            while one.waiting.count > 0 and not one.failed:
+                n_asked += 1
+                if n_asked % ASK == 0 and is_interrupted():
+                    break
                 one.ask(one.waiting.first())
+        raise_caught()
+        if one.failed:
+            raise MemoryError("no memory for the ways around edges of the body")
         # Behind a point or an edge at which tetrahedra touch, no line continues.
         before = np.array(d)
         if np.isinf(before).any():
@@ -126,6 +136,7 @@ class _Bends(Ray):
     offers: cython.pointer[_Offer]
     n_offers: cython.int
     n_most: cython.int
+    failed: cython.bint
     waiting: PriorityQueue
     beside: cython.double
     line: Line
@@ -313,9 +324,12 @@ class _Bends(Ray):
     def offer(self, i: cython.int, v: cython.int) -> cython.void:
         """Make an edge a candidate for v, which waits if the way around it would be shorter."""
         if self.n_offers == self.n_most:
-            self.n_most = 2 * self.n_most + 1024
-            room: cython.size_t = self.n_most * cython.sizeof(_Offer)
-            self.offers = cython.cast(cython.pointer[_Offer], realloc(self.offers, room))
+            room: cython.size_t = (2 * cython.cast(cython.size_t, self.n_most) + 1024) * cython.sizeof(_Offer)
+            more: cython.p_void = realloc(self.offers, room)
+            if more == cython.NULL:
+                self.failed = True
+                return
+            self.n_most, self.offers = 2 * self.n_most + 1024, cython.cast(cython.pointer[_Offer], more)
         one: cython.pointer[_Offer] = cython.address(self.offers[self.n_offers])
         one.edge, one.fit, one.next, one.asked, one.value = i, self.n_fits[i], self.newest[v], False, INFINITY
         self.newest[v], self.n_offers = self.n_offers, self.n_offers + 1

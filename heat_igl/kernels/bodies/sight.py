@@ -3,7 +3,10 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, Body, Line, Ray
+from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.libc.math import INFINITY
+
+from heat_igl.kernels.signals import raise_caught
 
 # Sources that a vertex looks for each time, the nearest first, and passes over the vertices that wait.
 _MOST_LOOKS = cython.declare(cython.int, 4)
@@ -48,11 +51,15 @@ def look_around(
         for _passes in range(_MOST_PASSES):
             n_changed: cython.Py_ssize_t = 0
             for i in range(n):
+                if i % ASK == 0 and is_interrupted():
+                    n_changed = 0
+                    break
                 if is_waiting[order[i]]:
                     is_waiting[order[i]] = False
                     n_changed += one.look(order[i])
             if n_changed == 0:
                 break
+    raise_caught()
 
 
 @cython.final

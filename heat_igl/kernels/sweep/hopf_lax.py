@@ -46,6 +46,7 @@ class HopfLax:
     def shorten(self, d: cython.double[::1], label: cython.int[::1]) -> None:
         """Lower distances `d` (n,) to paths along edges, in place; labels (n,) are handed on (Dijkstra 1959)."""
         size: cython.int = self.corners.shape[1]
+        n_taken: cython.Py_ssize_t = 0
         self.d, self.low, self.waiting = d, np.min(d), PriorityQueue(len(d))
         with cython.nogil:
             for s in range(self.corners.shape[0]):
@@ -54,6 +55,9 @@ class HopfLax:
                         if self.is_longer(s, c, i):
                             self.wait(self.corners[s, c])
             while self.waiting.count > 0:
+                n_taken += 1
+                if n_taken % ASK == 0 and is_interrupted():
+                    break
                 v: cython.int = cython.cast(cython.int, self.waiting.first())
                 self.waiting.set_key(v, 0.0)
                 for k in range(self.first[v], self.first[v + 1]):
@@ -65,6 +69,7 @@ class HopfLax:
                             d[u] = d[v] + edge_length(self.update, s, c, i)
                             label[u] = label[v]
                             self.wait(u)
+        raise_caught()
 
     def is_longer(self, s: cython.int, c: cython.int, i: cython.int) -> cython.bint:
         """Whether corner i of simplex s is farther away than by the edge from corner c."""

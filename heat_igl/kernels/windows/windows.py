@@ -545,15 +545,6 @@ def _meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-def _hear(s: cython.pointer(Search), news: cython.pointer(Entry), n: cython.int) -> cython.void:
-    """Use distances that the other search has found as upper bounds."""
-    for i in range(n):
-        if news[i].key < s.upper[news[i].what]:
-            s.upper[news[i].what] = news[i].key
-
-
-@cython.cfunc
-@cython.nogil
 def _run_beside(s: cython.pointer(Search)) -> cython.void:
     """`_run` for one of two searches on two threads; both return after the same round."""
     o: cython.pointer(Search) = s.other
@@ -564,7 +555,10 @@ def _run_beside(s: cython.pointer(Search)) -> cython.void:
         s.load[p] = _load(s)
         s.has_failed[p], s.met_flat[p] = s.failed, s.meets_flat
         _meet(s, p)
-        _hear(s, o.news[p], o.n_news[p])
+        # Distances that the other search has found are upper bounds.
+        for i in range(o.n_news[p]):
+            v: cython.int = o.news[p][i].what
+            s.upper[v] = min(s.upper[v], o.news[p][i].key)
         key = min(s.first_key[p], o.first_key[p])
         if s.has_failed[p] or o.has_failed[p] or key == INFINITY or key > s.last_key:
             break
