@@ -10,7 +10,8 @@ lead to one fixed point, which converges to the distance in a continuous metric 
 Its second differences along the edges of the facet are found from the slopes of distance at the corners, and are used
 as far as these agree with the distances, and with the metric of the simplex.
 
-Distances begin with those along edges, and are updated in rounds, each vertex after those it has its distance from.
+Distances begin with those along edges. Vertices are visited from near to far, then in rounds, each after those it has
+its distance from.
 """
 
 import cython
@@ -27,7 +28,7 @@ from heat_igl.kernels.signals import raise_caught
 @cython.final
 @cython.cclass
 class HopfLax:
-    """Rounds of visits to vertices, each through its simplices.
+    """Visits to vertices, each through its simplices.
 
     Parameters
     ----------
