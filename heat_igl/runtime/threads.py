@@ -7,6 +7,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import islice
 from typing import Any, TypeVar
 
 import numpy as np
@@ -101,23 +102,10 @@ def over_rows(work: Callable[[slice], Result], n: int, most: int) -> list[Result
     threads = n_threads()
     size = max(min(most, -(-n // (_BLOCKS_PER_THREAD * threads)) if threads > 1 else n), 1)
     slices = [slice(begin, min(begin + size, n)) for begin in range(0, n, size)]
-    waiting = deque(range(len(slices)))
-    results: dict[int, Result] = {}
-
-    def work_off(_: int) -> None:
-        while waiting:
-            try:
-                at = waiting.popleft()
-            except IndexError:  # another thread took the last one
-                return
-            try:
-                results[at] = work(slices[at])
-            except BaseException:
-                waiting.clear()  # for a Ctrl-C, other threads end with the rows at hand
-                raise
-
-    side_by_side(work_off, range(max(min(threads, len(slices)), 1)))
-    return [results[at] for at in range(len(slices))]
+    if min(threads, len(slices)) < 2:
+        return [work(rows) for rows in slices]
+    with Pool(min(threads, len(slices))) as workers:
+        return list(workers.map(work, slices))
 
 
 def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
@@ -140,25 +128,22 @@ def block_size(n_faces: int, n_sets: int | None, n_threads: int) -> tuple[int, i
     return max(1, min(_MOST, fit // threads)), threads
 
 
+def _until_failure(items: Iterable[Item], failures: list[Exception]) -> Iterator[Item]:
+    """The items before an exception, which is put into `failures`."""
+    try:
+        yield from items
+    except Exception as error:
+        failures.append(error)
+
+
 def in_blocks(items: Iterable[Item], size: int) -> Iterator[list[Item]]:
     """Yield lists of `size` items; the last list may be shorter. Items before an exception in `items` are yielded."""
-    failure: Exception | None = None
-    block: list[Item] = []
-    iterator = iter(items)
-    while failure is None:
-        try:
-            block.append(next(iterator))
-        except StopIteration:
-            break
-        except Exception as error:
-            failure = error
-        if len(block) == size:
-            yield block
-            block = []
-    if block:
+    failures: list[Exception] = []
+    left = _until_failure(items, failures)
+    while block := list(islice(left, size)):
         yield block
-    if failure is not None:
-        raise failure
+    if failures:
+        raise failures[0]
 
 
 def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: int) -> Iterator[Result]:
@@ -170,29 +155,21 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], n_threads: i
     if n_threads == 1:
         yield from map(work, items)
         return
-    failure: Exception | None = None
+    failures: list[Exception] = []
+    left = _until_failure(items, failures)
     pending: deque[Future[Result]] = deque()
-    iterator = iter(items)
     workers = Pool(n_threads)
     try:
         while True:
-            while failure is None and len(pending) < n_threads:
-                try:
-                    item = next(iterator)
-                except StopIteration:
-                    break
-                except Exception as error:
-                    failure = error
-                else:  # what a handler of signals raises here ends all at once
-                    pending.append(workers.submit(work, item))
+            pending.extend(workers.submit(work, item) for item in islice(left, n_threads - len(pending)))
             if not pending:
                 break
             yield pending.popleft().result()
     finally:
         # After Ctrl-C, or when no more results are wanted, what is in progress ends.
         workers.abandon()
-    if failure is not None:
-        raise failure
+    if failures:
+        raise failures[0]
 
 
 def float_type(dtype: npt.DTypeLike | None) -> np.dtype[Any]:
