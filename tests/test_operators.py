@@ -9,14 +9,7 @@ from surfaces import bent_pages
 
 from heat_igl import Mesh, MeshError, PointCloud, shapes, speed_operators
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
-from heat_igl.operators import (
-    Operators,
-    TriangleElements,
-    cotan_operators,
-    intrinsic_operators,
-    operators,
-    point_cloud_operators,
-)
+from heat_igl.operators import Operators, TriangleElements, intrinsic_operators, operators, point_cloud_operators
 from heat_igl.operators.triangles import cotangent_laplacian
 
 
@@ -27,7 +20,7 @@ def bad_sphere() -> Mesh:
 
 
 DOMAINS = {
-    "own triangles": lambda: cotan_operators(bad_sphere()),
+    "own triangles": lambda: operators(bad_sphere(), "cotan"),
     "intrinsic Delaunay": lambda: operators(bad_sphere()),
     "with boundary": lambda: operators(perturbed(shapes.disk(8), 0.3)),
     "tetrahedra": lambda: operators(perturbed(shapes.box(4), 0.2)),
@@ -86,7 +79,7 @@ def test_gradient_of_a_linear_function_in_space_is_exact():
     np.testing.assert_allclose(gradient, np.tile(slope[:, None], mesh.n_faces), rtol=0, atol=1e-12)
 
     surface = bad_sphere()
-    gradient = (cotan_operators(surface).G @ (surface.V @ slope)).reshape(3, -1).T
+    gradient = (operators(surface, "cotan").G @ (surface.V @ slope)).reshape(3, -1).T
     corner = surface.V[surface.F]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

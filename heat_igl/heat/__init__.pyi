@@ -9,5 +9,4 @@ from heat_igl.heat.signed_heat import Level as Level
 from heat_igl.heat.signed_heat import SignedHeatSolver as SignedHeatSolver
 from heat_igl.heat.solver import HeatMethodSolver as HeatMethodSolver
 from heat_igl.heat.vector_heat import VectorHeatSolver as VectorHeatSolver
-from heat_igl.heat.vector_heat import VectorMethod as VectorMethod
 from heat_igl.windows.directions import Directions as Directions

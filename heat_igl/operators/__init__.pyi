@@ -3,7 +3,6 @@ from heat_igl.operators.connection import edge_rotations as edge_rotations
 from heat_igl.operators.connection import face_rotations as face_rotations
 from heat_igl.operators.connection import with_rotations as with_rotations
 from heat_igl.operators.matrices import Laplacian as Laplacian
-from heat_igl.operators.matrices import OnLaplacian as OnLaplacian
 from heat_igl.operators.matrices import Operators as Operators
 from heat_igl.operators.matrices import Surface as Surface
 from heat_igl.operators.matrices import TriangleElements as TriangleElements
@@ -18,7 +17,6 @@ from heat_igl.operators.metric_simplices import MetricSimplices as MetricSimplic
 from heat_igl.operators.suitability import is_rough_or_narrow as is_rough_or_narrow
 from heat_igl.operators.suitability import share_on_large_triangles as share_on_large_triangles
 from heat_igl.operators.triangles import check_measures as check_measures
-from heat_igl.operators.triangles import cotan_operators as cotan_operators
 from heat_igl.operators.triangles import edge_length_operators as edge_length_operators
 from heat_igl.operators.triangles import fan_operators as fan_operators
 from heat_igl.operators.triangles import intrinsic_operators as intrinsic_operators

@@ -39,33 +39,6 @@ from heat_igl.operators.suitability import fit_for_heat
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 
-def cotan_operators(mesh: Mesh, on_laplacian: OnLaplacian | None = None) -> Operators:
-    """The operators on the mesh's own triangles or tetrahedra, gradients in space (d = 3).
-
-    Triangles come without `Operators.surface` and `Operators.lengths`; ``operators(mesh, "cotan")`` has both.
-    `on_laplacian` is called with L as soon as it is known. A MeshError if a triangle has no area, or a tetrahedron no
-    volume.
-    """
-    check_measures(mesh)
-    G = _gradient(mesh.V, mesh.F, _unit(mesh))
-    if not mesh.is_tetrahedral:
-        return _assembled(mesh, _cotangent_laplacian(mesh, on_laplacian), G)
-    # The cotangents of dihedral angles lose digits on flat tetrahedra, 1e-5 of the largest entry on a scanned volume;
-    # the gradient does not, and D G is the same matrix.
-    L = laplacian_of_gradient(G, mesh.measures)
-    if on_laplacian is not None:
-        on_laplacian(L)
-    return replace(_assembled(mesh, L, G), simplices=MetricSimplices.in_space(mesh))
-
-
-def _cotangent_laplacian(mesh: Mesh, on_laplacian: OnLaplacian | None) -> sp.csc_matrix:
-    """L of triangles."""
-    L = cotangent_laplacian(igl.cotmatrix_entries(mesh.V / _unit(mesh), mesh.F), mesh.F, mesh.n_vertices)
-    if on_laplacian is not None:
-        on_laplacian(L)
-    return L
-
-
 def cotangent_laplacian(cotangents: FloatArray, F: IntArray, n: int) -> sp.csc_matrix:
     """L (n, n) of triangles, zeros stored: that of `igl.cotmatrix`, assembled in a third of the time and memory.
 
@@ -293,7 +266,14 @@ def operators(
     """
     check_laplacian(laplacian)
     if mesh.is_tetrahedral:
-        return cotan_operators(mesh, on_laplacian)
+        check_measures(mesh)
+        G = _gradient(mesh.V, mesh.F, _unit(mesh))
+        # The cotangents of dihedral angles lose digits on flat tetrahedra, 1e-5 of the largest entry on a scanned
+        # volume; the gradient does not, and D G is the same matrix.
+        L = laplacian_of_gradient(G, mesh.measures)
+        if on_laplacian is not None:
+            on_laplacian(L)
+        return replace(_assembled(mesh, L, G), simplices=MetricSimplices.in_space(mesh))
     history: tuple[Change, ...] = ()
     if laplacian != "cotan" and has_nonmanifold_edges(mesh):
         # A face that is there twice is one piece of surface; often that is all that keeps a mesh from being manifold.
@@ -313,7 +293,10 @@ def operators(
     check_measures(mesh)
     surface = Surface(triangulation, faces, V=mesh.V)
     elements = TriangleElements(triangulation, partial(_gradient, mesh.V, mesh.F, _unit(mesh)))
-    return _assembled(mesh, _cotangent_laplacian(mesh, on_laplacian), elements, elements, surface)
+    L = cotangent_laplacian(igl.cotmatrix_entries(mesh.V / _unit(mesh), mesh.F), mesh.F, mesh.n_vertices)
+    if on_laplacian is not None:
+        on_laplacian(L)
+    return _assembled(mesh, L, elements, elements, surface)
 
 
 def tufted_operators(

@@ -10,7 +10,6 @@ from heat_igl.runtime.notices import held_warnings as held_warnings
 from heat_igl.runtime.notices import progress_bar as progress_bar
 from heat_igl.runtime.notices import rich_progress as rich_progress
 from heat_igl.runtime.notices import warn_caller as warn_caller
-from heat_igl.runtime.threads import WORKING_MEMORY as WORKING_MEMORY
 from heat_igl.runtime.threads import Pool as Pool
 from heat_igl.runtime.threads import block_size as block_size
 from heat_igl.runtime.threads import both as both

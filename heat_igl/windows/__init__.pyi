@@ -7,7 +7,6 @@ from heat_igl.windows.engine import MeshTriangles as MeshTriangles
 from heat_igl.windows.engine import OperatorTriangles as OperatorTriangles
 from heat_igl.windows.engine import Triangles as Triangles
 from heat_igl.windows.engine import WindowEngine as WindowEngine
-from heat_igl.windows.exact import ExactSolution as ExactSolution
 from heat_igl.windows.exact import ExactSurface as ExactSurface
 from heat_igl.windows.exact import Origin as Origin
 from heat_igl.windows.exact import exact_distance as exact_distance
