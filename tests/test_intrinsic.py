@@ -11,9 +11,8 @@ import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, shapes, tangent_frames
 from heat_igl.errors import AccuracyWarning
 from heat_igl.intrinsic import (
-    Flipped,
     IntrinsicTriangulation,
-    Refined,
+    Moved,
     apex,
     carried_angles,
     closed_cover,
@@ -318,7 +317,7 @@ def test_closed_cover_is_the_tufted_cover():
 # Points.
 
 
-def split(refined: Refined, move: int, faces: IntArray, barycentric: FloatArray) -> None:
+def split(refined: Moved, move: int, faces: IntArray, barycentric: FloatArray) -> None:
     """Carry points through one split: solve for coordinates in each of the three faces, take the one that is inside."""
     _, f, g = refined.kind[move]
     new = refined.numbers[move, :3]
@@ -332,7 +331,7 @@ def split(refined: Refined, move: int, faces: IntArray, barycentric: FloatArray)
                 break
 
 
-def flip(refined: Refined, move: int, faces: IntArray, barycentric: FloatArray) -> None:
+def flip(refined: Moved, move: int, faces: IntArray, barycentric: FloatArray) -> None:
     """Carry points through one flip: lay out both triangles beside their edge, and solve in the two new ones."""
     _, ab, ba = refined.kind[move]
     lengths = refined.numbers[move]
@@ -356,7 +355,7 @@ def test_points_are_carried_move_by_move(coarse):
     rng = np.random.default_rng(0)
     fine = delaunay_refinement(coarse, coarse.n + 60)
     refined = fine.history[-1]
-    assert isinstance(refined, Refined)
+    assert isinstance(refined, Moved)
     faces = rng.integers(len(coarse.F), size=200)
     barycentric = rng.dirichlet([1, 1, 1], 200)
     expected_faces, expected = faces.copy(), barycentric.copy()
@@ -366,19 +365,13 @@ def test_points_are_carried_move_by_move(coarse):
     assert np.array_equal(found_faces, expected_faces)
     assert np.abs(found - expected).max() < 1e-9
     assert (found_faces >= len(coarse.F)).mean() > 0.1
-    # Flips in rounds, the same way.
-    mesh = stretched()
-    triangulation = intrinsic_triangulation(mesh)
-    flipped = intrinsic_delaunay(triangulation)
-    assert flipped.n_flips > 10
-    expected_faces, expected = faces, barycentric
-    for change in flipped.history:
-        assert isinstance(change, Flipped)
-        expected_faces, expected = expected_faces.copy(), expected.copy()
-        kind = np.stack([np.ones(len(change.mate), int), change.half_edge, change.mate], axis=1)
-        one = Refined(kind, np.ascontiguousarray(change.lengths.T), faces, kind)
-        for move in range(len(kind)):
-            flip(one, move, expected_faces, expected)
+    # Flips alone, the same way.
+    flipped = intrinsic_delaunay(intrinsic_triangulation(stretched()))
+    (flips,) = flipped.history
+    assert len(flips.kind) == flipped.n_flips > 10
+    expected_faces, expected = faces.copy(), barycentric.copy()
+    for move in range(len(flips.kind)):
+        flip(flips, move, expected_faces, expected)
     found_faces, found = flipped.locate(faces, barycentric)
     assert np.array_equal(found_faces, expected_faces)
     assert np.abs(found - expected).max() < 1e-9

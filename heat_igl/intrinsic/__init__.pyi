@@ -16,10 +16,9 @@ from heat_igl.intrinsic.gluing import tufted_cover as tufted_cover
 from heat_igl.intrinsic.half_edges import HalfEdges as HalfEdges
 from heat_igl.intrinsic.half_edges import mollify as mollify
 from heat_igl.intrinsic.triangulation import Change as Change
-from heat_igl.intrinsic.triangulation import Flipped as Flipped
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation as IntrinsicTriangulation
 from heat_igl.intrinsic.triangulation import Merged as Merged
-from heat_igl.intrinsic.triangulation import Refined as Refined
+from heat_igl.intrinsic.triangulation import Moved as Moved
 from heat_igl.intrinsic.triangulation import apex as apex
 from heat_igl.intrinsic.triangulation import corner_angles as corner_angles
 from heat_igl.intrinsic.triangulation import lay_out as lay_out

@@ -6,9 +6,8 @@ import numpy as np
 
 from heat_igl.intrinsic.gluing import oriented
 from heat_igl.intrinsic.half_edges import HalfEdges
-from heat_igl.intrinsic.triangulation import Flipped, IntrinsicTriangulation, Refined
-from heat_igl.kernels.mesh import carrying, refinement
-from heat_igl.kernels.mesh.flipping import rounds
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, Moved
+from heat_igl.kernels.mesh import refinement
 from heat_igl.mesh import DELAUNAY_TOLERANCE
 from heat_igl.typing import FloatArray
 
@@ -35,11 +34,8 @@ def intrinsic_delaunay(triangulation: IntrinsicTriangulation, *, orients: bool =
     if len(seam):
         seam = np.flatnonzero((edges.twin == -2) & (edges.ring[edges.ring] == np.arange(len(edges.ring))))
         edges.twin[seam], edges.aligned[seam] = edges.ring[seam], False
-    of_flip = rounds(kind, len(given.F))
-    in_order = np.argsort(of_flip, kind="stable")
-    parts = np.split(in_order, np.flatnonzero(np.diff(of_flip[in_order])) + 1)
-    flipped = (Flipped(kind[part, 1], kind[part, 2], lengths[part].T) for part in parts)
-    return edges.replacing(given, n_flips=given.n_flips + len(kind), history=(*given.history, *flipped))
+    flips = Moved.of(kind, lengths, len(given.F))
+    return edges.replacing(given, n_flips=given.n_flips + len(kind), history=(*given.history, flips))
 
 
 # Degrees. The algorithm ends for certain below 30 degrees if no cone is sharp; close to that it makes many triangles.
@@ -78,10 +74,9 @@ def delaunay_refinement(
     if n == triangulation.n:
         return triangulation
     edges = HalfEdges(vertex, twin, np.arange(len(twin), dtype=np.int32), np.ones(len(twin), np.uint8), length)
-    first, following = carrying.index_moves(kind, len(twin) // 3)
     return edges.replacing(
         triangulation,
         n=n,
         n_flips=triangulation.n_flips + int(kind[:, 0].sum()),
-        history=(*triangulation.history, Refined(kind, numbers, first, following)),
+        history=(*triangulation.history, Moved.of(kind, numbers, len(twin) // 3)),
     )

@@ -101,7 +101,7 @@ class HalfEdges(NamedTuple):
     def make_delaunay(self, *, records: bool = False) -> tuple[IntArray, FloatArray]:
         """Flip edges in place until the triangles are intrinsic Delaunay; all glued faces must be aligned.
 
-        Returns the moves in order, if they are recorded: kind (k, 3) and numbers (k, 5), see `Refined`.
+        Returns the moves in order, if they are recorded: kind (k, 3) and numbers (k, 5), see `Moved`.
         """
         found: tuple[IntArray, FloatArray] = flipping.flip(
             self, -DELAUNAY_TOLERANCE, _MOST_FLIPS_PER_FACE * (len(self.twin) // 3), records

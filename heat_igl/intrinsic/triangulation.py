@@ -100,75 +100,18 @@ class Covered(NamedTuple):
         return faces + self.n_faces, barycentric[:, BACK_CORNERS]
 
 
-class Flipped(NamedTuple):
-    """Edges flipped at once, no two in one face.
+class Moved(NamedTuple):
+    """Edges flipped, and faces split at new vertices, one after another.
 
-    Attributes
-    ----------
-    half_edge, mate : (k,) int64
-        The two half-edges of each edge. Before: `half_edge` ab opposite corner p, `mate` ba opposite corner q. After:
-        the first face is paq, the second qbp; p and q are the same corners as before.
-    lengths : (5, k) float64
-        Of ab, pa, bp, aq and qb.
-    """
-
-    half_edge: IntArray
-    mate: IntArray
-    lengths: FloatArray
-
-    def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
-        moved, edge, _ = self.moved(faces)
-        faces, barycentric = np.array(faces, np.int64), np.array(barycentric, np.float64, order="C")
-        lengths = np.ascontiguousarray(self.lengths.T)
-        carrying.carry_flipped(self.half_edge, self.mate, lengths, edge, moved, faces, barycentric)
-        return faces, barycentric
-
-    def turn(self, before: IntArray, after: IntArray) -> FloatArray:
-        """By how much directions at points turn from the faces (k,) after the change to those before it.
-
-        Angles in a face count from the side of its corners 0 and 1. To add is what leads from an angle in the face
-        after the change to the angle of the same direction in the face before.
-        """
-        turn = np.zeros(len(before))
-        moved, edge, in_second = self.moved(before)
-        ab, pa, bp, aq, qb = self.lengths[:, edge]
-        # As in `carry`: a at the origin, b on the first axis.
-        (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
-        p, q, a, b = px + 1j * py, qx - 1j * qy, np.zeros(len(edge), complex), ab + 0j
-        first, second = self.half_edge[edge], self.mate[edge]
-        to_second = after[moved] == second // 3
-        old = np.where(in_second, [q, b, a], [p, a, b])
-        new = np.where(to_second, [q, b, p], [p, a, q])
-        axes = []
-        for corners, side in ((old, np.where(in_second, second, first)), (new, np.where(to_second, second, first))):
-            # The first of the three stands at the corner opposite the edge that is flipped.
-            start, end = ((c - side) % 3 for c in (0, 1))
-            k = np.arange(len(edge))
-            axes.append(corners[end, k] - corners[start, k])
-        turn[moved] = np.angle(axes[1] * axes[0].conj())
-        return turn
-
-    def moved(self, faces: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
-        """The points whose faces (k,) change, which edge is flipped there, and whether the face is its second."""
-        sides = np.concatenate([self.half_edge, self.mate])
-        ascending = np.argsort(sides // 3)
-        place = np.searchsorted(sides[ascending] // 3, faces)
-        moved = np.flatnonzero(place < len(sides))
-        moved = moved[sides[ascending[place[moved]]] // 3 == faces[moved]]
-        side = ascending[place[moved]]
-        return moved, side % len(self.mate), side >= len(self.mate)
-
-
-class Refined(NamedTuple):
-    """Faces split at new vertices and edges flipped, one after another.
+    A flip of the half-edges ab opposite corner p and ba opposite corner q makes the first face paq and the second qbp;
+    p and q are the same corners as before.
 
     Attributes
     ----------
     kind : (k, 3) int64
-        The moves in order: 0, face, first of the two new faces for a split; 1, half-edge, mate for a flip.
+        The moves in order: 0, face, first of the two new faces for a split; 1, half-edge ab, ba for a flip.
     numbers : (k, 5) float64
-        Barycentric coordinates of the new vertex, or the lengths of `Flipped`.
+        Barycentric coordinates of the new vertex, or the lengths of ab, pa, bp, aq and qb.
     first, following : (m,) int64, (k, 3) int64
         Tables to find the next move that concerns a face, see `heat_igl.kernels.mesh.carrying`.
     """
@@ -178,15 +121,26 @@ class Refined(NamedTuple):
     first: IntArray
     following: IntArray
 
-    def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Faces (k,) and barycentric coordinates (k, 3) of points after the change."""
+    @classmethod
+    def of(cls, kind: IntArray, numbers: FloatArray, m: int) -> Moved:
+        """Moves that lead to m faces."""
+        return cls(kind, numbers, *carrying.index_moves(kind, m))
+
+    def carry(
+        self, faces: IntArray, barycentric: FloatArray, turn: FloatArray | None = None
+    ) -> tuple[IntArray, FloatArray]:
+        """Faces (k,) and barycentric coordinates (k, 3) of points after the change.
+
+        To `turn` (k,) is added what leads from an angle in the face after the change to the angle of the same direction
+        in the face before, if all moves are flips. Angles in a face count from the side of its corners 0 and 1.
+        """
         faces, barycentric = np.array(faces, np.int64), np.array(barycentric, np.float64, order="C")
-        carrying.carry(*self, faces, barycentric)
+        carrying.carry(*self, faces, barycentric, np.empty(0) if turn is None else turn)
         return faces, barycentric
 
 
 # How faces became others.
-Change = Merged | Turned | Covered | Flipped | Refined
+Change = Merged | Turned | Covered | Moved
 
 
 def next_half_edge(half_edge: IntArray) -> IntArray:
@@ -198,11 +152,6 @@ def next_half_edge(half_edge: IntArray) -> IntArray:
 def previous_half_edge(half_edge: IntArray) -> IntArray:
     """The half-edge before each in the same face; of corners, the previous corner."""
     return np.asarray(half_edge - 1 + 3 * (half_edge % 3 == 0))
-
-
-def sides_from(half_edge: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Each half-edge, and the next and the previous one of the same face."""
-    return half_edge, next_half_edge(half_edge), previous_half_edge(half_edge)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,15 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic.triangulation import (
-    Flipped,
-    IntrinsicTriangulation,
-    apex,
-    corner_angles,
-    next_half_edge,
-    sides_from,
-)
-from heat_igl.kernels.mesh.polar_angles import polar_angles as kernel
+from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, Moved, corner_angles, next_half_edge
+from heat_igl.kernels.mesh import polar_angles as kernel
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 
@@ -95,7 +88,7 @@ def polar_angles(triangulation: IntrinsicTriangulation) -> PolarAngles:
     lowest = np.full(n, -1)
     lowest[F.ravel()[::-1]] = np.arange(F.size)[::-1]
     outgoing = np.zeros(F.size)
-    sums, counts, closes = kernel(corners.ravel(), triangulation.twin, lowest, outgoing)
+    sums, counts, closes = kernel.polar_angles(corners.ravel(), triangulation.twin, lowest, outgoing)
     fans = np.bincount(F.ravel(), minlength=n) != counts
     if fans.any():
         first = int(np.argmax(fans))
@@ -138,54 +131,16 @@ def carried_angles(angles: PolarAngles, flipped: IntrinsicTriangulation) -> Pola
 
     `angles` are those before all flips; reference directions stay.
     """
-    outgoing, scale = angles.outgoing.copy(), angles.scale
-    flips = [change for change in flipped.history if isinstance(change, Flipped)]
-    if len(flips) < len(flipped.history):
+    history = [change for change in flipped.history if isinstance(change, Moved) and change.kind[:, 0].all()]
+    if len(history) < len(flipped.history):
         raise ValueError("polar angles are carried over flips only: pass a triangulation without added vertices")
-    F = _faces_before(flipped.F, flips)
-    for change in flips:
-        _replay(outgoing, scale, F, change)
-    return PolarAngles(
-        outgoing, corner_angles(flipped.l), angles.sums, scale, angles.on_boundary, np.full_like(angles.first, -1)
-    )
-
-
-def _faces_before(flipped_faces: IntArray, flips: list[Flipped]) -> IntArray:
-    """The vertices (3 m,) at the corners of the faces before the flips."""
-    F = flipped_faces.ravel().copy()
-    for change in flips[::-1]:
-        (p, _, q_in_f), (q, _, p_in_g) = sides_from(change.half_edge), sides_from(change.mate)
-        # (p, a, q), (q, b, p) back to (p, a, b), (q, b, a)
-        at_a, at_b = F[next_half_edge(p)], F[next_half_edge(q)]
-        F[q_in_f], F[p_in_g] = at_b, at_a
-    return F
-
-
-def _replay(outgoing: FloatArray, scale: FloatArray, F: IntArray, change: Flipped) -> None:
-    """Carry the angles, and the faces, over edges flipped at once; names as in `Flipped`."""
-    (ab, bp, pa), (ba, aq, qb) = sides_from(change.half_edge), sides_from(change.mate)
-    p, q = F[ab], F[ba]
-    length_ab, length_pa, length_bp, length_aq, length_qb = change.lengths
-    # The quadrilateral p a q b: the angles at p and q, on the sides of a and b, from the new diagonal.
-    at_p, at_q = _angles_at_diagonal(length_ab, length_pa, length_bp, length_aq, length_qb)
-    outgoing_qp = outgoing[qb] + scale[q] * at_q
-    outgoing_pq = outgoing[pa] + scale[p] * at_p
-    outgoing[ab], outgoing[ba] = outgoing[aq], outgoing[bp]
-    outgoing[bp], outgoing[aq] = outgoing_qp, outgoing_pq
-    F[pa], F[qb] = q, p
-
-
-def _angles_at_diagonal(
-    ab: FloatArray, pa: FloatArray, bp: FloatArray, aq: FloatArray, qb: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Angle from pa to pq at p, and from qb to qp at q (k,), with p above ab and q below."""
-    (px, py), (qx, qy) = apex(ab, pa, bp), apex(ab, aq, qb)
-    dx, dy = px - qx, py + qy
-    # At p: from (-px, -py), towards a in the origin, counterclockwise to (-dx, -dy).
-    at_p = np.arctan2(px * dy - py * dx, px * dx + py * dy)
-    # At q: from (ab - qx, qy), towards b, counterclockwise to (dx, dy).
-    at_q = np.arctan2((ab - qx) * dy - qy * dx, (ab - qx) * dx + qy * dy)
-    return np.maximum(at_p, 0.0), np.maximum(at_q, 0.0)
+    outgoing, F = angles.outgoing.copy(), flipped.F.ravel().copy()
+    for flips in history[::-1]:
+        kernel.vertices_before(flips.kind, F)
+    for flips in history:
+        kernel.carry_angles(flips.kind, flips.numbers, angles.scale, F, outgoing)
+    first = np.full_like(angles.first, -1)
+    return PolarAngles(outgoing, corner_angles(flipped.l), angles.sums, angles.scale, angles.on_boundary, first)
 
 
 def transport_angles(triangulation: IntrinsicTriangulation, angles: PolarAngles) -> FloatArray:

@@ -17,7 +17,7 @@ from heat_igl.intrinsic import (
     lay_out,
     polar_angles,
 )
-from heat_igl.intrinsic.triangulation import Flipped, next_half_edge, previous_half_edge
+from heat_igl.intrinsic.triangulation import Moved, next_half_edge, previous_half_edge
 from heat_igl.kernels.windows.surface import SEVERAL_FANS
 from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
 from heat_igl.mesh.cloud_orientation import on_one_side
@@ -177,11 +177,8 @@ class PathDirections:
         faces, barycentric = points.faces, points.barycentric
         turn = np.zeros(len(faces))
         for flips in self._triangulation.history:
-            if not isinstance(flips, Flipped):
-                continue  # surfaces with other changes have no polar angles
-            after, barycentric = flips.carry(faces, barycentric)
-            turn += flips.turn(faces, after)
-            faces = after
+            if isinstance(flips, Moved):  # surfaces with other changes have no polar angles
+                faces, barycentric = flips.carry(faces, barycentric, turn)
         return turn
 
 

@@ -9,7 +9,7 @@ Half-edge ``3 f + c`` is the side of face f opposite its corner c; `triangles.px
 3. `flipping` makes the triangulation Delaunay, and records the flips if their history is needed.
 4. `refinement` splits faces of a Delaunay triangulation and flips edges until no angle is small; `carrying` finds the
    faces that points are in after these moves.
-5. `polar_angles` sums the angles around vertices for tangent frames.
+5. `polar_angles` sums the angles around vertices for tangent frames, and carries them over flips.
 
 `checking` is about distances: what edges and straight lines say of them without a search.
 """

@@ -3,12 +3,13 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot
+from cython.cimports.libc.math import atan2
 
 
 def index_moves(kind: cython.longlong[:, ::1], n_faces):
     """Which move is the first to change each face, and the next to change each face that a move makes; -1 for none.
 
-    `kind` (k, 3) are the moves, as `Refined` has them, and there are `n_faces` after all of them. Returns an array
+    `kind` (k, 3) are the moves, as `Moved` has them, and there are `n_faces` after all of them. Returns an array
     (n_faces,), and (k, 3) for the first, second and third face of each move.
     """
     k = kind.shape[0]
@@ -34,8 +35,12 @@ def carry(
     following: cython.longlong[:, ::1],
     face: cython.longlong[::1],
     barycentric: cython.double[:, ::1],
+    turn: cython.double[::1],
 ):
-    """Carry points, given by a face (p,) and barycentric coordinates (p, 3), through all moves, in place."""
+    """Carry points, given by a face (p,) and barycentric coordinates (p, 3), through all moves, in place.
+
+    Unless it is empty, `turn` (p,) grows by the angle of `_turn` at each flip.
+    """
     with cython.nogil:
         for i in range(face.shape[0]):
             move: cython.longlong = first[face[i]]
@@ -44,26 +49,12 @@ def carry(
                     piece: cython.longlong = _split(numbers[move], barycentric[i])
                     face[i] = kind[move, 1] if piece == 0 else kind[move, 2] + piece - 1
                 else:
-                    piece = _flip(kind[move, 1], kind[move, 2], numbers[move], face[i], barycentric[i])
+                    in_second: cython.longlong = face[i] == kind[move, 2] // 3
+                    piece = _flip(kind[move, 1], kind[move, 2], numbers[move], in_second, barycentric[i])
                     face[i] = kind[move, 1 + piece] // 3
+                    if turn.shape[0] > 0:
+                        turn[i] += _turn(kind[move, 1], kind[move, 2], numbers[move], in_second, piece)
                 move = following[move, piece]
-
-
-def carry_flipped(
-    half_edge: cython.const[cython.longlong][::1],
-    mate: cython.const[cython.longlong][::1],
-    lengths: cython.double[:, ::1],
-    edge: cython.const[cython.longlong][::1],
-    point: cython.const[cython.longlong][::1],
-    face: cython.longlong[::1],
-    barycentric: cython.double[:, ::1],
-):
-    """Carry points through flips, as `Flipped` has them, in place: ``point[i]`` through flip ``edge[i]``."""
-    for i in range(point.shape[0]):
-        e: cython.longlong = edge[i]
-        p: cython.longlong = point[i]
-        in_second: cython.longlong = _flip(half_edge[e], mate[e], lengths[e], face[p], barycentric[p])
-        face[p] = (mate[e] if in_second else half_edge[e]) // 3
 
 
 @cython.cfunc
@@ -91,12 +82,12 @@ def _flip(
     half_edge: cython.longlong,
     mate: cython.longlong,
     lengths: cython.double[::1],
-    face: cython.longlong,
+    in_second: cython.longlong,
     b: cython.double[::1],
 ) -> cython.longlong:
     """Whether the first (0) or the second (1) face holds a point after a flip; the coordinates are changed.
 
-    As `Flipped` has it: before, the faces are pab and qba; after, the first is paq and the second qbp.
+    As `Moved` has it: before, the faces are pab and qba; after, the first is paq and the second qbp.
     """
     # a at the origin, b on the first axis, p above the axis and q below.
     ab: cython.double = lengths[0]
@@ -104,7 +95,6 @@ def _flip(
     x_q: cython.double = foot(ab, lengths[3], lengths[4])
     y_p: cython.double = 2.0 * area(ab, lengths[1], lengths[2]) / ab
     y_q: cython.double = 2.0 * area(ab, lengths[3], lengths[4]) / ab
-    in_second: cython.bint = face == mate // 3
     c: cython.int = (mate if in_second else half_edge) % 3
     at_apex: cython.double = b[c]
     at_a: cython.double = b[(c + 2) % 3] if in_second else b[(c + 1) % 3]
@@ -124,3 +114,35 @@ def _flip(
     c = (mate if goes_on else half_edge) % 3
     b[c], b[(c + 1) % 3], b[(c + 2) % 3] = (at_q, third, at_p) if goes_on else (at_p, third, at_q)
     return goes_on
+
+
+@cython.cfunc
+@cython.nogil
+def _turn(
+    half_edge: cython.longlong,
+    mate: cython.longlong,
+    lengths: cython.double[::1],
+    in_second: cython.longlong,
+    goes_on: cython.longlong,
+) -> cython.double:
+    """What leads from an angle in the face after a flip to the angle of the same direction in the face before.
+
+    Both count from the side of corners 0 and 1. The faces are the first (0) or the second (1), as in `_flip`.
+    """
+    x: cython.double[4]
+    y: cython.double[4]
+    # The corners p, q, a and b in the plane.
+    x[0], y[0] = foot(lengths[0], lengths[1], lengths[2]), 2.0 * area(lengths[0], lengths[1], lengths[2]) / lengths[0]
+    x[1], y[1] = foot(lengths[0], lengths[3], lengths[4]), -2.0 * area(lengths[0], lengths[3], lengths[4]) / lengths[0]
+    x[2], y[2], x[3], y[3] = 0.0, 0.0, lengths[0], 0.0
+    corner: cython.int[3]
+    angle: cython.double[2]
+    for is_after in range(2):
+        is_second: cython.int = goes_on if is_after else in_second
+        # From the corner opposite the edge on: pab and qba before, paq and qbp after.
+        corner[0], corner[1], corner[2] = is_second, 2 + is_second, (1 if is_after else 3) - is_second
+        first: cython.int = (3 - (mate if is_second else half_edge) % 3) % 3
+        start: cython.int = corner[first]
+        end: cython.int = corner[(first + 1) % 3]
+        angle[is_after] = atan2(y[end] - y[start], x[end] - x[start])
+    return angle[1] - angle[0]

@@ -46,19 +46,6 @@ def flip(edges, tolerance: cython.double, most: cython.longlong, records: cython
     return flips.moves()
 
 
-def rounds(kind: cython.const[cython.longlong][:, ::1], m: cython.Py_ssize_t):
-    """The earliest round (k,) of each of k flips: after those before it that changed one of its faces, below m."""
-    found = np.empty(kind.shape[0], np.int64)
-    of_flip: cython.longlong[::1] = found
-    of_face: cython.longlong[::1] = np.zeros(m, np.int64)
-    for i in range(kind.shape[0]):
-        f: cython.longlong = kind[i, 1] // 3
-        g: cython.longlong = kind[i, 2] // 3
-        of_flip[i] = max(of_face[f], of_face[g])
-        of_face[f] = of_face[g] = of_flip[i] + 1
-    return found
-
-
 @cython.final
 @cython.cclass
 class Flips:
@@ -75,7 +62,7 @@ class Flips:
         self.kind, self.numbers = np.empty((room, 3), np.int64), np.zeros((room, 5))
 
     def moves(self):
-        """The moves (k, 3) and their numbers (k, 5), as `Refined` has them; none if they are not recorded."""
+        """The moves (k, 3) and their numbers (k, 5), as `Moved` has them; none if they are not recorded."""
         return np.array(self.kind[: self.n_moves]), np.array(self.numbers[: self.n_moves])
 
     def measure(self, f: cython.int) -> cython.void:

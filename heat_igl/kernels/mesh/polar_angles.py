@@ -2,6 +2,8 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.mesh.triangles import area, foot, next_half_edge, previous_half_edge
+from cython.cimports.libc.math import atan2
 
 
 def polar_angles(
@@ -49,3 +51,48 @@ def polar_angles(
                     break
             closed[v] = t >= 0
     return sums, counts, closes.astype(bool)
+
+
+def vertices_before(kind: cython.const[cython.longlong][:, ::1], F: cython.longlong[::1]) -> None:
+    """Turn the vertices F (3 m,) at the corners of faces after flips, as `Moved` has them, into those before."""
+    for i in range(kind.shape[0] - 1, -1, -1):
+        h: cython.int = kind[i, 1]
+        t: cython.int = kind[i, 2]
+        F[previous_half_edge(h)], F[previous_half_edge(t)] = F[next_half_edge(t)], F[next_half_edge(h)]
+
+
+def carry_angles(
+    kind: cython.const[cython.longlong][:, ::1],
+    numbers: cython.const[cython.double][:, ::1],
+    scale: cython.const[cython.double][::1],
+    F: cython.longlong[::1],
+    outgoing: cython.double[::1],
+) -> None:
+    """Carry polar angles (3 m,) of half-edges, and the vertices F (3 m,) at corners, over flips of `Moved`, in place.
+
+    `scale` (n,) are the polar angles at a vertex over those in faces.
+    """
+    for i in range(kind.shape[0]):
+        ab: cython.int = kind[i, 1]
+        ba: cython.int = kind[i, 2]
+        bp: cython.int = next_half_edge(ab)
+        pa: cython.int = previous_half_edge(ab)
+        aq: cython.int = next_half_edge(ba)
+        qb: cython.int = previous_half_edge(ba)
+        p: cython.longlong = F[ab]
+        q: cython.longlong = F[ba]
+        # a in the origin, b on the first axis, p above it and q below: the angles at p and q beside the new edge.
+        base: cython.double = numbers[i, 0]
+        px: cython.double = foot(base, numbers[i, 1], numbers[i, 2])
+        py: cython.double = 2.0 * area(base, numbers[i, 1], numbers[i, 2]) / base
+        qx: cython.double = foot(base, numbers[i, 3], numbers[i, 4])
+        qy: cython.double = 2.0 * area(base, numbers[i, 3], numbers[i, 4]) / base
+        dx: cython.double = px - qx
+        dy: cython.double = py + qy
+        at_p: cython.double = atan2(px * dy - py * dx, px * dx + py * dy)
+        at_q: cython.double = atan2((base - qx) * dy - qy * dx, (base - qx) * dx + qy * dy)
+        to_q: cython.double = outgoing[pa] + scale[p] * max(at_p, 0.0)
+        to_p: cython.double = outgoing[qb] + scale[q] * max(at_q, 0.0)
+        outgoing[ab], outgoing[ba] = outgoing[aq], outgoing[bp]
+        outgoing[bp], outgoing[aq] = to_p, to_q
+        F[pa], F[qb] = q, p

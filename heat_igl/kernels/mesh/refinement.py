@@ -234,7 +234,7 @@ def refine(edges, n, unit, least_angle, largest_radius, most_vertices: cython.lo
     `largest_radius` times the `unit` (m,) of the face, which the faces that are made of it inherit. `edges` are
     `HalfEdges` on n vertices: intrinsic Delaunay, closed and oriented. `tolerance` is that of `flipping.flip`.
 
-    Returns the vertices, twins and lengths of the new half-edges, the number of vertices, and the moves as `Refined`
+    Returns the vertices, twins and lengths of the new half-edges, the number of vertices, and the moves as `Moved`
     has them.
     """
     one = _Refinement(edges, n, max(most_vertices - n, 0), tolerance)
