@@ -20,7 +20,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError, SourceError, names_guessed, shown
 from heat_igl.geodesic import GeodesicSolver, Solver
-from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
+from heat_igl.mesh import Mesh, MeshLike, as_simplices, as_triangles, connectivity
 from heat_igl.runtime import TimeLeft
 from heat_igl.sources import named_vertices, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -346,9 +346,7 @@ def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
     >>> coarse.n_vertices, coarse.report().euler_characteristic
     (60, 0)
     """
-    mesh = as_simplices(mesh)
-    if mesh.is_tetrahedral:
-        raise MeshError("a dual triangulation needs triangles, but F has 4 columns")
+    mesh = as_triangles(mesh, "a dual triangulation needs")
     if not isinstance(cells, VoronoiCells):
         raise MeshError(f"cells must be VoronoiCells, as farthest_cells returns them, not {shown(cells)}")
     if len(cells.labels) != mesh.n_vertices:

@@ -372,7 +372,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: BY_LENGTHS.directions(0), "directions need the positions of a mesh"),
     (lambda _: GeodesicSolver(SPHERE, method="sweep").directions(0), "paths, which a sweep does not find"),
     (lambda _: GeodesicSolver(BOX).directions(0), "directions follow paths on triangles that fit together"),
-    (lambda _: heat_igl.distances_within(BOX, 1.0), "exact distances need triangles"),
+    (lambda _: heat_igl.distances_within(BOX, 1.0), "unlike those of distance_matrix, need triangles"),
     (lambda _: heat_igl.log_maps_within(BOOK, 1), "more than two faces"),
     (lambda _: shortest_paths(BOX, 1, 0), "paths need triangles"),
     (lambda _: shortest_paths(LOOSE, 25, 0), r"targets\[0\] = 25 is a vertex that no face uses"),

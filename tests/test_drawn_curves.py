@@ -111,7 +111,7 @@ def test_values_are_sorted_by_their_length(monkeypatch):
     assert not there.process
     with pytest.raises(ValueError, match="a must have a row for each of 16 vertices or 18 faces, not shape"):
         heat_igl.to_trimesh(mesh, a=np.arange(5))
-    with pytest.raises(MeshError, match="holds tetrahedra"):
+    with pytest.raises(MeshError, match="need triangles, but the mesh is tetrahedral"):
         heat_igl.to_trimesh(Mesh(np.eye(4)[:, :3], [[0, 1, 2, 3]]))
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(ImportError, match="trimesh"):

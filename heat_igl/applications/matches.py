@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.mesh import MeshLike, as_triangles
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray
 from heat_igl.windows import pair_distances
@@ -50,9 +50,7 @@ def geodesic_errors(mesh: MeshLike, matches: Sources, truth: Sources) -> FloatAr
     >>> heat_igl.geodesic_errors(mesh, [0, 1, 6], [0, 0, 0]).round(6).tolist()
     [0.0, 0.25, 0.353553]
     """
-    triangles = as_simplices(mesh)
-    if triangles.is_tetrahedral:
-        raise MeshError("errors of matches need a surface of triangles, and the mesh holds tetrahedra")
+    triangles = as_triangles(mesh, "errors of matches need")
     n = triangles.n_vertices
     found, right = named_vertices(matches, n, "matches"), named_vertices(truth, n, "truth")
     if len(found) != len(right):

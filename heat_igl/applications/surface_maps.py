@@ -7,10 +7,10 @@ from typing import Literal, cast, get_args
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, as_array, names_guessed, positive, real_numbers, require_choice, truth
+from heat_igl.errors import as_array, names_guessed, positive, real_numbers, require_choice, truth
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.linear import factorize
-from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, triangles_inside
 from heat_igl.operators import Surface, operators
 from heat_igl.plan import Method
 from heat_igl.runtime import progress_bar
@@ -79,7 +79,7 @@ def parcel_distances(
     [[0.0, 4.0], [4.0, 0.0]]
     """
     require_choice("statistic", statistic, get_args(Statistic))
-    triangles, part = _part(mesh, region)
+    triangles, part = triangles_inside(mesh, region, "maps on a surface need")
     names, vertices, parcel = _parcels(labels, triangles.n_vertices, part)
     p, n = len(names), triangles.n_vertices
     solver = GeodesicSolver(triangles, method=method)
@@ -100,15 +100,6 @@ def parcel_distances(
         counts = np.bincount(parcel)
         found /= counts[:, None] * counts
     return np.asarray((found + found.T) / 2)
-
-
-def _part(mesh: MeshLike, region: ArrayLike | None) -> tuple[Mesh, MeshPart | None]:
-    """The triangles that paths may enter, on all vertices; and the part of the mesh that they are."""
-    triangles = as_simplices(mesh)
-    if triangles.is_tetrahedral:
-        raise MeshError("maps on a surface need triangles, and the mesh holds tetrahedra")
-    part = None if region is None else MeshPart.of(triangles, region)
-    return triangles if part is None else part.mesh, part
 
 
 def _parcels(labels: ArrayLike, n: int, part: MeshPart | None) -> tuple[IntArray, IntArray, IntArray]:
@@ -185,7 +176,7 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
     >>> bool(heat_igl.smooth(mesh, noise, 0.5).std() < 0.2 * noise.std())
     True
     """
-    triangles, _ = _part(mesh, region)
+    triangles, _ = triangles_inside(mesh, region, "maps on a surface need")
     n = triangles.n_vertices
     given = real_numbers("values", values)
     if given.ndim not in (1, 2) or given.shape[-1] != n:

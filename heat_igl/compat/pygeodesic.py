@@ -12,7 +12,7 @@ import numpy as np
 
 from heat_igl.curves import shortest_path
 from heat_igl.errors import MeshError, positive
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, as_triangles
 from heat_igl.sources import Sources, named_vertices, source_set
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.windows import ExactSurface
@@ -46,9 +46,7 @@ class PyGeodesicAlgorithmExact:
     """
 
     def __init__(self, points: ArrayLike, faces: ArrayLike) -> None:
-        self._mesh = Mesh(points, faces)
-        if self._mesh.is_tetrahedral:
-            raise MeshError("faces must be triangles (m, 3), but they have 4 columns")
+        self._mesh = as_triangles(Mesh(points, faces), "exact distances need")
         self._surface = ExactSurface(from_mesh(self._mesh, 0))
 
     def geodesicDistance(self, sourceIndex: int, targetIndex: int) -> tuple[float, FloatArray]:

@@ -18,7 +18,7 @@ from heat_igl.mesh import (
     NestedCurves,
     SurfaceCurve,
     SurfacePoints,
-    as_simplices,
+    as_triangles,
     connectivity,
     named_entries,
 )
@@ -199,9 +199,7 @@ def cut(mesh: MeshLike, curves: NestedCurves) -> CutMesh:
     >>> round(float(found.mesh.measures.sum()), 6), int(found.pieces.max()) + 1
     (1.0, 2)
     """
-    triangles = as_simplices(mesh)
-    if triangles.is_tetrahedral:
-        raise MeshError("curves cut triangles, but the mesh is tetrahedral")
+    triangles = as_triangles(mesh, "curves cut")
     entries = named_entries(curves, "curves")
     if not entries:
         raise SourceError("curves is empty: give one curve or more")

@@ -14,10 +14,10 @@ import igl
 import numpy as np
 
 from heat_igl.curves.places import CommonFaces, Waypoints, checked_places, corners
-from heat_igl.errors import MeshError, SourceError, names_guessed, shown, truth
+from heat_igl.errors import SourceError, names_guessed, shown, truth
 from heat_igl.intrinsic import HalfEdges, corner_angles, lengths_to_divide_by
 from heat_igl.kernels.paths import face_table, routes, shortening
-from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_triangles
 from heat_igl.mesh.connectivity import group_by_label
 from heat_igl.mesh.surface_points import require_faces, unchecked_curve
 from heat_igl.sources.source_sets import on_simplex
@@ -263,9 +263,7 @@ class GeodesicPathSolver:
     """
 
     def __init__(self, mesh: MeshLike) -> None:
-        self._mesh: Mesh = as_simplices(mesh)
-        if self._mesh.is_tetrahedral:
-            raise MeshError("paths need triangles, but the mesh is tetrahedral")
+        self._mesh: Mesh = as_triangles(mesh, "paths need")
         self._faces, self._kernel = shortener(self._mesh)
         self._corner_at = corners(self._mesh)
         # The tables hold what one search leaves behind.
@@ -428,7 +426,7 @@ def geodesic_bezier(mesh: MeshLike, points: Waypoints, pieces: int = 32) -> Surf
     """
     if isinstance(pieces, bool) or not isinstance(pieces, int | np.integer) or not 1 <= pieces <= _MOST_PIECES:
         raise ValueError(f"pieces must be an integer from 1 to {_MOST_PIECES}, not {shown(pieces)}")
-    triangles = as_simplices(mesh)
+    triangles = as_triangles(mesh, "paths need")
     solver = GeodesicPathSolver(triangles)
     faces, barycentric = checked_places("points", triangles, points)
     if len(faces) < 2:

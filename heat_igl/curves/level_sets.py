@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.errors import MeshError, positive, real_numbers, shown
+from heat_igl.errors import positive, real_numbers, shown
 from heat_igl.geodesic import Solver
 from heat_igl.mesh import (
     Mesh,
     MeshLike,
     SurfaceCurve,
-    as_simplices,
+    as_triangles,
     connectivity,
     crossings,
     joined_segments,
@@ -69,7 +69,7 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
     >>> [float(curve.points[0, 0].round(6)) for (curve,) in heat_igl.isolines(mesh, mesh.V[:, 0], 3)]
     [0.25, 0.5, 0.75]
     """
-    mesh = as_simplices(mesh)
+    mesh = as_triangles(mesh, "isolines need")
     if isinstance(levels, int | np.integer) and not isinstance(levels, bool):
         checked, _ = _checked(mesh, values, [])
         finite, k = checked[np.isfinite(checked)], int(levels)
@@ -115,7 +115,7 @@ def offset_curves(mesh: MeshLike, solver: Solver, sources: Sources, radius: floa
     >>> round(float(curve.lengths(mesh).sum() / np.pi), 2)  # a circle of radius 1/2
     1.0
     """
-    mesh = as_simplices(mesh)
+    mesh = as_triangles(mesh, "isolines need")
     radius = positive("radius", radius)
     if not isinstance(solver, Solver):
         raise ValueError(f"solver must be a GeodesicSolver or HeatMethodSolver of the mesh, not {shown(solver)}")
@@ -146,7 +146,7 @@ def sublevel_areas(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> Floa
     >>> heat_igl.curves.sublevel_areas(mesh, mesh.V[:, 0], [0.0, 0.25, 2.0]).round(6).tolist()
     [0.0, 0.25, 1.0]
     """
-    mesh = as_simplices(mesh)
+    mesh = as_triangles(mesh, "isolines need")
     checked, wanted = _checked(mesh, values, levels)
     return np.array([_areas_below(mesh, checked, level).sum() for level in wanted])
 
@@ -172,7 +172,7 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
     >>> heat_igl.curves.enclosed_areas(mesh, mesh.V[:, 0], 0.25).round(6).tolist()
     [0.25]
     """
-    mesh = as_simplices(mesh)
+    mesh = as_triangles(mesh, "isolines need")
     checked, wanted = _checked(mesh, values, level)
     if len(wanted) != 1:
         raise ValueError(f"level must be one number, not {len(wanted)}")
@@ -188,8 +188,6 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
 
 
 def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    if mesh.is_tetrahedral:
-        raise MeshError("isolines need triangles, but the mesh is tetrahedral")
     array = real_numbers("values", values)
     if array.shape != (mesh.n_vertices,):
         raise ValueError(f"values must have shape ({mesh.n_vertices},), one per vertex, not {array.shape}")

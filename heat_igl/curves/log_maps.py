@@ -8,11 +8,11 @@ from typing import Literal, get_args
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError, names_guessed, positive, require_choice
+from heat_igl.errors import SourceError, names_guessed, positive, require_choice
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.heat import VectorHeatSolver
 from heat_igl.intrinsic import TangentFrames
-from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices, one_sided
+from heat_igl.mesh import MeshLike, PointCloud, SurfacePoints, as_mesh, as_simplices, as_triangles, one_sided
 from heat_igl.operators import unfolding_surface
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import FloatArray, IntArray
@@ -186,9 +186,7 @@ def log_maps_within(mesh: MeshLike, radius: float, sources: Sources | None = Non
     True
     """
     limit = positive("radius", radius, infinite=True)
-    triangles = one_sided(mesh, "parallel transport along paths needs")
-    if triangles.is_tetrahedral:
-        raise MeshError("log maps need triangles, and the mesh holds tetrahedra")
+    triangles = as_triangles(one_sided(mesh, "parallel transport along paths needs"), "log maps need")
     n = triangles.n_vertices
     chosen = triangles.originals[np.arange(n) if sources is None else named_vertices(sources, n)]
     surface = unfolding_surface(triangles, MARGIN)

@@ -10,7 +10,7 @@ from heat_igl.curves.places import checked_places
 from heat_igl.errors import MeshError, SourceError, names_guessed
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.kernels.windows.paths import trace_back
-from heat_igl.mesh import Mesh, MeshLike, MeshPart, SurfaceCurve, SurfacePoints, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, SurfaceCurve, SurfacePoints, as_triangles
 from heat_igl.sources import Sources, SourceSet, named_vertices, source_set
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 from heat_igl.windows.exact import search
@@ -65,9 +65,7 @@ def shortest_paths(
     >>> round(path.length, 6)
     5.0
     """
-    mesh = as_simplices(mesh)
-    if mesh.is_tetrahedral:
-        raise MeshError("paths need triangles, but the mesh is tetrahedral")
+    mesh = as_triangles(mesh, "paths need")
     part = None if region is None else MeshPart.of(mesh, region)
     chosen = source_set(sources, mesh.n_vertices, mesh.F, mesh, part=part, originals=mesh.originals)
     if part is None:

@@ -13,7 +13,7 @@ from heat_igl.errors import MeshError, as_array, real_numbers
 from heat_igl.intrinsic.gluing import intrinsic_triangulation, lengths_to_divide_by
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
 from heat_igl.intrinsic.vertex_angles import PolarAngles, polar_angles
-from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_simplices, tangent_surface
+from heat_igl.mesh import Mesh, MeshLike, as_mesh, as_triangles, tangent_surface
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 
@@ -247,9 +247,7 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
     True
     """
     given = as_mesh(mesh)
-    mesh, n = tangent_surface(given), as_simplices(given).n_vertices
-    if mesh.is_tetrahedral:
-        raise MeshError("tangent frames need triangles, but the mesh is tetrahedral")
+    mesh, n = tangent_surface(given), as_triangles(given, "tangent frames need").n_vertices
     triangulation = replace(intrinsic_triangulation(mesh), l=lengths_to_divide_by(mesh), lengthening=0.0)
     angles = polar_angles(triangulation)
     sides = _unit(mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F])

@@ -8,6 +8,7 @@ from heat_igl.mesh.mesh import Mesh as Mesh
 from heat_igl.mesh.objects import MeshLike as MeshLike
 from heat_igl.mesh.objects import as_mesh as as_mesh
 from heat_igl.mesh.objects import as_simplices as as_simplices
+from heat_igl.mesh.objects import as_triangles as as_triangles
 from heat_igl.mesh.objects import one_sided as one_sided
 from heat_igl.mesh.objects import tangent_surface as tangent_surface
 from heat_igl.mesh.objects import to_open3d as to_open3d
@@ -15,6 +16,7 @@ from heat_igl.mesh.objects import to_pyvista as to_pyvista
 from heat_igl.mesh.objects import to_trimesh as to_trimesh
 from heat_igl.mesh.objects import warn_of_seams as warn_of_seams
 from heat_igl.mesh.part import MeshPart as MeshPart
+from heat_igl.mesh.part import triangles_inside as triangles_inside
 from heat_igl.mesh.point_cloud import PointCloud as PointCloud
 from heat_igl.mesh.polygons import PolygonFans as PolygonFans
 from heat_igl.mesh.polygons import PolygonMesh as PolygonMesh

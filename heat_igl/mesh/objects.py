@@ -213,6 +213,14 @@ def as_simplices(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh:
     return found if isinstance(found, Mesh) else found.triangles
 
 
+def as_triangles(mesh: MeshLike, what: str) -> Mesh:
+    """`as_simplices`; a MeshError if they are tetrahedra: `what` needs triangles."""
+    found = as_simplices(mesh)
+    if found.is_tetrahedral:
+        raise MeshError(f"{what} triangles, but the mesh is tetrahedral")
+    return found
+
+
 def tangent_surface(mesh: MeshLike) -> Mesh:
     """The surface that tangent vectors live on: `as_simplices`, or the `cover` of a `PointCloud` that has one."""
     found = as_mesh(mesh)
@@ -393,7 +401,7 @@ def to_trimesh(mesh: MeshLike, **attributes: ArrayLike) -> Any:
     >>> surface.vertex_attributes["distance"].shape
     (162,)
     """
-    triangles = _triangles(mesh)
+    triangles = as_triangles(mesh, "other libraries' surfaces need")
     import trimesh  # type: ignore[import-not-found]
 
     of_vertices, of_faces = _attributes(triangles, attributes)
@@ -415,7 +423,7 @@ def to_pyvista(mesh: MeshLike, **attributes: ArrayLike) -> Any:
     >>> surface.point_data["distance"].shape
     (162,)
     """
-    triangles = _triangles(mesh)
+    triangles = as_triangles(mesh, "other libraries' surfaces need")
     import pyvista  # type: ignore[import-not-found]
 
     of_vertices, of_faces = _attributes(triangles, attributes)
@@ -439,7 +447,7 @@ def to_open3d(mesh: MeshLike, **attributes: ArrayLike) -> Any:
     >>> surface.vertex["distance"].shape
     SizeVector[162, 1]
     """
-    triangles = _triangles(mesh)
+    triangles = as_triangles(mesh, "other libraries' surfaces need")
     import open3d  # type: ignore[import-not-found]
 
     surface = open3d.t.geometry.TriangleMesh(
@@ -449,13 +457,6 @@ def to_open3d(mesh: MeshLike, **attributes: ArrayLike) -> Any:
         for name, values in found.items():
             there[name] = open3d.core.Tensor(np.ascontiguousarray(values.reshape(len(values), -1)))
     return surface
-
-
-def _triangles(mesh: MeshLike) -> Mesh:
-    triangles = as_simplices(mesh)
-    if triangles.is_tetrahedral:
-        raise MeshError("a surface of triangles is wanted, and the mesh holds tetrahedra")
-    return triangles
 
 
 def _attributes(mesh: Mesh, attributes: dict[str, ArrayLike]) -> tuple[dict[str, AnyArray], dict[str, AnyArray]]:

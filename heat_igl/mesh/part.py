@@ -8,6 +8,7 @@ import numpy as np
 
 from heat_igl.errors import MeshError, SourceError, as_array
 from heat_igl.mesh.mesh import Mesh
+from heat_igl.mesh.objects import MeshLike, as_triangles
 from heat_igl.typing import ArrayLike, BoolArray, IntArray
 
 
@@ -62,6 +63,13 @@ class MeshPart:
         at = np.minimum(np.searchsorted(self.faces, faces), len(self.faces) - 1)
         _require(self.faces[at] == faces, faces, name, "face", position)
         return np.asarray(at)
+
+
+def triangles_inside(mesh: MeshLike, region: ArrayLike | None, what: str) -> tuple[Mesh, MeshPart | None]:
+    """The triangles, which `what` needs, on all vertices; only those of the part that a region, if any, selects."""
+    triangles = as_triangles(mesh, what)
+    part = None if region is None else MeshPart.of(triangles, region)
+    return triangles if part is None else part.mesh, part
 
 
 def _require(is_inside: BoolArray, places: IntArray, name: str, kind: str, position: IntArray | None) -> None:

@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
 from heat_igl.kernels.signals import raise_caught
 from heat_igl.kernels.windows import windows
 from heat_igl.kernels.windows.surface import FLAT_VERTEX
-from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints
+from heat_igl.mesh import ON_SIDE, Mesh, SurfacePoints, as_triangles
 from heat_igl.runtime import n_threads, side_by_side
 from heat_igl.sources import Sources, SourceSet, source_set, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
@@ -311,9 +310,7 @@ def exact_distance(V: ArrayLike, F: ArrayLike, sources: Sources) -> FloatArray:
     `sources` are a vertex, a sequence of them or a mask (n,) of bool. A MeshError if the mesh cannot be used or is
     tetrahedral, and a SourceError if `sources` does not name vertices.
     """
-    mesh = Mesh(V, F)
-    if mesh.is_tetrahedral:
-        raise MeshError("exact distance needs triangles, but F has 4 columns")
+    mesh = as_triangles(Mesh(V, F), "exact distance needs")
     chosen = source_set(vertex_sources(sources, mesh.n_vertices), mesh.n_vertices, None)
     return ExactSurface(from_mesh(mesh, int(chosen.vertices[0]))).distance(chosen, threads=n_threads())
 

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import MeshError, SourceError, names_guessed, positive, shown
+from heat_igl.errors import SourceError, names_guessed, positive, shown
 from heat_igl.kernels.mesh import checking
 from heat_igl.kernels.windows import windows
-from heat_igl.mesh import Mesh, MeshLike, MeshPart, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, triangles_inside
 from heat_igl.runtime import TimeLeft, available_memory, n_threads, over_rows
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
@@ -31,6 +31,8 @@ _MOST_PADDED = 2**28
 CHUNK = 64
 # Initial capacity of a thread's result arrays.
 _ROOM = 2**16
+# What needs triangles, in the message for tetrahedra.
+_WHAT = "exact distances, unlike those of distance_matrix, need"
 _NO_VERTICES = np.empty(0, np.int32)
 _NONE_WRONG = np.empty(0, bool)
 _NO_WAYS, _NO_LINES = np.empty((0, 3), np.int32), np.empty((0, 3))
@@ -79,7 +81,7 @@ def distances_within(
     ([48, 49, 50, 51, 52], [2.0, 1.0, 0.0, 1.0, 2.0])
     """
     limit = positive("radius", radius, infinite=True)
-    triangles, part = _triangles(mesh, region)
+    triangles, part = triangles_inside(mesh, region, _WHAT)
     chosen = _chosen(sources, triangles, part)
     found = _rows_within(triangles, from_mesh(triangles, int(chosen[0])), chosen, limit)
     if triangles.has_copies:
@@ -95,7 +97,7 @@ def blocks_within(
     Blocks have about `most_entries` distances; the first has few rows, and is used to estimate the next.
     """
     limit = positive("radius", radius, infinite=True)
-    triangles, part = _triangles(mesh)
+    triangles, part = triangles_inside(mesh, None, _WHAT)
     chosen = _chosen(sources, triangles, part)
     tables = from_mesh(triangles, int(chosen[0]))
     least = CHUNK * n_threads()
@@ -165,7 +167,7 @@ def nearest_vertices(
     """
     if isinstance(k, bool) or not isinstance(k, int | np.integer) or k < 1:
         raise ValueError(f"k must be a positive integer, not {shown(k)}")
-    triangles, part = _triangles(mesh, region)
+    triangles, part = triangles_inside(mesh, region, _WHAT)
     chosen = _chosen(sources, triangles, part)
     tables = from_mesh(triangles, int(chosen[0]))
     # No more vertices than the mesh has can be found.
@@ -233,7 +235,7 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None
     >>> heat_igl.pair_distances(heat_igl.shapes.strip(4, 3), [[0, 4], [0, 19]]).round(6).tolist()
     [4.0, 5.0]
     """
-    triangles, part = _triangles(mesh, region)
+    triangles, part = triangles_inside(mesh, region, _WHAT)
     first, second = triangles.originals[_checked_pairs(pairs, triangles.n_vertices)].T
     if part is not None:
         part.require_vertices(first, "pairs")
@@ -281,15 +283,6 @@ class _Count:
             )
         self._left(len(near.counts), f" for {expected:.2g} distances, less with a smaller radius")
         return near
-
-
-def _triangles(mesh: MeshLike, region: ArrayLike | None = None) -> tuple[Mesh, MeshPart | None]:
-    """The triangles that paths may enter, on all vertices, and the part of the mesh given by the region."""
-    triangles = as_simplices(mesh)
-    if triangles.is_tetrahedral:
-        raise MeshError("exact distances need triangles, and the mesh holds tetrahedra: take distance_matrix")
-    part = None if region is None else MeshPart.of(triangles, region)
-    return triangles if part is None else part.mesh, part
 
 
 def _chosen(sources: Sources | None, mesh: Mesh, part: MeshPart | None) -> IntArray:
