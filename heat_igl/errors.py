@@ -230,6 +230,21 @@ def truth(name: str, value: object) -> bool:
     raise ValueError(f"{name} must be True or False, not {shown(value)}")
 
 
+def raise_at_first(
+    bad: npt.ArrayLike,
+    name: str,
+    values: npt.NDArray[Any],
+    problem: str,
+    remedy: str = "",
+    error: type[ValueError] = ValueError,
+) -> None:
+    """Raise an `error` that names the first of the `values` (k, ...), called `name`, at which `bad` (k,) is true."""
+    if np.any(bad):
+        first, count = int(np.argmax(bad)), f" ({np.sum(bad)} of {len(values)} are not)" if len(values) > 1 else ""
+        end = f": {remedy}" if remedy else ""
+        raise error(f"{name}[{first}] = {values[first].tolist()} {problem}{count}{end}")
+
+
 def checked_cutoff(value: float | None) -> float:
     """The cutoff as a positive float, infinity for None; a ValueError for anything else."""
     return np.inf if value is None else positive("cutoff", value, infinite=True)

@@ -296,7 +296,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     mesh, groups = circle_and_arc()
     target = tmp_path / "lines.obj"
     target.write_text("old")
-    with pytest.raises(heat_igl.SourceError, match="is no face"):
+    with pytest.raises(heat_igl.SourceError, match="must be a face"):
         write_curves(target, SQUARE, groups)
     with pytest.raises(ValueError, match=r"curves go to .obj, .ply, .vtp, .csv, .svg, .dxf files"):
         write_curves(tmp_path / "lines.png", mesh, groups)

@@ -124,7 +124,7 @@ def changed(face: int, value: Any) -> FloatArray:
         ),
         (
             changed(4, np.diag([1, -1, 1])),
-            r"metric\[4\] = .* must be positive definite on its face \(1 of 18 are not\)",
+            r"metric\[4\] = .* must be positive definite \(1 of 18 are not\)",
         ),
         (changed(5, np.diag([1, 0, 1])), r"metric\[5\] = .* must be positive definite"),
     ],

@@ -451,8 +451,11 @@ BAD = {
     "nan": ((with_entry(sphere(9), 4, np.nan),), r"P\[4, 0\] is nan \(1 of 9 points are not .*: P\[numpy.isfinite"),
     "one column": ((np.zeros((9, 1)),), r"P must have shape \(n, 3\), or \(n, 2\) in the plane, but .* \(9, 1\)"),
     "huge": ((1e70 * sphere(9),), "P spans .* rescale P"),
-    "normals nan": ((sphere(9), with_entry(sphere(9), 2, np.nan)), r"normals\[2\] is \[nan, .* \(1 of 9 normals"),
-    "normals zero": ((sphere(9), with_entry(sphere(9), 5, 0)), r"normals\[5\] is \[0.0, 0.0, 0.0\] \(1 of 9 "),
+    "normals nan": ((sphere(9), with_entry(sphere(9), 2, np.nan)), r"normals\[2\] = \[nan, .* \(1 of 9 are"),
+    "normals zero": (
+        (sphere(9), with_entry(sphere(9), 5, 0)),
+        r"normals\[5\] = \[0.0, 0.0, 0.0\] must be .* \(1 of 9 ",
+    ),
     "a path": (("scan.ply",), "P must hold real numbers, .*; as_mesh takes files and clouds of other libraries"),
     "too few normals": ((sphere(9), sphere(8)), r"normals must have shape \(9, 3\)"),
     "complex normals": ((sphere(9), sphere(9) * 1j), "normals must hold real numbers"),

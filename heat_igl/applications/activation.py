@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from typing import cast
+
 import numpy as np
 
-from heat_igl.errors import real_numbers
+from heat_igl.errors import SourceError, raise_at_first, real_numbers
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import MeshLike, as_simplices
+from heat_igl.mesh.surface_points import points_beside
 from heat_igl.operators import metric_operators
-from heat_igl.sources import OffsetSources, Sources
+from heat_igl.operators.metric import least_eigenvalue, symmetric_tensors
+from heat_igl.sources import OffsetSources, Sources, are_positions, source_set
 from heat_igl.typing import ArrayLike, FloatArray
 
 
@@ -65,25 +70,23 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
         D = np.broadcast_to(D, (m, 3, 3))
     if D.shape not in ((m, 3, 3), (n, 3, 3)):
         raise ValueError(f"D must have shape (3, 3), {(m, 3, 3)} per face or {(n, 3, 3)} per vertex, not {D.shape}")
-    size = np.abs(D).max(axis=(1, 2))
-    skew = np.abs(D - np.swapaxes(D, 1, 2)).max(axis=(1, 2))
-    least = np.linalg.eigvalsh(np.where(np.isfinite(size)[:, None, None], D, 0))[:, 0]
-    for bad, problem in (
-        (~np.isfinite(size), "must be finite"),
-        (skew > _ROUNDING * size, "must be symmetric"),
-        (~(least > 0), "must be positive definite"),
-    ):
-        if bad.any():
-            first = int(np.argmax(bad))
-            raise ValueError(f"D[{first}] = {D[first].tolist()} {problem} ({int(bad.sum())} of {len(D)} are not)")
-    inverse = np.linalg.inv(D)
+    symmetric = symmetric_tensors("D", D)
+    least_eigenvalue("D", np.asarray(np.linalg.eigvalsh(symmetric)[:, 0]), D)
     start = real_numbers("times", times)
-    if not np.isfinite(start).all():
-        raise ValueError("times must be finite: leave out sites where no wave starts")
-    first_time = float(start.min(initial=np.inf)) if start.size else 0.0
-    solver = GeodesicSolver(metric_operators(simplices, (inverse + np.swapaxes(inverse, 1, 2)) / 2))
-    return np.asarray(solver.distance(OffsetSources(sites, start - first_time)) + first_time)
-
-
-# Asymmetry that is taken for rounding.
-_ROUNDING = 1e-9
+    raise_at_first(~np.isfinite(start.ravel()), "times", start.ravel(), "must be finite", "leave out its site")
+    first_time = float(start.min()) if start.size else 0.0
+    try:
+        with np.errstate(over="ignore"):
+            sources = OffsetSources(sites, start - first_time)
+        if are_positions(sites) and not simplices.is_tetrahedral:
+            places = points_beside(simplices, cast(ArrayLike, sites), "sites")
+            sources = OffsetSources(places, sources.offsets)
+        # Wrong sites are named before anything is prepared.
+        source_set(sources, n, None if simplices.is_tetrahedral else simplices.F)
+        inverse = np.linalg.inv(symmetric)
+        solver = GeodesicSolver(metric_operators(simplices, (inverse + np.swapaxes(inverse, 1, 2)) / 2))
+        return np.asarray(solver.distance(sources) + first_time)
+    except SourceError as error:
+        # In the words of this function.
+        words = re.sub(r"\bsource(s?)\b", r"site\1", re.sub(r"\boffsets\b", "times", str(error)))
+        raise SourceError(words) from None

@@ -11,7 +11,16 @@ from heat_igl.curves.geodesics import GeodesicPathSolver
 from heat_igl.curves.paths import shortest_path, shortest_paths
 from heat_igl.curves.places import Waypoints, checked_places
 from heat_igl.curves.straightest import Tracer
-from heat_igl.errors import AccuracyWarning, MeshError, SourceError, is_number, names_guessed, real_numbers, shown
+from heat_igl.errors import (
+    AccuracyWarning,
+    MeshError,
+    SourceError,
+    is_number,
+    names_guessed,
+    raise_at_first,
+    real_numbers,
+    shown,
+)
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, SurfacePoints, as_mesh, as_simplices
 from heat_igl.mesh.surface_points import unchecked_curve
@@ -276,10 +285,7 @@ def _checked_weights(weights: ArrayLike | None, k: int) -> FloatArray:
     array = real_numbers("weights", weights)
     if array.shape != (k,):
         raise ValueError(f"weights must be {k} numbers, one for each point, but the shape is {array.shape}")
-    bad = ~(np.isfinite(array) & (array >= 0))
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise ValueError(f"weights[{first}] = {array[first]} must be finite and not negative")
+    raise_at_first(~(np.isfinite(array) & (array >= 0)), "weights", array, "must be finite and not negative")
     if not array.any():
         raise ValueError("weights are all 0: one point at least needs a positive weight")
     return array

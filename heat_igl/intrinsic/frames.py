@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from heat_igl.errors import MeshError, as_array, real_numbers
+from heat_igl.errors import MeshError, as_array, raise_at_first, real_numbers
 from heat_igl.intrinsic.gluing import intrinsic_triangulation, lengths_to_divide_by
 from heat_igl.intrinsic.triangulation import IntrinsicTriangulation, next_half_edge, previous_half_edge
 from heat_igl.intrinsic.vertex_angles import PolarAngles, polar_angles
@@ -317,10 +317,7 @@ def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> 
     if found.ndim != 2 or found.shape[1] != size or (k is not None and len(found) != k):
         wanted = "k" if k is None else k
         raise ValueError(f"{name} must have shape ({wanted}, {size}), but it has shape {given.shape}")
-    bad = ~np.isfinite(found).all(axis=1)
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise ValueError(f"{name}[{first}] = {found[first].tolist()} is not finite ({int(bad.sum())} rows are not)")
+    raise_at_first(~np.isfinite(found).all(axis=1), name, found, "must be finite")
     return found
 
 
@@ -331,8 +328,6 @@ def checked_indices(name: str, indices: ArrayLike, n: int) -> IntArray:
         return np.empty(0, np.int64)  # what is empty has no type
     if given.ndim != 1 or given.dtype.kind not in "iu":
         raise MeshError(f"{name} must be indices (k,), not {given.dtype} of shape {given.shape}")
-    outside = (given < 0) | (given >= n)
-    if outside.any():
-        first = int(np.argmax(outside))
-        raise MeshError(f"{name}[{first}] = {given[first]} is out of range: indices run from 0 to {n - 1}")
+    remedy = f"indices run from 0 to {n - 1}"
+    raise_at_first((given < 0) | (given >= n), name, given, "must be in range", remedy, MeshError)
     return given.astype(np.int64)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning, MeshError, as_array
+from heat_igl.errors import AccuracyWarning, MeshError, as_array, raise_at_first
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.mesh.report import CloudReport
 from heat_igl.runtime import warn_caller
@@ -318,13 +318,8 @@ def _checked_normals(normals: ArrayLike, n: int) -> FloatArray:
         raise MeshError(f"normals must have shape ({n}, 3), a normal for each point, but they have shape {array.shape}")
     directions = np.array(array, dtype=np.float64)
     largest = np.abs(directions).max(axis=1, keepdims=True)
-    bad = ~((largest > 0) & (largest < np.inf))
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise MeshError(
-            f"normals[{first}] is {directions[first].tolist()} ({int(bad.sum())} of {n} normals are 0 or not finite): "
-            "pass normals=None to have planes fitted to the points"
-        )
+    bad, remedy = ~((largest > 0) & (largest < np.inf))[:, 0], "pass normals=None to have planes fitted to the points"
+    raise_at_first(bad, "normals", directions, "must be finite and not 0", remedy, MeshError)
     # Unit vectors stay as they are, so that a copy of the cloud has the same bits.
     rows = np.abs(np.einsum("nx,nx->n", directions, directions) - 1) > 1e-14
     directions[rows] /= largest[rows]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import igl
 import numpy as np
 
-from heat_igl.errors import SourceError, as_array, real_numbers, truth
+from heat_igl.errors import SourceError, as_array, raise_at_first, real_numbers, truth
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.objects import MeshLike, as_simplices
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
@@ -229,13 +229,8 @@ def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
     # By columns: along rows of three numbers, numpy takes ten times as long.
     a, b, c = array.T
     wrong = ~(np.isfinite(a + b + c) & (np.minimum(np.minimum(a, b), c) >= -ON_SIDE_COMPUTED))
-    if wrong.any():
-        first = int(np.flatnonzero(wrong)[0])
-        raise SourceError(f"{name}[{first}] = {array[first].tolist()} must be finite and not negative")
-    wrong = np.abs(a + b + c - 1) > ON_SIDE_COMPUTED
-    if wrong.any():
-        first = int(np.flatnonzero(wrong)[0])
-        raise SourceError(f"{name}[{first}] = {array[first].tolist()} must sum to 1, not {array[first].sum():.12g}")
+    raise_at_first(wrong, name, array, "must be finite and not negative", error=SourceError)
+    raise_at_first(np.abs(a + b + c - 1) > ON_SIDE_COMPUTED, name, array, "must sum to 1", error=SourceError)
     array = np.maximum(array, 0.0)
     a, b, c = array.T
     return np.asarray(array / (a + b + c)[:, None])
@@ -249,10 +244,8 @@ def require_triangles(mesh: Mesh) -> None:
 
 def require_faces(faces: IntArray, n_faces: int, place: str = "") -> None:
     """Raise a `SourceError` if there is no such face; the message begins with `place` and names the first."""
-    outside = (faces < 0) | (faces >= n_faces)
-    if outside.any():
-        first = int(np.flatnonzero(outside)[0])
-        raise SourceError(f"{place}faces[{first}] = {faces[first]} is no face: indices run from 0 to {n_faces - 1}")
+    outside, remedy = (faces < 0) | (faces >= n_faces), f"indices run from 0 to {n_faces - 1}"
+    raise_at_first(outside, f"{place}faces", faces, "must be a face", remedy, SourceError)
 
 
 def _in_space(mesh: MeshLike, faces: IntArray, barycentric: FloatArray) -> FloatArray:
@@ -341,17 +334,9 @@ def checked_points(positions: ArrayLike) -> FloatArray:
     array = rows_in_space("positions", positions)
     if not len(array):
         raise SourceError(f"positions must have shape (k, 3), a row for each, not {array.shape}")
-    wrong = ~np.isfinite(array).all(axis=1)
-    if wrong.any():
-        first = int(np.flatnonzero(wrong)[0])
-        raise SourceError(f"positions[{first}] = {array[first].tolist()} is not finite")
-    far = (abs(array) > _FARTHEST).any(axis=1)
-    if far.any():
-        first = int(np.flatnonzero(far)[0])
-        raise SourceError(
-            f"positions[{first}] = {array[first].tolist()} is too far away: coordinates end at {_FARTHEST:.0e}, so "
-            "that squares do not overflow"
-        )
+    raise_at_first(~np.isfinite(array).all(axis=1), "positions", array, "must be finite", error=SourceError)
+    far, remedy = (abs(array) > _FARTHEST).any(axis=1), "so that squares do not overflow"
+    raise_at_first(far, "positions", array, f"must be within {_FARTHEST:.0e}", remedy, SourceError)
     return array
 
 

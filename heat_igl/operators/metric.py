@@ -10,7 +10,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import names_guessed, real_numbers
+from heat_igl.errors import names_guessed, raise_at_first, real_numbers
 from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, lay_out, mollify
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
@@ -156,12 +156,12 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
             f"speed must have shape ({m},), one per face, not {s.shape}: speed[mesh.F].mean(axis=1) of one per vertex"
         )
     remedy = "remove faces that cannot be crossed"
-    _raise_at_first(~((s > 0) & np.isfinite(s)), "speed", s, "must be positive and finite", remedy)
+    raise_at_first(~((s > 0) & np.isfinite(s)), "speed", s, "must be positive and finite", remedy)
     if not mesh.edge_lengths.all():
         check_measures(mesh)
     largest = _LARGEST**0.5
     outside = (s < 1 / largest) | (s > largest)
-    _raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
+    raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
     root = np.eye(p) * s[:, None, None]
     domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2, 1 / float(s.max()), root)
     if domain.surface is None:
@@ -228,7 +228,7 @@ def fibre_metric(
         raise ValueError(f"sheets must have the shape of directions, ({k}, 3), not {np.shape(sheets)}")
     sheet -= np.einsum("ki,ki->k", sheet, fibre)[:, None] * fibre
     size = np.linalg.norm(sheet, axis=1, keepdims=True)
-    _raise_at_first(size[:, 0] < _ROUNDING, "sheets", np.asarray(sheets), "has the direction of its fibre")
+    raise_at_first(size[:, 0] < _ROUNDING, "sheets", np.asarray(sheets), "has the direction of its fibre")
     sheet /= size
     second = sheet[:, :, None] * sheet[:, None]
     three = _squared_factor("normal", normal, k)
@@ -245,7 +245,7 @@ def _unit_directions(name: str, given: ArrayLike) -> FloatArray:
     w = np.pad(w, ((0, 0), (0, 3 - w.shape[1])))
     with np.errstate(over="ignore"):
         length = np.linalg.norm(w, axis=1)
-    _raise_at_first(~((length > 0) & np.isfinite(length)), name, w, "is no direction")
+    raise_at_first(~((length > 0) & np.isfinite(length)), name, w, "is no direction")
     return np.asarray(w / length[:, None])
 
 
@@ -257,7 +257,7 @@ def _squared_factor(name: str, given: ArrayLike, k: int) -> FloatArray:
     factor = np.broadcast_to(factor, k)
     with np.errstate(over="ignore", under="ignore"):
         square = factor**2
-    _raise_at_first(~((factor > 0) & (square > 0) & np.isfinite(square)), name, factor, "must be positive and finite")
+    raise_at_first(~((factor > 0) & (square > 0) & np.isfinite(square)), name, factor, "must be positive and finite")
     return np.asarray(square[:, None, None])
 
 
@@ -443,17 +443,17 @@ def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray]:
         raise ValueError(
             f"metric must have shape {' or '.join(map(str, shapes))}, one per face or vertex, not {g.shape}{remedy}"
         )
-    symmetric = _symmetric(g)
+    symmetric = symmetric_tensors("metric", g)
     if p < g.shape[1]:
         axes = plane_axes(mesh)
         symmetric = np.asarray(axes @ symmetric @ np.swapaxes(axes, 1, 2), np.float64)
     root, smallest = inverse_root(symmetric)
-    return symmetric, _least_length(smallest, g), root
+    return symmetric, float(np.sqrt(least_eigenvalue("metric", smallest, g))), root
 
 
 def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray]:
     """The metric (n, 3, 3) from one per vertex, and on faces its least length and inverse root."""
-    symmetric = _symmetric(g)
+    symmetric = symmetric_tensors("metric", g)
     if mesh.is_tetrahedral:
         root, sizes = inverse_root(symmetric)
         smallest = np.where(mesh.referenced, sizes, np.inf)
@@ -461,33 +461,23 @@ def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, F
         axes, smallest = plane_axes(mesh)[:, None], np.full(mesh.n_vertices, np.inf)
         root, sizes = inverse_root(axes @ symmetric[mesh.F] @ np.swapaxes(axes, 2, 3))
         np.minimum.at(smallest, mesh.F, sizes)
-    return symmetric, _least_length(smallest, g), root
+    return symmetric, float(np.sqrt(least_eigenvalue("metric", smallest, g))), root
 
 
-def _symmetric(g: FloatArray) -> FloatArray:
+def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
     """Tensors (k, p, p), after a check that they are finite and symmetric but for rounding."""
     above = np.triu_indices(g.shape[1], 1)
     size = np.abs(g).max(axis=(1, 2))
-    _raise_at_first(~np.isfinite(size), "metric", g, "must be finite")
+    raise_at_first(~np.isfinite(size), name, g, "must be finite")
     apart = np.abs(g[:, *above] - g[:, *above[::-1]]).max(axis=1)
-    _raise_at_first(apart > _ROUNDING * size, "metric", g, "must be symmetric")
+    raise_at_first(apart > _ROUNDING * size, name, g, "must be symmetric")
     return np.asarray((g + np.swapaxes(g, 1, 2)) / 2)
 
 
-def _least_length(smallest: FloatArray, g: FloatArray) -> float:
-    """The root of the least of the smallest eigenvalues (k,) of tensors (k, p, p); an error unless doubles hold all."""
-    _raise_at_first(~(smallest > 0), "metric", g, "must be positive definite on its face")
+def least_eigenvalue(name: str, smallest: FloatArray, g: FloatArray) -> float:
+    """The least of the smallest eigenvalues (k,) of tensors g (k, p, p); an error unless doubles hold all of them."""
+    raise_at_first(~(smallest > 0), name, g, "must be positive definite")
     outside = (smallest < 1 / _LARGEST) | (np.abs(g).max(axis=(1, 2)) > _LARGEST)
     needed = f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}"
-    _raise_at_first(outside, "metric", g, needed, "squares leave the range of doubles, take another unit")
-    return float(np.sqrt(smallest.min()))
-
-
-def _raise_at_first(bad: AnyArray, name: str, values: AnyArray, problem: str, remedy: str = "") -> None:
-    """A ValueError with the first of the `values` that are `bad`."""
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise ValueError(
-            f"{name}[{first}] = {values[first].tolist()} {problem} ({int(bad.sum())} of {len(bad)} are not)"
-            + (f": {remedy}" if remedy else "")
-        )
+    raise_at_first(outside, name, g, needed, "squares leave the range of doubles, take another unit")
+    return float(smallest.min())

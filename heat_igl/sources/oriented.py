@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, raise_at_first
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
 from heat_igl.mesh.surface_points import require_faces, rows_in_space
 from heat_igl.sources.source_sets import on_simplex
@@ -61,9 +61,7 @@ class OrientedPoints:
         if len(normals) != len(self.points):
             raise SourceError(f"normals must have shape ({len(self.points)}, 3), not {np.shape(self.normals)}")
         wrong = ~(np.isfinite(normals).all(axis=1) & normals.any(axis=1))
-        if wrong.any():
-            first = int(np.argmax(wrong))
-            raise SourceError(f"normals[{first}] = {normals[first].tolist()} must be finite and not 0")
+        raise_at_first(wrong, "normals", normals, "must be finite and not 0", error=SourceError)
         object.__setattr__(self, "normals", normals)
 
     def __len__(self) -> int:

@@ -227,7 +227,7 @@ def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
     if are_positions(array):
         raise SourceError(
             f"{name} holds floats of shape {array.shape}: for vertices, convert with astype(int); for positions in "
-            f"space, pass the nearest places of the surface, closest_points(mesh, {name}).points"
+            f"space, pass the nearest vertices, or of a surface the nearest places, closest_points(mesh, {name}).points"
         )
     if array.ndim != 1:
         raise SourceError(f"{name} must be {_ACCEPTED}, but it has shape {array.shape}")
