@@ -217,11 +217,11 @@ def _symmetric(above: FloatArray) -> FloatArray:
 def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[FloatArray | None, AnyArray, float]:
     """The velocities W (m, 6) of simplices as samples of a smooth field, with the row at each corner (m, p + 1).
 
-    Around each vertex, a linear function is fitted. The velocity at the vertex is taken from it if it explains all of
-    the variance and is positive definite there, and is that of each simplex if it leaves a quarter or more, as it
-    leaves of a step: jumps stay where they are. What varies since triangles, with the projections `across` (m, 6) on
-    their normals, have other planes, counts as left. None if the field is smooth nowhere. The third result is the
-    least length of a unit vector at vertices.
+    Around each vertex, a linear function is fitted. The velocities at the corners of a simplex are taken from it if at
+    each it explains all of the variance and is positive definite, and are those of the simplex if it leaves a quarter
+    or more at one, as it leaves of a step: jumps stay where they are. What varies since triangles, with the projections
+    `across` (m, 6) on their normals, have other planes, counts as left. None if the field is smooth nowhere. The third
+    result is the least length of a unit vector at vertices.
     """
     F, n, size = mesh.F, mesh.n_vertices, mesh.F.shape[1]
     off = np.where(_ABOVE[0] == _ABOVE[1], 1, np.sqrt(2))  # for the norm of symmetric matrices
@@ -230,6 +230,8 @@ def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[F
     X = mesh.V - mesh.V.mean(axis=0)
     of_corners = sp.csr_array((np.ones(F.size), F.ravel(), np.arange(0, F.size + 1, size)), shape=(len(F), n))
     at = of_corners.T.tocsr()
+    ring = at @ of_corners
+    ring.data[:] = 1
     by = np.concatenate([np.ones((len(F), 1)), of_corners @ X / size], axis=1)
     planes = np.empty((len(F), 0)) if across is None else across * off
     row = np.concatenate([by, values, np.einsum("mk,mk->m", values, values)[:, None], planes], axis=1)
@@ -240,12 +242,18 @@ def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[F
     about = means[:, 1:, 1:10] - middle[:, :, None] * means[:, :1, 1:10]
     slope = about[..., 3:]
     variance = square - (mean**2).sum(axis=1)
-    fitted = np.linalg.pinv(about[..., :3], hermitian=True) @ slope
+    inverse = np.linalg.pinv(about[..., :3], hermitian=True)
+    fitted = inverse @ slope
     explained = (fitted * slope).sum(axis=(1, 2))
     is_constant = variance <= _ROUNDING * ((level**2).sum() + square)
     if across is not None:
         explained -= (1 - (means[:, 0, 11:] ** 2).sum(axis=1)) * ((mean + level) ** 2).sum(axis=1)
-    share = np.clip(1 - 4 * (1 - explained / np.where(is_constant, 1, variance)), 0, 1) * ~is_constant
+    left = 1 - explained / np.where(is_constant, 1, variance)
+    # Of no more simplices than it has coefficients, a function explains all: the adjusted coefficient of determination.
+    others = ring @ at.sum(axis=1) / size - 1
+    free = others - np.einsum("nij,nji->n", inverse, about[..., :3])
+    left = np.where(free > 0, left * others / np.where(free > 0, free, 1), 1)
+    share = np.clip(1 - 4 * left, 0, 1) * ~is_constant
     if not (share > _ROUNDING).any():
         return None, F, np.inf
     found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
@@ -256,13 +264,13 @@ def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[F
         found += at @ ((values - of_corners @ found / size) * least) / count
     at_vertex = (found + level) / off
     sizes = np.linalg.eigvalsh(_symmetric(at_vertex))
-    share[sizes[:, 0] <= 0] = 0
-    del row, values, by, of_corners, at  # what follows is as large
-    rows = F.astype(np.int32)
-    own, corner = np.nonzero(share[F] < 1 - _ROUNDING)
-    v, rows[own, corner] = rows[own, corner], n + np.arange(len(own))
-    velocity = np.concatenate([at_vertex, at_vertex[v]])
-    velocity[n:] -= W[own]
-    velocity[n:] *= share[v, None]
-    velocity[n:] += W[own]
+    least[(sizes[:, 0] <= 0)[F].any(axis=1)] = 0
+    del row, values, by, of_corners, at, ring  # what follows is as large
+    own, rows = np.flatnonzero(least < 1 - _ROUNDING), F.astype(np.int32)
+    rows[own] = np.arange(n, n + own.size * size).reshape(-1, size)
+    velocity = np.concatenate([at_vertex, at_vertex[F[own].ravel()]])
+    blend = velocity[n:].reshape(-1, size, 6)
+    blend -= W[own, None]
+    blend *= least[own, None]
+    blend += W[own, None]
     return velocity, rows, float(1 / sizes.max())
