@@ -18,12 +18,15 @@ _MISFIT = cython.declare(cython.double, 1e-3)
 _STRAIGHT_FRONT = cython.declare(cython.double, 1e-7)
 # Share of the longest edge at a vertex that sees a source by which a way around an edge that it passes on is longer.
 _SLACK = cython.declare(cython.double, 0.02)
-# Times that distance along an edge is found.
-_MOST_FITS = cython.declare(cython.int, 50)
+# Times that distance along an edge is found, and that in bits.
+_MOST_FITS = cython.declare(cython.int, 63)
+_FIT_BITS = cython.declare(cython.int, 6)
 # No edge, and no way.
 _NONE = cython.declare(cython.int, -3)
 
-_Offer = cython.struct(edge=cython.int, fit=cython.int, next=cython.int, asked=cython.int, value=cython.double)
+_Offer = cython.struct(fit=cython.int, next=cython.int, asked=cython.int, value=cython.double)
+# As large as what a processor reads at once.
+_Met = cython.struct(fits=cython.int[14], count=cython.int, next=cython.int)
 
 
 def bend_around(
@@ -55,8 +58,6 @@ def bend_around(
     share of its longest edge, and the edge still is a candidate. `way` (n,) int32 is the edge around which the way to
     each vertex bends last, -1 on straight ways, -2 where it is not known. The other arguments are those of
     `sight.look_around`; `d`, `begin`, `label` and `way` are changed.
-
-    Returns the number of times that distance along an edge was found.
     """
     n, e = body.positions.shape[0], edges.shape[0]
     ends = np.asarray(body.positions)[np.asarray(edges)]
@@ -68,8 +69,9 @@ def bend_around(
     one.start, one.along, one.height, one.fits = np.zeros(e), np.zeros(e), np.zeros(e), np.zeros(e, np.uint8)
     one.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
     one.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
-    one.n_fits, one.newest, one.waiting = np.zeros(e, np.int32), np.full(n, _NONE, np.int32), PriorityQueue(n)
-    one.offered_to = np.full(e, _NONE, np.int32)
+    one.fit_of = np.arange(e, dtype=np.int32) << _FIT_BITS
+    one.newest, one.best, one.met = np.full((3, n), _NONE, np.int32)
+    one.met_by, one.waiting = np.full(e, _NONE, np.int32), PriorityQueue(n)
     one.line.lit = cython.address(one.way[0])
     is_shorter = np.ones(n, bool)
     n_asked: cython.Py_ssize_t = 0
@@ -91,7 +93,6 @@ def bend_around(
             body.along_edges(d, label, begin)
         is_shorter = np.asarray(d) < before
         np.asarray(way)[is_shorter] = -2
-    return int(np.sum(one.n_fits))
 
 
 @cython.final
@@ -105,9 +106,11 @@ class _Bends(Ray):
     Of the way that was last asked for, `bend` (3,) is the point at which it bends last, and `share` the place of this
     point along the edge.
 
-    The edges that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has the
-    number of fits of its edge (`n_fits`) when it was made, whether it has been `asked` for, and the value of the way,
-    `INFINITY` once the line has been followed. `offered_to` is the vertex whose list was last read or written for it.
+    `fit_of` (e,) is the number of each edge, followed by `_FIT_BITS` that count how often it has been fitted. The edges
+    that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,) and whose shortest one,
+    unless it is done, is the `best` (n,). Each has `fit_of` its edge when it was made, whether it has been `asked` for,
+    and the value of the way, `INFINITY` once the line has been followed. All edges that were offered to a vertex are in
+    `lists` that begin at `met` (n,); `met_by` (e,) is the vertex whose lists put the last mark on an edge.
     The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`, and `sought` is
     the edge to which the `line` goes.
     """
@@ -128,13 +131,17 @@ class _Bends(Ray):
     bend: cython.double[3]
     share: cython.double
     sought: cython.int
-    n_fits: cython.int[::1]
     at_end: cython.int[::1]
     first_at_end: cython.int[::1]
+    fit_of: cython.int[::1]
     newest: cython.int[::1]
-    offered_to: cython.int[::1]
+    best: cython.int[::1]
+    met: cython.int[::1]
+    met_by: cython.int[::1]
     offers: cython.pointer[_Offer]
+    lists: cython.pointer[_Met]
     n_offers: cython.int
+    n_lists: cython.int
     n_most: cython.int
     failed: cython.bint
     waiting: PriorityQueue
@@ -143,6 +150,7 @@ class _Bends(Ray):
 
     def __dealloc__(self):
         free(self.offers)
+        free(self.lists)
 
     @cython.cfunc
     @cython.nogil
@@ -174,9 +182,12 @@ class _Bends(Ray):
             else:
                 self.at[i, j] = max(from_a, from_b)
             if j == 2:
-                self.value(a, x)
                 self.has_before[i] = self.way[a] > -2
+                if self.way[a] >= 0:
+                    self.around(self.way[a], x, True)
                 for k in range(3):
+                    if self.way[a] == -1:
+                        self.bend[k] = self.body.positions[self.sources[self.label[a]], k]
                     self.before[i, k] = self.bend[k]
         self.lay_flat(i, a, b)
 
@@ -218,21 +229,19 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def value(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """Distance at a point near vertex v, by the way to v; `bend` becomes the point at which this way bends last."""
+        """Distance at a point near vertex v, by the way to v."""
         if self.way[v] >= 0:
-            return self.around(self.way[v], x)
-        source: cython.int = v
-        value: cython.double = self.d[v]
+            return self.around(self.way[v], x, False)
         if self.way[v] == -1:
-            source, value = self.sources[self.label[v]], self.offset[self.label[v]]
-        for k in range(3):
-            self.bend[k] = self.body.positions[source, k]
-        return value + self.body.away(source, x)
+            return self.offset[self.label[v]] + self.body.away(self.sources[self.label[v]], x)
+        return self.d[v] + self.body.away(v, x)
 
     @cython.cfunc
     @cython.nogil
-    def around(self, i: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """Length of the way to a point that bends around an edge last; sets `bend` and `share`."""
+    def around(
+        self, i: cython.int, x: cython.pointer[cython.const[cython.double]], is_placed: cython.bint
+    ) -> cython.double:
+        """Length of the way to a point that bends around an edge last; if it `is_placed`, sets `bend` and `share`."""
         away: cython.double = 0.0
         along: cython.double = 0.0
         for k in range(3):
@@ -241,25 +250,28 @@ class _Bends(Ray):
             along += off * self.tangent[i, k]
         squared: cython.double = max(away - along * along, 0.0)
         best: cython.double = INFINITY
+        place: cython.double = 0.0
+        both: cython.double = 1.0
         if self.fits[i]:
             height: cython.double = sqrt(squared)
-            both: cython.double = height + self.height[i]
-            self.share = self.along[i]
-            if both > 0:
-                self.share = (self.along[i] * height + along * self.height[i]) / both
-            self.share = min(max(self.share / self.length[i], 0.0), 1.0)
-            if 0 < self.share < 1:
+            both = height + self.height[i]
+            place = self.along[i] * height + along * self.height[i]
+            if 0 < place < both * self.length[i]:
                 best = self.start[i] + sqrt((along - self.along[i]) * (along - self.along[i]) + both * both)
         if best == INFINITY:
+            both = 1.0
             for j in range(5):
                 if self.fits[i] and 0 < j < 4:
                     continue
                 off = along - 0.25 * j * self.length[i]
                 through: cython.double = self.at[i, j] + sqrt(squared + off * off)
                 if through < best:
-                    best, self.share = through, 0.25 * j
-        for k in range(3):
-            self.bend[k] = self.body.positions[self.edges[i, 0], k] + self.share * self.length[i] * self.tangent[i, k]
+                    best, place = through, 0.25 * j * self.length[i]
+        if is_placed:
+            self.share = place / (both * self.length[i])
+            for k in range(3):
+                end: cython.double = self.body.positions[self.edges[i, 0], k]
+                self.bend[k] = end + self.share * self.length[i] * self.tangent[i, k]
         return best
 
     @cython.cfunc
@@ -288,56 +300,96 @@ class _Bends(Ray):
         to_a: cython.double = self.d[self.edges[i, 0]]
         to_b: cython.double = self.d[self.edges[i, 1]]
         is_new: cython.bint = self.at[i, 0] > to_a * (1 + GAIN) or self.at[i, 4] > to_b * (1 + GAIN)
-        if is_new and max(to_a, to_b) < INFINITY and self.n_fits[i] < _MOST_FITS:
-            self.sought, self.offered_to[i] = i, _NONE
+        if is_new and max(to_a, to_b) < INFINITY and self.fit_of[i] & _MOST_FITS < _MOST_FITS:
+            self.sought, self.met_by[i] = i, _NONE
             self.fit(i)
-            self.n_fits[i] += 1
+            self.fit_of[i] += 1
             self.offer_around(i, self.edges[i, 0])
             self.offer_around(i, self.edges[i, 1])
 
     @cython.cfunc
     @cython.nogil
     def offer_around(self, i: cython.int, u: cython.int) -> cython.void:
-        """Make an edge a candidate for the neighbours of u to which it is none."""
+        """Make an edge a candidate for the neighbours of u."""
         for m in range(self.body.first_neighbour[u], self.body.first_neighbour[u + 1]):
-            v: cython.int = self.body.neighbours[m]
-            if self.d[v] < INFINITY and self.around(i, cython.address(self.body.positions[v, 0])) >= self.most(v):
-                continue
-            k: cython.int = self.newest[v]
-            while k >= 0 and (self.offers[k].edge != i or self.offers[k].fit != self.n_fits[i]):
-                k = self.offers[k].next
-            if k < 0:
-                self.offer(i, v)
+            self.offer(i, self.body.neighbours[m])
 
     @cython.cfunc
     @cython.nogil
     def offer_at(self, a: cython.int, v: cython.int) -> cython.void:
-        """Make the edges that end at a candidates for v, whose list has just been read."""
+        """Make the edges that end at a candidates for v, whose marks are on those that it has met."""
         for k in range(self.first_at_end[a], self.first_at_end[a + 1]):
             i: cython.int = self.at_end[k]
-            if self.n_fits[i] > 0 and self.offered_to[i] != v:
-                self.offered_to[i] = v
+            if self.fit_of[i] & _MOST_FITS and self.met_by[i] != v:
+                self.met_by[i] = v
                 self.offer(i, v)
 
     @cython.cfunc
     @cython.nogil
     def offer(self, i: cython.int, v: cython.int) -> cython.void:
-        """Make an edge a candidate for v, which waits if the way around it would be shorter."""
-        if self.n_offers == self.n_most:
-            room: cython.size_t = (2 * cython.cast(cython.size_t, self.n_most) + 1024) * cython.sizeof(_Offer)
-            more: cython.p_void = realloc(self.offers, room)
-            if more == cython.NULL:
-                self.failed = True
-                return
-            self.n_most, self.offers = 2 * self.n_most + 1024, cython.cast(cython.pointer[_Offer], more)
+        """Make an edge a candidate for v, which waits, if the way around it would be shorter and v has not met it."""
+        value: cython.double = self.around(i, cython.address(self.body.positions[v, 0]), False)
+        if value >= self.most(v) or self.has_met(v, self.fit_of[i]) or self.lacks_room():
+            return
+        k: cython.int = self.met[v]
+        if k < 0 or self.lists[k].count == 14:
+            k = self.n_lists
+            for m in range(14):
+                self.lists[k].fits[m] = _NONE
+            self.lists[k].count, self.lists[k].next = 0, self.met[v]
+            self.met[v], self.n_lists = k, self.n_lists + 1
+        self.lists[k].fits[self.lists[k].count] = self.fit_of[i]
+        self.lists[k].count += 1
+        if v == self.edges[i, 0] or v == self.edges[i, 1] or not self.is_hidden_from_before(i, v):
+            return
         one: cython.pointer[_Offer] = cython.address(self.offers[self.n_offers])
-        one.edge, one.fit, one.next, one.asked, one.value = i, self.n_fits[i], self.newest[v], False, INFINITY
+        one.fit, one.next, one.asked, one.value = self.fit_of[i], self.newest[v], False, value
+        if self.best[v] < 0 or value * (1 + GAIN) < self.offers[self.best[v]].value:
+            self.best[v] = self.n_offers
         self.newest[v], self.n_offers = self.n_offers, self.n_offers + 1
-        value: cython.double = self.around(i, cython.address(self.body.positions[v, 0]))
-        is_end: cython.bint = v == self.edges[i, 0] or v == self.edges[i, 1]
-        if not is_end and value < self.most(v) and self.is_hidden_from_before(i, v):
-            one.value = value
-            self.waiting.set_key(v, max(self.waiting.key[v], 1 / value))
+        self.waiting.set_key(v, max(self.waiting.key[v], 1 / value))
+
+    @cython.cfunc
+    @cython.nogil
+    def has_met(self, v: cython.int, fit: cython.int) -> cython.bint:
+        """Whether an edge has been offered to v since it was fitted last."""
+        k: cython.int = self.met[v]
+        while k >= 0:
+            found: cython.int = 0
+            for m in range(14):
+                found |= self.lists[k].fits[m] == fit
+            if found:
+                return True
+            k = self.lists[k].next
+        return False
+
+    @cython.cfunc
+    @cython.nogil
+    def mark_met(self, v: cython.int) -> cython.void:
+        """Put marks on the edges that v has met."""
+        k: cython.int = self.met[v]
+        while k >= 0:
+            for m in range(self.lists[k].count):
+                fit: cython.int = self.lists[k].fits[m]
+                if fit == self.fit_of[fit >> _FIT_BITS]:
+                    self.met_by[fit >> _FIT_BITS] = v
+            k = self.lists[k].next
+
+    @cython.cfunc
+    @cython.nogil
+    def lacks_room(self) -> cython.bint:
+        """Whether there is no memory for one more offer and one more list."""
+        if max(self.n_offers, self.n_lists) == self.n_most:
+            most: cython.size_t = 2 * cython.cast(cython.size_t, self.n_most) + 1024
+            offers: cython.p_void = realloc(self.offers, most * cython.sizeof(_Offer))
+            if offers != cython.NULL:
+                self.offers = cython.cast(cython.pointer[_Offer], offers)
+            lists: cython.p_void = realloc(self.lists, most * cython.sizeof(_Met))
+            if lists != cython.NULL:
+                self.lists = cython.cast(cython.pointer[_Met], lists)
+            self.failed = offers == cython.NULL or lists == cython.NULL
+            self.n_most = 0 if self.failed else cython.cast(cython.int, most)
+        return self.failed
 
     @cython.cfunc
     @cython.inline
@@ -348,29 +400,38 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def shortest(self, v: cython.int) -> cython.int:
-        """The candidate of v around which the way is the shortest, of equal ones the oldest; v waits for its turn."""
+    def is_left(self, k: cython.int, v: cython.int) -> cython.bint:
+        """Whether an offer to v is still to be asked for."""
+        fit: cython.int = self.offers[k].fit
+        return fit == self.fit_of[fit >> _FIT_BITS] and self.offers[k].value < self.most(v)
+
+    @cython.cfunc
+    @cython.nogil
+    def shortest(self, v: cython.int) -> cython.void:
+        """Find the `best` candidate of v, of equal ones the oldest, and drop those that are done."""
         least: cython.double = INFINITY
-        best: cython.int = _NONE
-        k: cython.int = self.newest[v]
-        while k >= 0:
-            one: cython.pointer[_Offer] = cython.address(self.offers[k])
-            if one.fit == self.n_fits[one.edge]:
-                self.offered_to[one.edge] = v
-                if one.value < self.most(v) and one.value <= least * (1 + GAIN):
-                    best, least = k, one.value
-            k = one.next
+        self.best[v] = _NONE
+        link: cython.pointer[cython.int] = cython.address(self.newest[v])
+        while link[0] >= 0:
+            one: cython.pointer[_Offer] = cython.address(self.offers[link[0]])
+            if not self.is_left(link[0], v):
+                link[0] = one.next
+                continue
+            if one.value <= least * (1 + GAIN):
+                self.best[v], least = link[0], one.value
+            link = cython.address(one.next)
         self.waiting.set_key(v, 1 / least)
-        return best
 
     @cython.cfunc
     @cython.nogil
     def ask(self, v: cython.int) -> cython.void:
         """Give v the way around its first candidate if the line is clear, and offer the edge to the neighbours."""
-        k: cython.int = self.shortest(v)
+        if self.best[v] < 0 or not self.is_left(self.best[v], v):
+            self.shortest(v)
+        k: cython.int = self.best[v]
         if k < 0:
             return
-        i: cython.int = self.offers[k].edge
+        i: cython.int = self.offers[k].fit >> _FIT_BITS
         value: cython.double = self.offers[k].value
         if value >= self.d[v] * (1 - GAIN):
             self.offers[k].value = INFINITY
@@ -379,14 +440,16 @@ class _Bends(Ray):
             return
         if not self.offers[k].asked:
             self.offers[k].asked = True
+            self.mark_met(v)
             self.offer_at(self.edges[i, 0], v)
             self.offer_at(self.edges[i, 1], v)
             if self.waiting.key[v] * value > 1 + GAIN:
                 return
         self.offers[k].value = INFINITY
-        self.around(i, cython.address(self.body.positions[v, 0]))
+        self.around(i, cython.address(self.body.positions[v, 0]), True)
         self.sought = i
         if not self.is_seen_by(v, self.bend, i):
+            self.mark_met(v)
             for c in range(1, 4):
                 self.offer_at(self.body.cells[self.line.t, (self.line.out + c) & 3], v)
             self.shortest(v)

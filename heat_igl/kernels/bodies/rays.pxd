@@ -60,8 +60,8 @@ cdef class Ray:
     cdef int begins(self, Line* line, int v, int i) noexcept nogil
     cdef bint is_near(self, Line* line, int v) noexcept nogil
     cdef bint arrives_from(self, Line* line, int begin) noexcept nogil
-    cdef bint arrives(self, Line* line, int begin, int into, int toward) noexcept nogil
-    cdef int step(self, Line* line) noexcept nogil
+    cdef int arrives(self, Line* line, int begin, int into, int toward) noexcept nogil
+    cdef bint is_blocked(self, Line* line, double room) noexcept nogil
     cdef int cone(self, Line* line, int v) noexcept nogil
     cdef void aim(self, Line* line, int t, int into, double nudge, int toward) noexcept nogil
     cdef bint leaves(self, Line* line, int k, double part) noexcept nogil

@@ -3,6 +3,7 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, ON_SIDE, Line
+from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.libc.math import fabs, sqrt
 
 # What lies behind a side that has not been looked at.
@@ -183,60 +184,39 @@ class Ray:
 
     def arrives_from(self, line: cython.pointer[Line], begin: cython.int) -> cython.bint:
         """Whether the line that begins in the tetrahedron of a corner arrives."""
-        return self.arrives(line, begin, -1, -1)
+        return self.arrives(line, begin, -1, -1) > 0
 
     def arrives(
         self, line: cython.pointer[Line], begin: cython.int, into: cython.int, toward: cython.int
-    ) -> cython.bint:
-        """Whether the line arrives before it leaves the body; it begins and ends as `aim` moves it."""
+    ) -> cython.int:
+        """What `_step` says in the end, or -2 if it does not end; the line begins and ends as `aim` moves it."""
         self.aim(line, begin // 4, into, NUDGE, toward)
         for i in range(4):
             k: cython.int = begin // 4 * 4 + ((begin + i) & 3)
             if self.leaves(line, k, 0.0):
                 break
         else:
-            return False
+            return -2
         line.t, line.out = k >> 2, k & 3
         for i in range(3):
             line.x[i] *= line.sign
             line.has[i] = _has(line, line.corner[i])
         for _steps in range(_MOST_STEPS):
-            found: cython.int = self.step(line)
+            found: cython.int = _step(self.body, line)
             if found != 0:
-                return found > 0
-        return False
+                return found
+        return -2
 
-    def step(self, line: cython.pointer[Line]) -> cython.int:
-        """Go on to the next tetrahedron: 1 if the line has arrived, -1 if it has left the body, else 0."""
-        if line.has[0] & line.has[1] & line.has[2] & 4:
-            return 1
-        k: cython.int = self.body.cells[line.t, 4 + line.out]
-        if k < 0:
-            return -1
-        line.t = k >> 2
-        corners: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[line.t, 0])
-        o: cython.int = corners[k & 3]
-        has_o: cython.int = _has(line, o)
-        if (line.has[0] | line.has[1] | line.has[2] | has_o) & 3 == 3:
-            return 1
-        at: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[o, 0])
-        z: cython.double = at[line.up] - line.p_z
-        x: cython.double = line.sign * (at[line.east] - line.p_x - line.tilt_x * z)
-        y: cython.double = at[line.north] - line.p_y - line.tilt_y * z
-        of_a: cython.double = x * line.y[0] - y * line.x[0]
-        of_b: cython.double = x * line.y[1] - y * line.x[1]
-        of_c: cython.double = x * line.y[2] - y * line.x[2]
-        # The line leaves through the triangle of o and two corners, which are on both sides.
-        no_c: cython.int = (of_a >= 0) & (of_b <= 0)
-        no_a: cython.int = (of_b >= 0) & (of_c <= 0)
-        if not no_c | no_a | ((of_c >= 0) & (of_a <= 0)):
-            return -1
-        # Without a branch, which no processor foresees.
-        k = 2 * no_c + (1 - no_c) * (1 - no_a)
-        u: cython.int = line.corner[k]
-        line.out = (corners[1] == u) + 2 * (corners[2] == u) + 3 * (corners[3] == u)
-        line.corner[k], line.has[k], line.x[k], line.y[k] = o, has_o, x, y
-        return 0
+    def is_blocked(self, line: cython.pointer[Line], room: cython.double) -> cython.bint:
+        """Whether the line has left the body through a wall that all lines within this distance of it meet as well."""
+        for i in range(3):
+            j: cython.int = (i + 1) % 3
+            x: cython.double = line.x[j] - line.x[i]
+            y: cython.double = line.y[j] - line.y[i]
+            of_side: cython.double = line.x[i] * line.y[j] - line.y[i] * line.x[j]
+            if of_side <= 0 or of_side * of_side <= room * room * (x * x + y * y):
+                return False
+        return True
 
     def cone(self, line: cython.pointer[Line], v: cython.int) -> cython.int:
         """The corner ``4 t + corner`` at v through whose tetrahedron the line to the goal begins, well inside; else -1.
@@ -324,3 +304,41 @@ class Ray:
 def _has(line: cython.pointer[Line], v: cython.int) -> cython.int:
     """What a tetrahedron `has` with v."""
     return (v == line.goal_a) + 2 * (v == line.goal_b) + 4 * (line.lit[v] == line.stamp)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _step(body: Body, line: cython.pointer[Line]) -> cython.int:
+    """Go on to the next tetrahedron: 1 if the line has arrived, -1 at a wall, -2 if there is none, else 0."""
+    if line.has[0] & line.has[1] & line.has[2] & 4:
+        return 1
+    k: cython.int = (cython.address(body.cells[0, 0]) + 8 * line.t)[4 + line.out]
+    if k < 0:
+        return -1
+    line.t = k >> 2
+    corners: cython.pointer[cython.const[cython.int]] = cython.address(body.cells[0, 0]) + 8 * (k >> 2)
+    for c in range(4):
+        prefetch(cython.address(body.cells[0, 0]) + 8 * (corners[4 + c] >> 2))
+    o: cython.int = corners[k & 3]
+    has_o: cython.int = _has(line, o)
+    if (line.has[0] | line.has[1] | line.has[2] | has_o) & 3 == 3:
+        return 1
+    at: cython.pointer[cython.const[cython.double]] = cython.address(body.positions[0, 0]) + 3 * o
+    z: cython.double = at[line.up] - line.p_z
+    x: cython.double = line.sign * (at[line.east] - line.p_x - line.tilt_x * z)
+    y: cython.double = at[line.north] - line.p_y - line.tilt_y * z
+    of_a: cython.double = x * line.y[0] - y * line.x[0]
+    of_b: cython.double = x * line.y[1] - y * line.x[1]
+    of_c: cython.double = x * line.y[2] - y * line.x[2]
+    # The line leaves through the triangle of o and two corners, which are on both sides.
+    no_c: cython.int = (of_a >= 0) & (of_b <= 0)
+    no_a: cython.int = (of_b >= 0) & (of_c <= 0)
+    if not no_c | no_a | ((of_c >= 0) & (of_a <= 0)):
+        return -2
+    # Without a branch, which no processor foresees.
+    k = 2 * no_c + (1 - no_c) * (1 - no_a)
+    u: cython.int = line.corner[k]
+    line.out = (corners[1] == u) + 2 * (corners[2] == u) + 3 * (corners[3] == u)
+    line.corner[k], line.has[k], line.x[k], line.y[k] = o, has_o, x, y
+    return 0

@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, Body, Line, Ray
+from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, Body, Line, Ray
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.libc.math import INFINITY
 
@@ -164,10 +164,15 @@ class _Sight(Ray):
         into: cython.int = self.body.incident[self.body.first[self.sources[self.sought]]] // 4
         if self.turns[self.sought]:
             into = -1
+        room: cython.double = self.body.reach[self.body.cells[begin >> 2, begin & 3]]
+        room = 2 * NUDGE * (room + self.body.reach[self.sources[self.sought]])
         for toward in range(-1, 4 if self.is_concave else 0):
             if toward == begin % 4:
                 continue
-            if self.arrives(line, begin, into, toward):
+            found: cython.int = self.arrives(line, begin, into, toward)
+            if found > 0:
                 return True
+            if found == -1 and self.is_blocked(line, room):
+                return False
             into = -1
         return False
