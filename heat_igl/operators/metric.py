@@ -15,7 +15,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intri
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
-from heat_igl.operators.metric_simplices import MetricSimplices, inverse_root
+from heat_igl.operators.metric_simplices import MetricSimplices, equal_runs, inverse_root
 from heat_igl.operators.suitability import mean_angle_defect
 from heat_igl.operators.triangles import check_measures, edge_length_operators, intrinsic_operators, longest_sides
 from heat_igl.plan import hopf_lax_is_nearer
@@ -102,7 +102,9 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
     g = real_numbers("metric", metric)
     if g.shape == (mesh.n_vertices, 3, 3) and mesh.n_vertices != mesh.n_faces:
         return _of_smooth_metric(mesh, *_checked_at_corners(g, mesh), laplacian)
-    domain = operators_in_metric(mesh, *_checked(g, mesh), laplacian)
+    if mesh.is_tetrahedral:
+        return _TetrahedronOperators(mesh, *_checked(g, mesh))
+    domain = operators_in_metric(mesh, *_checked(g, mesh)[:3], laplacian)
     if domain.surface is None:
         return domain
     return replace(domain, metric=MetricSides(mesh, metric))
@@ -157,13 +159,17 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
         )
     remedy = "remove faces that cannot be crossed"
     raise_at_first(~((s > 0) & np.isfinite(s)), "speed", s, "must be positive and finite", remedy)
-    if not mesh.edge_lengths.all():
+    if mesh.is_tetrahedral or not mesh.edge_lengths.all():
         check_measures(mesh)
     largest = _LARGEST**0.5
     outside = (s < 1 / largest) | (s > largest)
     raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
-    root = np.eye(p) * s[:, None, None]
-    domain = operators_in_metric(mesh, np.eye(p) / s[:, None, None] ** 2, 1 / float(s.max()), root)
+    first, group = equal_runs(s) if mesh.is_tetrahedral else (slice(None), None)
+    each = s[first, None, None]
+    in_metric = np.eye(p) / each**2, 1 / float(s.max()), np.eye(p) * each
+    if mesh.is_tetrahedral:
+        return _TetrahedronOperators(mesh, *in_metric, group)
+    domain = operators_in_metric(mesh, *in_metric)
     if domain.surface is None:
         return domain
     return replace(domain, metric=MetricSides(mesh, np.eye(3) / s[:, None, None] ** 2))
@@ -264,12 +270,10 @@ def _squared_factor(name: str, given: ArrayLike, k: int) -> FloatArray:
 def operators_in_metric(
     mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None = None, laplacian: Laplacian = "auto"
 ) -> Operators:
-    """`metric_operators` of a checked mesh and metric g (m, p, p), in the planes of triangles or in space.
+    """`metric_operators` of checked triangles and metrics g (m, 2, 2) in their planes.
 
-    No unit vector is shorter than `least` in it. The inverse root (m, p, p) may be given.
+    No unit vector is shorter than `least` in it. The inverse root (m, 2, 2) may be given.
     """
-    if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, MetricSimplices.in_metric(mesh, g, least, root=root), g)
     corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
     along = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     own = np.sqrt(((along @ g) * along).sum(axis=2))
@@ -299,9 +303,9 @@ def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None =
 
 def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, root: FloatArray, laplacian: Laplacian) -> Operators:
     """The operators of simplices with a metric (n, 3, 3) at each vertex, as `operators_in_metric`."""
-    simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
     if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, simplices, g)
+        return _TetrahedronOperators(mesh, g, least, root)
+    simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
     axes = plane_axes(mesh)
     inside = axes @ g[mesh.F].mean(axis=1) @ np.swapaxes(axes, 1, 2)
     sides = simplices.edges[1].reshape(-1, 3)[:, ::-1]  # opposite each corner
@@ -359,12 +363,13 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
 
 
 class _TetrahedronOperators(Operators):
-    """The operators of tetrahedra in a metric, made on first use: `simplices` need none."""
+    """Those of tetrahedra in metrics of each `group` (m,) or vertex, made on first use: `simplices` need none."""
 
-    def __init__(self, mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> None:
-        vars(self).update(_of=(mesh, simplices, g), simplices=simplices, is_surface=False)
+    def __init__(self, mesh: Mesh, g: FloatArray, least: float, root: FloatArray, group: Any = None) -> None:
+        simplices = MetricSimplices.in_metric(mesh, g, least, group is None, root, group)
+        vars(self).update(_of=(mesh, simplices, g, group), simplices=simplices, is_surface=False)
 
-    _of: tuple[Mesh, MetricSimplices, FloatArray]
+    _of: tuple[Mesh, MetricSimplices, FloatArray, AnyArray | None]
 
     @property
     def n(self) -> int:
@@ -386,10 +391,10 @@ class _TetrahedronOperators(Operators):
         return getattr(self._made, name)
 
 
-def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray) -> Operators:
+def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray, group: AnyArray | None) -> Operators:
     """The operators of tetrahedra with a metric on each or at each vertex for heat, and `simplices` for distance."""
     m, n = mesh.n_faces, mesh.n_vertices
-    g = g if len(g) == m else g[mesh.F].mean(axis=1)
+    g = g[mesh.F].mean(axis=1) if group is None else g[group]
     # Each in a space of its own: edges times C have the lengths of the metric C C^T.
     corners = mesh.V[mesh.F]
     corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)
@@ -434,8 +439,8 @@ def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths
     )
 
 
-def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray]:
-    """The metric (m, p, p) in the planes of triangles or in space, its least length, and its inverse root."""
+def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray, Any]:
+    """The metric (k, p, p), least length and inverse root in planes of triangles, or of groups (m,) of tetrahedra."""
     m, p = mesh.n_faces, mesh.F.shape[1] - 1
     shapes = [(m, 3, 3), (mesh.n_vertices, 3, 3)] + [(m, 2, 2)] * (p == 2)
     if g.shape not in (shapes[0], *shapes[2:]):
@@ -447,8 +452,9 @@ def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray]:
     if p < g.shape[1]:
         axes = plane_axes(mesh)
         symmetric = np.asarray(axes @ symmetric @ np.swapaxes(axes, 1, 2), np.float64)
-    root, smallest = inverse_root(symmetric)
-    return symmetric, float(np.sqrt(least_eigenvalue("metric", smallest, g))), root
+    first, group = equal_runs(symmetric) if p == 3 else (slice(None), slice(None))
+    root, smallest = inverse_root(symmetric[first])
+    return symmetric[first], float(np.sqrt(least_eigenvalue("metric", smallest[group], g))), root, group
 
 
 def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.kernels.mesh import incidence
 from heat_igl.kernels.sweep.simplex_metrics import lengths_in_velocity
 from heat_igl.mesh import Mesh
 from heat_igl.operators.metric_derivatives import plane_axes
@@ -36,8 +37,9 @@ class MetricSimplices:
         Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
     lengths : (m, pairs) float64 or None
         Distances between the corners, pairs in the order of `np.tril_indices`, if not those in `tensors`.
-    tensors : (m, 1, 3, 3) float64 or None
-        A metric of each simplex; lengths are distances in space if there are neither tensors nor velocities.
+    tensors, group : (k, 3, 3) float64, (m,) int32, or None
+        Metrics, and which of them each simplex has; lengths are distances in space if there are neither these nor
+        velocities.
     velocity : (k, 6) float64 or None
         Inverse roots of metrics; across a triangle it is the mean in its plane. Of the symmetric matrix the entries on
         and above the diagonal, row by row.
@@ -54,6 +56,7 @@ class MetricSimplices:
     least: float = 1.0
     lengths: FloatArray | None = None
     tensors: FloatArray | None = None
+    group: AnyArray | None = None
     velocity: FloatArray | None = None
     rows: AnyArray | None = None
     is_given: bool = False
@@ -65,14 +68,14 @@ class MetricSimplices:
 
     @classmethod
     def in_metric(
-        cls, mesh: Mesh, g: FloatArray, least: float, at_vertices: bool = False, root: FloatArray | None = None
+        cls, mesh: Mesh, g: FloatArray, least: float, at_vertices: bool = False, root: Any = None, group: Any = None
     ) -> MetricSimplices:
         """The faces of a mesh with a metric (m, 3, 3) on each, or (n, 3, 3) at each vertex, and its `least` length.
 
         Where it is the same everywhere, distance is that in space after a linear map. The inverse root may be given,
-        for triangles in the plane of each, (m, 2, 2) or (m, 3, 2, 2).
+        for triangles in the plane of each, (m, 2, 2) or (m, 3, 2, 2). Tetrahedra may have metrics (k, 3, 3) by `group`.
         """
-        p = mesh.F.shape[1] - 1
+        p, corners = mesh.F.shape[1] - 1, mesh.F.astype(np.int32)
         if p == 3 and np.abs(g - g[0]).max() <= _ROUNDING * np.abs(g[0]).max():
             # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
             mapped = cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(g[0]), mesh.F))
@@ -89,21 +92,21 @@ class MetricSimplices:
         else:
             W = (inverse_root(g)[0] if root is None else root)[:, None]
         velocity: FloatArray | None = W[..., *_ABOVE]
-        rows: AnyArray = mesh.F.astype(np.int32)
+        rows: AnyArray = corners
         if not at_vertices:
+            group = np.arange(len(corners), dtype=np.int32) if group is None else group
             planes = None if across is None else across[:, 0][:, *_ABOVE]
-            velocity, rows, fitted = _at_corners(mesh, W[:, 0][:, *_ABOVE], planes)
+            velocity, rows, fitted = _at_corners(mesh.V, corners, W[:, 0][:, *_ABOVE], group, planes)
             least = min(least, fitted)
         if velocity is None:
-            return cls(mesh.F, mesh.n_vertices, mesh.V, least, None, g[:, None], is_given=p == 3)
+            return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3)
         if across is not None:
             if not at_vertices:
                 inside = (np.eye(3) - across) @ _symmetric(velocity[rows]) @ (np.eye(3) - across)
                 velocity = _with_normal(inside, across)[..., *_ABOVE]
             rows = np.arange(mesh.F.size, dtype=np.int32).reshape(mesh.F.shape)
         velocity = np.ascontiguousarray(velocity).reshape(-1, 6)
-        corners = rows if p == 3 and at_vertices else mesh.F
-        return cls(corners, mesh.n_vertices, mesh.V, least, None, None, velocity, rows, at_vertices)
+        return cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows, at_vertices)
 
     @classmethod
     def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
@@ -113,7 +116,7 @@ class MetricSimplices:
         a, b, c = sides.T**2
         products = np.stack([c, (b + c - a) / 2, (b + c - a) / 2, b], axis=1).reshape(-1, 2, 2)
         tensors = across @ products @ np.swapaxes(across, 1, 2)
-        return cls(F, len(V), V, least, sides[:, ::-1], tensors[:, None])
+        return cls(F, len(V), V, least, sides[:, ::-1], tensors, np.arange(len(F)))
 
     @cached_property
     def measured(self) -> tuple[Any, ...]:
@@ -125,14 +128,14 @@ class MetricSimplices:
         if lengths is None:
             one, other = np.tril_indices(self.corners.shape[1], -1)
             e = self.place[self.corners[:, one]] - self.place[self.corners[:, other]]
-            lengths = np.sqrt(((e if self.tensors is None else e @ self.tensors[:, 0]) * e).sum(axis=2))
+            lengths = np.sqrt(((e if self.tensors is None else e @ self.tensors[self.group]) * e).sum(axis=2))
         mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths))
         return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0.0
 
     def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:
         """The tensors (..., 3, 3) of chosen simplices (...) at corners (...)."""
-        if self.tensors is not None:
-            return np.asarray(self.tensors[chosen, 0])
+        if self.tensors is not None and self.group is not None:
+            return np.asarray(self.tensors[self.group[chosen]])
         if self.velocity is None or self.rows is None:
             raise ValueError("these simplices have lengths, and no tensors")
         W = _symmetric(self.velocity[self.rows[chosen, corner]])
@@ -214,29 +217,73 @@ def _symmetric(above: FloatArray) -> FloatArray:
     return full
 
 
-def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[FloatArray | None, AnyArray, float]:
-    """The velocities W (m, 6) of simplices as samples of a smooth field, with the row at each corner (m, p + 1).
+def equal_runs(values: AnyArray) -> tuple[IntArray, AnyArray]:
+    """The first (k,) of each run of equal rows (m, ...), as of the simplices of a voxel, and the run (m,) int32."""
+    is_new = np.ones(len(values), bool)
+    is_new[1:] = (values[1:] != values[:-1]).reshape(len(values) - 1, -1).any(axis=1)
+    return np.flatnonzero(is_new), np.cumsum(is_new, dtype=np.int32) - np.int32(1)
 
-    Around each vertex, a linear function is fitted. The velocities at the corners of a simplex are taken from it if at
-    each it explains all of the variance and is positive definite, and are those of the simplex if it leaves a quarter
-    or more at one, as it leaves of a step: jumps stay where they are. What varies since triangles, with the projections
-    `across` (m, 6) on their normals, have other planes, counts as left. None if the field is smooth nowhere. The third
-    result is the least length of a unit vector at vertices.
+
+def _at_corners(
+    V: FloatArray, F: AnyArray, W: FloatArray, group: AnyArray, across: FloatArray | None
+) -> tuple[FloatArray | None, AnyArray, float]:
+    """The velocities W (k, 6) of groups (m,) of simplices as samples of a smooth field, with the row at each corner.
+
+    Those at the corners of a simplex are `_fitted` if at each this explains all of the variance and is positive
+    definite, and are those of the simplex if it leaves a quarter or more at one, as it leaves of a step: jumps stay
+    where they are. None if the field is smooth nowhere. The third result is the least length of a unit vector at
+    vertices.
     """
-    F, n, size = mesh.F, mesh.n_vertices, mesh.F.shape[1]
+    at_vertex, share = _fitted(V, F, W, group, across)
+    if not (share > _ROUNDING).any():
+        return None, F, np.inf
+    sizes = np.linalg.eigvalsh(_symmetric(at_vertex))
+    share[sizes[:, 0] <= 0] = 0
+    of_simplex = reduce(np.minimum, (share[corner] for corner in F.T))
+    # Corners that meet in a vertex have a row together where their velocities are equal.
+    first, incident = incidence.corners_by_vertex(F, len(V))
+    v, simplex = np.repeat(np.arange(len(V), dtype=np.int32), np.diff(first)), incident // np.int32(F.shape[1])
+    share, is_new = of_simplex[simplex], np.ones(len(v), bool)
+    share[share >= 1 - _ROUNDING] = 1
+    own = np.where(share < 1, group[simplex], np.int32(-1))
+    is_new[1:] = (v[1:] != v[:-1]) | (own[1:] != own[:-1]) | (share[1:] != share[:-1])
+    rows = np.empty(F.size, np.int32)
+    rows[incident] = np.cumsum(is_new, dtype=np.int32) - np.int32(1)
+    velocity, own, share = at_vertex[v[is_new]], own[is_new], share[is_new, None]
+    del incident, simplex, v, is_new
+    alone = W[own] * (share < 1)
+    velocity -= alone
+    velocity *= share
+    velocity += alone
+    return velocity, rows.reshape(F.shape), float(1 / sizes.max())
+
+
+def _fitted(
+    V: FloatArray, F: AnyArray, W: FloatArray, group: AnyArray, across: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """The velocity (n, 6) at each vertex of a linear function fitted around it, and how far it holds there, up to 1.
+
+    It holds as far as it explains the variance around the vertex. What varies since triangles, with the projections
+    `across` (m, 6) on their normals, have other planes, counts as left.
+    """
+    (m, size), n = F.shape, len(V)
     off = np.where(_ABOVE[0] == _ABOVE[1], 1, np.sqrt(2))  # for the norm of symmetric matrices
-    level = (W * off).mean(axis=0)
-    values = np.ascontiguousarray(W * off - level)
-    X = mesh.V - mesh.V.mean(axis=0)
-    of_corners = sp.csr_array((np.ones(F.size), F.ravel(), np.arange(0, F.size + 1, size)), shape=(len(F), n))
-    at = of_corners.T.tocsr()
-    ring = at @ of_corners
-    ring.data[:] = 1
-    by = np.concatenate([np.ones((len(F), 1)), of_corners @ X / size], axis=1)
-    planes = np.empty((len(F), 0)) if across is None else across * off
-    row = np.concatenate([by, values, np.einsum("mk,mk->m", values, values)[:, None], planes], axis=1)
+    level = np.bincount(group) @ (W * off) / m
+    values = W * off - level
+    X = V - V.mean(axis=0)
+    of_corners = sp.csr_array((np.ones(F.size, np.int32), F.ravel(), np.arange(0, F.size + 1, size)), shape=(m, n))
+    at = of_corners.T
+    count = of_corners.sum(axis=0, dtype=np.float64)
+    others = (at @ of_corners).astype(bool) @ count / size - 1
+    by = [np.ones(m), *(of_corners @ x / size for x in X.T)]
+    row = [*values.T, np.einsum("mk,mk->m", values, values), *([] if across is None else (across * off).T)]
     # Around a vertex: the simplices at it and at the other corners of these.
-    means = np.stack([at @ (of_corners @ (at @ (x[:, None] * row))) for x in by.T], axis=1)
+    means = np.empty((n, 4, 4 + len(row)))
+    for k, column in enumerate([*by, *row]):
+        of_simplex = column if k < 4 else column[group]
+        for j, x in enumerate(by):
+            means[:, j, k] = at @ (of_corners @ (at @ (x * of_simplex)))
+    del by, row, x, column, of_simplex
     means /= np.maximum(means[:, :1, :1], 1)
     middle, mean, square = means[:, 0, 1:4], means[:, 0, 4:10], means[:, 0, 10]
     about = means[:, 1:, 1:10] - middle[:, :, None] * means[:, :1, 1:10]
@@ -250,27 +297,13 @@ def _at_corners(mesh: Mesh, W: FloatArray, across: FloatArray | None) -> tuple[F
         explained -= (1 - (means[:, 0, 11:] ** 2).sum(axis=1)) * ((mean + level) ** 2).sum(axis=1)
     left = 1 - explained / np.where(is_constant, 1, variance)
     # Of no more simplices than it has coefficients, a function explains all: the adjusted coefficient of determination.
-    others = ring @ at.sum(axis=1) / size - 1
     free = others - np.einsum("nij,nji->n", inverse, about[..., :3])
     left = np.where(free > 0, left * others / np.where(free > 0, free, 1), 1)
     share = np.clip(1 - 4 * left, 0, 1) * ~is_constant
-    if not (share > _ROUNDING).any():
-        return None, F, np.inf
     found = mean + np.einsum("nk,nkl->nl", X - middle, fitted)
-    count = np.maximum(at.sum(axis=1), 1)[:, None]
-    least = share[F].min(axis=1)[:, None]
-    for _ in range(3):
-        # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
-        found += at @ ((values - of_corners @ found / size) * least) / count
-    at_vertex = (found + level) / off
-    sizes = np.linalg.eigvalsh(_symmetric(at_vertex))
-    least[(sizes[:, 0] <= 0)[F].any(axis=1)] = 0
-    del row, values, by, of_corners, at, ring  # what follows is as large
-    own, rows = np.flatnonzero(least < 1 - _ROUNDING), F.astype(np.int32)
-    rows[own] = np.arange(n, n + own.size * size).reshape(-1, size)
-    velocity = np.concatenate([at_vertex, at_vertex[F[own].ravel()]])
-    blend = velocity[n:].reshape(-1, size, 6)
-    blend -= W[own, None]
-    blend *= least[own, None]
-    blend += W[own, None]
-    return velocity, rows, float(1 / sizes.max())
+    del means, mean, about, slope, inverse, fitted
+    # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
+    least = reduce(np.minimum, (share[corner] for corner in F.T))
+    for _, k in np.ndindex(3, 6):
+        found[:, k] += at @ ((values[group, k] - of_corners @ found[:, k] / size) * least) / np.maximum(count, 1)
+    return (found + level) / off, share

@@ -428,10 +428,10 @@ class FixedPointDerivative(SimplexDerivative):
 
     def by_speed(self, g: ArrayLike) -> FloatArray:
         """The gradient (m,) by the speeds given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
-        by_metric, tensors = self.by_metric(g), self._simplices.tensors
-        if tensors is None or self._simplices.velocity is not None:
+        by_metric, simplices = self.by_metric(g), self._simplices
+        if simplices.tensors is None:
             raise ValueError("the solver knows no speeds, but a metric at the vertices: use by_metric")
-        return np.asarray(-2 * np.trace(by_metric, axis1=1, axis2=2) * tensors[:, 0, 0, 0] ** 1.5)
+        return np.asarray(-2 * np.trace(by_metric, axis1=1, axis2=2) * simplices.tensors[simplices.group, 0, 0] ** 1.5)
 
     def _moved(self, dV: FloatArray) -> FloatArray:
         change = np.zeros_like(self._state)
