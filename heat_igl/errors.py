@@ -238,11 +238,23 @@ def raise_at_first(
     remedy: str = "",
     error: type[ValueError] = ValueError,
 ) -> None:
-    """Raise an `error` that names the first of the `values` (k, ...), called `name`, at which `bad` (k,) is true."""
+    """Raise an `error` that names the first of the `values`, called `name`, at which `bad` is true.
+
+    `bad` has the shape of the values, or of the first dimensions of these.
+    """
     if np.any(bad):
-        first, count = int(np.argmax(bad)), f" ({np.sum(bad)} of {len(values)} are not)" if len(values) > 1 else ""
-        end = f": {remedy}" if remedy else ""
-        raise error(f"{name}[{first}] = {values[first].tolist()} {problem}{count}{end}")
+        first, size = np.argwhere(bad)[0].tolist(), np.size(bad)
+        count, end = f" ({np.sum(bad)} of {size} are not)" if size > 1 else "", f": {remedy}" if remedy else ""
+        raise error(f"{name}{first or ''} = {values[tuple(first)].tolist()} {problem}{count}{end}")
+
+
+@contextmanager
+def errors_at(place: str) -> Iterator[None]:
+    """Put the `place`, in a file or an argument, before the message of a `MeshError` or `SourceError`."""
+    try:
+        yield
+    except (MeshError, SourceError) as error:
+        raise type(error)(f"{place}: {error}") from None
 
 
 def checked_cutoff(value: float | None) -> float:

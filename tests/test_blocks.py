@@ -206,5 +206,5 @@ def test_a_mesh_that_moves_shares_what_its_faces_say(cow):
     assert (copy.V == moved.V).all()
     with pytest.raises(MeshError, match="V has 3 rows, but the mesh has 2904 vertices"):
         cow.with_vertices(cow.V[:3])
-    with pytest.raises(MeshError, match=r"V\[0, 1\] is nan"):
+    with pytest.raises(MeshError, match=r"V\[0, 1\] = nan"):
         cow.with_vertices(np.where([False, True, False], np.nan, cow.V))

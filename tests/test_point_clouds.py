@@ -448,7 +448,7 @@ BAD = {
     "all equal": ((np.ones((9, 3)),), "all 9 points in P are equal"),
     "on a line": ((LINE,), "all 30 points in P lie on a line"),
     "on a line far away": ((LINE + 1e6,), "all 30 points in P lie on a line"),
-    "nan": ((with_entry(sphere(9), 4, np.nan),), r"P\[4, 0\] is nan \(1 of 9 points are not .*: P\[numpy.isfinite"),
+    "nan": ((with_entry(sphere(9), 4, np.nan),), r"P\[4, 0\] = nan must .* \(3 of 27 are not.*: P\[numpy.isfinite"),
     "one column": ((np.zeros((9, 1)),), r"P must have shape \(n, 3\), or \(n, 2\) in the plane, but .* \(9, 1\)"),
     "huge": ((1e70 * sphere(9),), "P spans .* rescale P"),
     "normals nan": ((sphere(9), with_entry(sphere(9), 2, np.nan)), r"normals\[2\] = \[nan, .* \(1 of 9 are"),

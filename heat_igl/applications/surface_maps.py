@@ -7,7 +7,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import as_array, names_guessed, positive, real_numbers, require_choice, truth
+from heat_igl.errors import as_array, names_guessed, positive, raise_at_first, real_numbers, require_choice, truth
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.linear import factorize
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, triangles_inside
@@ -182,12 +182,7 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
     if given.ndim not in (1, 2) or given.shape[-1] != n:
         raise ValueError(f"values must have shape ({n},) or (k, {n}), not {given.shape}")
     bad = ~np.isfinite(given) & triangles.referenced
-    if bad.any():
-        first = np.argwhere(bad)[0].tolist()
-        raise ValueError(
-            f"values{first} is {given[tuple(first)]} ({int(bad.sum())} of {given.size} are not finite): fill them, or "
-            "leave these vertices out by region"
-        )
+    raise_at_first(bad, "values", given, "must be finite", "fill them, or leave these vertices out by region")
     given[..., triangles.referenced] = _diffused(triangles, given, positive("fwhm", fwhm) ** 2 / (16 * np.log(2)))
     return given
 

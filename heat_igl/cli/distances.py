@@ -16,7 +16,7 @@ import heat_igl
 from heat_igl import drawing
 from heat_igl.cli import options as opt
 from heat_igl.cli.options import Row, check_file, check_output, described, plan_row, print_rows, write_results, wrote
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, errors_at
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat import HeatMethodSolver, Level, Magnitude, SignedHeatSolver
 from heat_igl.io import MESH_SUFFIXES, is_flat, read_mesh_or_cloud, read_polylines, write_mesh
@@ -323,8 +323,6 @@ def projected(mesh: Mesh, path: Path) -> list[SurfaceCurve]:
     """The polylines of a file as curves on the mesh."""
     curves = []
     for i, line in enumerate(read_polylines(path)):
-        try:
+        with errors_at(f"{path}, polyline {i}"):
             curves.append(heat_igl.curve_on(mesh, line.positions, closed=line.is_closed))
-        except SourceError as error:
-            raise SourceError(f"{path}, polyline {i}: {error}") from None
     return curves

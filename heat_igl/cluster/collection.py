@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError
+from heat_igl.errors import SourceError, errors_at
 from heat_igl.io import MESH_SUFFIXES, is_mesh_or_cloud_path
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_simplices
 from heat_igl.sources import Sources, vertex_sources
@@ -85,10 +85,8 @@ def _held(mesh: MeshLike, label: str) -> Path | Mesh | PointCloud | tuple[Any, A
         return Path(mesh)
     if isinstance(mesh, Mesh | PointCloud) or (isinstance(mesh, tuple) and len(mesh) == 2):
         return mesh
-    try:
+    with errors_at(label):
         return as_simplices(mesh)
-    except MeshError as error:
-        raise MeshError(f"{label}: {error}") from None
 
 
 @dataclass(frozen=True)
@@ -114,11 +112,9 @@ class SourcePlan:
             raise SourceError(f"sources must be 'all', 'farthest:K' or a list of source sets, not {sources!r}")
         sets = []
         for i, one in enumerate(sources):
-            try:
+            with errors_at(f"sources[{i}]"):
                 # The number of vertices of a mesh is not known yet.
                 sets.append(tuple(int(v) for v in vertex_sources(one, np.iinfo(np.int64).max)))
-            except SourceError as error:
-                raise SourceError(f"sources[{i}]: {error}") from None
         return cls(source_sets=tuple(sets))
 
     def __str__(self) -> str:

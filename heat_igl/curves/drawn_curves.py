@@ -8,7 +8,7 @@ from heat_igl.curves.geodesics import GeodesicPathSolver, as_curve
 from heat_igl.curves.places import Waypoints, checked_places
 from heat_igl.errors import SourceError, names_guessed, positive, truth
 from heat_igl.heat import SignedHeatSolver
-from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, NestedCurves, SurfaceCurve, SurfacePoints, as_triangles
 from heat_igl.mesh.connectivity import enumerate_runs
 from heat_igl.mesh.surface_points import ClosestPoints, Projector, checked_points, unchecked_curve
 from heat_igl.sources.source_sets import on_simplex
@@ -57,7 +57,7 @@ def curve_through(mesh: MeshLike, points: Waypoints, *, closed: bool = False) ->
     >>> round(triangle.length, 6)
     1.2
     """
-    triangles, closed = as_simplices(mesh), truth("closed", closed)
+    triangles, closed = as_triangles(mesh, "curves need"), truth("closed", closed)
     faces, barycentric = checked_places("points", triangles, points)
     needed = 3 if closed else 2
     if len(faces) < needed:
@@ -110,7 +110,7 @@ def curve_on(
     >>> round(float(curve.lengths(mesh).sum()), 6)
     0.5
     """
-    mesh, closed = as_simplices(mesh), truth("closed", closed)
+    mesh, closed = as_triangles(mesh, "curves need"), truth("closed", closed)
     corners = checked_points(positions)
     if len(corners) < 2:
         raise SourceError(f"positions must be two corners of a curve or more, not {len(corners)}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heat_igl.errors import positive, real_numbers, shown
+from heat_igl.errors import positive, raise_at_first, real_numbers, shown
 from heat_igl.geodesic import Solver
 from heat_igl.mesh import (
     Mesh,
@@ -191,10 +191,7 @@ def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArr
     array = real_numbers("values", values)
     if array.shape != (mesh.n_vertices,):
         raise ValueError(f"values must have shape ({mesh.n_vertices},), one per vertex, not {array.shape}")
-    bad = np.isnan(array) | (array == -np.inf)
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise ValueError(f"values[{first}] is {array[first]} ({int(bad.sum())} of {len(array)} are NaN or -inf)")
+    raise_at_first(np.isnan(array) | (array == -np.inf), "values", array, "must be a number or inf")
     wanted = np.atleast_1d(real_numbers("levels", levels))
     if wanted.ndim != 1 or not np.isfinite(wanted).all():
         raise ValueError(f"levels must be finite numbers in one dimension, not {shown(levels)}")

@@ -7,10 +7,10 @@ from typing import cast
 
 import numpy as np
 
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, raise_at_first
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.mesh.connectivity import group_by_label
-from heat_igl.mesh.surface_points import points_beside, require_faces, require_triangles
+from heat_igl.mesh.surface_points import points_beside, require_faces
 from heat_igl.sources import Sources, are_positions, named_vertices
 from heat_igl.sources.source_sets import on_simplex
 from heat_igl.typing import FloatArray, IntArray
@@ -27,7 +27,6 @@ def checked_places(
     `name` is the name of the argument, for messages; `corner_at`, the result of `corners`, saves time in many calls.
     """
     if isinstance(points, SurfacePoints):
-        require_triangles(mesh)
         require_faces(points.faces, mesh.n_faces, f"{name}: ")
         return points.faces, on_simplex(points.barycentric)
     if isinstance(points, Sequence) and any(isinstance(point, SurfacePoints) for point in points):
@@ -42,9 +41,7 @@ def checked_places(
         return checked_places(name, mesh, points_beside(mesh, points, name))  # type: ignore[arg-type]
     vertex = mesh.originals[named_vertices(cast(Sources, points), mesh.n_vertices, name)]
     corner = (corners(mesh) if corner_at is None else corner_at)[vertex]
-    if (corner < 0).any():
-        first = int(np.argmax(corner < 0))
-        raise SourceError(f"{name}[{first}] = {vertex[first]} is a vertex that no face uses: no path starts there")
+    raise_at_first(corner < 0, name, vertex, "is no vertex that a face uses", "no path starts there", SourceError)
     return corner // 3, np.eye(3)[corner % 3]
 
 

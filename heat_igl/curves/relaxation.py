@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from heat_igl.curves.straightest import Tracer
-from heat_igl.errors import SourceError
+from heat_igl.errors import SourceError, raise_at_first
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices
 from heat_igl.runtime import over_rows
@@ -100,9 +100,8 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
     if len(np.unique(chosen)) < len(chosen):
         values, counts = np.unique(chosen, return_counts=True)
         raise SourceError(f"sites must be distinct, but vertex {values[counts > 1][0]} is there twice")
-    lost = np.flatnonzero(~triangles.referenced[chosen])
-    if len(lost):
-        raise SourceError(f"sites[{lost[0]}] = {chosen[lost[0]]} is a vertex that no face uses: it has no cell")
+    lost = ~triangles.referenced[chosen]
+    raise_at_first(lost, "sites", chosen, "is no vertex that a face uses", "it has no cell", SourceError)
     return _Relaxation(mesh).relaxed(chosen, int(rounds))
 
 

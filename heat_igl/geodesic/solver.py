@@ -316,9 +316,7 @@ class GeodesicSolver(BatchedSolver):
     @property
     def _n_faces(self) -> int:
         domain = self._domain
-        if isinstance(domain, Operators):
-            return len(domain.weights)
-        return domain.triangles.n_faces if isinstance(domain, PointCloud) else domain.n_faces
+        return len(domain.weights) if isinstance(domain, Operators) else domain.n_faces
 
     @names_guessed
     def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from heat_igl.errors import AccuracyWarning, SourceError, checked_cutoff, names_guessed, shown, truth
+from heat_igl.errors import AccuracyWarning, SourceError, checked_cutoff, errors_at, names_guessed, shown, truth
 from heat_igl.runtime import (
     block_size,
     float_type,
@@ -198,10 +198,9 @@ class BatchedSolver(ABC):
     def _named(self, source_sets: Iterable[Sources]) -> Iterator[SourceSet]:
         """The sources of each set; errors say which set they are in."""
         for i, sources in enumerate(source_sets):
-            try:
-                yield self._source_set(sources)
-            except SourceError as error:
-                raise SourceError(f"source_sets[{i}]: {error}") from None
+            with errors_at(f"source_sets[{i}]"):
+                chosen = self._source_set(sources)
+            yield chosen
 
     def _blocks(
         self, source_sets: Iterable[SourceSet], n_sets: int | None, cutoff: float = np.inf

@@ -327,8 +327,17 @@ def prepare(
     begun = time.perf_counter()
     found = analysis(domain.L, options.backend, known())
     analysed = time.perf_counter()
+    # Both matrices at once: the backends run without the interpreter's lock. The Poisson problem is done first, and
+    # the divergence follows on that thread.
+    makers: list[Callable[[], Any]] = [
+        lambda: PoissonProblem(domain, options.backend, found),
+        lambda: HeatFlow(domain, step, options.boundary, options.backend, found, fitted),
+        lambda: NormalizedDivergence(domain, t_damping, found.order, fitted),
+    ]
+    # scipy's SuperLU keeps the memory of a factor that is made on one thread and dropped on another, as a solver is.
+    threads = 1 if found.backend == "scipy" else min(2, n_threads())
     try:
-        heat_flow, poisson, divergence = _factored(domain, options, step, found, t_damping, fitted)
+        poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
     except FactorizationError as error:
         raise FactorizationError(f"{error}{thinnest(domain.source_surface)}") from None
     factored = time.perf_counter()
@@ -368,32 +377,6 @@ def prepare(
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,
     )
-
-
-def _factored(
-    domain: Operators,
-    options: SolverOptions,
-    step: float | FloatArray,
-    found: Analysis,
-    t_damping: float | FloatArray | None,
-    fitted: bool,
-) -> tuple[HeatFlow, PoissonProblem, NormalizedDivergence]:
-    """The heat flow, the Poisson problem and the divergence."""
-
-    def flow() -> HeatFlow:
-        return HeatFlow(domain, step, options.boundary, options.backend, found, fitted)
-
-    # Both matrices at once: the backends run without the interpreter's lock. The Poisson problem is done first, and
-    # the divergence follows on that thread.
-    makers: list[Callable[[], Any]] = [
-        lambda: PoissonProblem(domain, options.backend, found),
-        flow,
-        lambda: NormalizedDivergence(domain, t_damping, found.order, fitted),
-    ]
-    # scipy's SuperLU keeps the memory of a factor that is made on one thread and dropped on another, as a solver is.
-    threads = 1 if found.backend == "scipy" else min(2, n_threads())
-    poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
-    return heat_flow, poisson, divergence
 
 
 def _of_largest(step: float | FloatArray, domain: Operators) -> float:

@@ -190,7 +190,7 @@ class SourceAssembler:
         which, inside, start, end = fans.carry_segments(segments.faces, segments.start, segments.end)
         return replace(
             sources,
-            points=replace(points, faces=faces, barycentric=barycentric),
+            points=points._replace(faces=faces, barycentric=barycentric),
             segments=SourceSegments(inside, start, end, segments.label[which], segments.offset[which]),
         )
 

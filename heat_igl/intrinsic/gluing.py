@@ -14,8 +14,8 @@ from dataclasses import replace
 import igl
 import numpy as np
 
-from heat_igl.errors import MeshError, real_numbers
-from heat_igl.intrinsic.half_edges import HalfEdges, mollify
+from heat_igl.errors import MeshError, raise_at_first, real_numbers
+from heat_igl.intrinsic.half_edges import HalfEdges, mollify, require_room
 from heat_igl.intrinsic.triangulation import (
     BACK_CORNERS,
     Covered,
@@ -25,8 +25,9 @@ from heat_igl.intrinsic.triangulation import (
     next_half_edge,
     previous_half_edge,
 )
+from heat_igl.kernels.mesh import gluing
 from heat_igl.mesh import Mesh, connectivity
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 # Two lengths of one edge may differ by this share: digits lost when the lengths were written to a file, for instance.
 _SAME_LENGTH = 1e-9
@@ -40,20 +41,12 @@ def from_edge_lengths(l: ArrayLike, F: IntArray, n: int) -> IntrinsicTriangulati
 
     A MeshError if `l` has the wrong shape or an entry that is not a length, or gives an edge two lengths.
     """
-    found, lengths = connectivity.facets(F, n), _checked_lengths(l, F)
-    half_edge = np.arange(F.size)
-    first, last = np.empty((2, len(found.n_faces)), np.int64)
-    # Of several values written to one place, the last stays.
-    last[found.of_face.ravel()] = half_edge
-    first[found.of_face.ravel()[::-1]] = half_edge[::-1]
-    a, b = first[found.n_faces == 2], last[found.n_faces == 2]
-    _require_one_length(lengths, a, b)
-    twin = np.where(found.n_faces[found.of_face.ravel()] == 1, -1, -2)
-    twin[a], twin[b] = b, a
-    aligned = np.ones(F.size, bool)
-    aligned[a] = aligned[b] = F.ravel()[next_half_edge(a)] == F.ravel()[previous_half_edge(b)]
-    added = mollify(lengths, F)
-    return IntrinsicTriangulation(F, lengths + added, twin, aligned, n, lengthening=float(added.max()))
+    lengths = _checked_lengths(l, F)
+    require_room(len(F), n)
+    # Of the positions come only lengths, and these are given.
+    _, twin, _, aligned, _ = gluing.glue(F, np.zeros((n, 3)), 1.0)
+    _require_one_length(lengths, twin)
+    return _mollified(lengths, F, n, twin, aligned)
 
 
 def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> IntrinsicTriangulation:
@@ -87,24 +80,22 @@ def from_gluing(l: ArrayLike, F: IntArray, n: int, twin: ArrayLike) -> Intrinsic
             f"twin[{h // 3}, {h % 3}] = {mate[h]} is no half-edge that ends at the same vertices and is glued back to "
             f"{h} ({int(wrong.sum())} entries are not): twin[f, c] = 3 g + d and twin[g, d] = 3 f + c, or -1"
         )
-    _require_one_length(lengths, a, b)
-    added = mollify(lengths, F)
-    return IntrinsicTriangulation(F, lengths + added, mate, aligned, n, lengthening=float(added.max()))
+    _require_one_length(lengths, mate)
+    return _mollified(lengths, F, n, mate, aligned)
 
 
 def _checked_lengths(l: ArrayLike, F: IntArray) -> FloatArray:
     lengths = real_numbers("l", l)
     if lengths.shape != F.shape:
         raise MeshError(f"l must have one length per side of F, shape {F.shape}, but it has shape {lengths.shape}")
-    bad = ~(np.isfinite(lengths) & (lengths >= 0))
-    if bad.any():
-        f, c = (int(i) for i in np.argwhere(bad)[0])
-        raise MeshError(f"l[{f}, {c}] = {lengths[f, c]} is not a length ({int(bad.sum())} entries are not)")
+    raise_at_first(~(np.isfinite(lengths) & (lengths >= 0)), "l", lengths, "is not a length", error=MeshError)
     return lengths
 
 
-def _require_one_length(lengths: FloatArray, a: IntArray, b: IntArray) -> None:
-    """Half-edges a and b (k,), which are glued, have the same length."""
+def _require_one_length(lengths: FloatArray, twin: AnyArray) -> None:
+    """Half-edges that are glued have the same length."""
+    a = np.flatnonzero(twin > np.arange(len(twin)))
+    b = twin[a]
     differs = np.abs(lengths.ravel()[a] - lengths.ravel()[b]) > _SAME_LENGTH * lengths.ravel()[a]
     if differs.any():
         one, other = int(a[differs][0]), int(b[differs][0])
@@ -118,11 +109,15 @@ def intrinsic_triangulation(mesh: Mesh, margin: float | None = None) -> Intrinsi
     """The triangles of `mesh` by their edge lengths; degenerate ones are mollified, see `mollify`."""
     edges, exponent = HalfEdges.of_mesh(mesh)
     lengths = np.ldexp(edges.length, exponent).reshape(-1, 3)
-    added = mollify(lengths, mesh.F, margin)
-    twin, aligned = edges.twin.astype(np.int64), edges.aligned.astype(bool)
-    return IntrinsicTriangulation(
-        mesh.F, lengths + added, twin, aligned, mesh.n_vertices, lengthening=float(added.max())
-    )
+    return _mollified(lengths, mesh.F, mesh.n_vertices, edges.twin, edges.aligned, margin)
+
+
+def _mollified(
+    l: FloatArray, F: IntArray, n: int, twin: AnyArray, aligned: AnyArray, margin: float | None = None
+) -> IntrinsicTriangulation:
+    added = mollify(l, F, margin)
+    longer, twin, aligned = l + added, twin.astype(np.int64), aligned.astype(bool)
+    return IntrinsicTriangulation(F, longer, twin, aligned, n, lengthening=float(added.max()))
 
 
 def lengths_to_divide_by(mesh: Mesh) -> FloatArray:

@@ -57,7 +57,7 @@ class HalfEdges(NamedTuple):
         It is 0, but for very large or small meshes the power of two just above the mean extent. A MeshError if there
         are too many triangles for 32-bit indices.
         """
-        _require_room(mesh.n_faces, mesh.n_vertices)
+        require_room(mesh.n_faces, mesh.n_vertices)
         exponent = 0
         found = cls(*gluing.glue(mesh.F, mesh.V, 1.0))
         if not 1 / _LARGEST_LENGTH < found.length.max() < _LARGEST_LENGTH:
@@ -69,7 +69,7 @@ class HalfEdges(NamedTuple):
     @classmethod
     def of(cls, triangulation: IntrinsicTriangulation) -> HalfEdges:
         """Those of a triangulation; a MeshError if there are too many triangles for 32-bit indices."""
-        _require_room(len(triangulation.F), triangulation.n)
+        require_room(len(triangulation.F), triangulation.n)
         ring = np.arange(len(triangulation.twin), dtype=np.int32)
         many = np.flatnonzero(triangulation.twin == -2)
         if len(many):
@@ -134,7 +134,8 @@ def mean_exponent(lengths: FloatArray) -> int:
     return int(np.frexp(lengths.mean())[1])
 
 
-def _require_room(m: int, n: int) -> None:
+def require_room(m: int, n: int) -> None:
+    """Raise a `MeshError` if m faces on n vertices are too many for 32-bit indices."""
     if 3 * m + n >= _TOO_MANY:
         raise MeshError(f"{m} faces are too many for 32-bit indices: split the mesh")
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning, MeshError
+from heat_igl.errors import AccuracyWarning, MeshError, errors_at
 from heat_igl.mesh import Mesh, which_repeat_a_vertex
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -180,12 +180,10 @@ class Contents(NamedTuple):
     def mesh(self, path: Path) -> Mesh:
         """The mesh of the file; polygons are cut into triangles. A MeshError if the positions cannot be used."""
         corners, degree, tetrahedra = self.cells
-        try:
+        with errors_at(str(path)):
             if tetrahedra:
                 return Mesh(self.V, corners.reshape(-1, 4))
             return Mesh.of_polygons(self.V, corners, degree, numbered(path, "face", 0))
-        except MeshError as error:
-            raise MeshError(f"{path}: {error}") from None
 
 
 def integers(values: FloatArray, where: Callable[[int], str], what: str = "index") -> IntArray:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heat_igl.errors import MeshError, as_array, names_guessed, shown
+from heat_igl.errors import MeshError, as_array, errors_at, names_guessed, shown
 from heat_igl.io import by_meshio, by_nibabel, obj, off, ply
 from heat_igl.io.contents import Contents, Text, format_rows
 from heat_igl.io.storage import form_suffix, is_packed, pack, replacing, unpacked
@@ -146,10 +146,8 @@ def read_polygon_mesh(path: str | os.PathLike[str]) -> PolygonMesh:
     cells = contents.cells
     if cells.tetrahedra:
         raise MeshError(f"{path}: the file holds tetrahedra, not polygons: read it with read_mesh")
-    try:
+    with errors_at(str(path)):
         return PolygonMesh(contents.V, np.split(cells.corners, np.cumsum(cells.degree)[:-1]))
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
 
 
 def read_attributes(path: str | os.PathLike[str]) -> dict[str, AnyArray]:
@@ -395,10 +393,8 @@ def read_point_cloud(path: str | os.PathLike[str]) -> PointCloud:
     """
     path = checked_path(path, POINT_CLOUD_SUFFIXES, POINT_CLOUD_SUFFIXES)
     P, normals = _POINT_FORMATS[form_suffix(path)][0](path, file_bytes(path))
-    try:
+    with errors_at(str(path)):
         return PointCloud(P, None if normals is None else usable_normals(normals, f"{path}: "))
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
 
 
 def read_mesh_or_cloud(path: str | os.PathLike[str], points: bool = False) -> Mesh | PointCloud:

@@ -8,8 +8,8 @@ import numpy as np
 
 from heat_igl.errors import SourceError, as_array, truth
 from heat_igl.mesh.mesh import Mesh
-from heat_igl.mesh.objects import MeshLike, as_simplices
-from heat_igl.mesh.surface_points import SurfaceCurve, require_triangles
+from heat_igl.mesh.objects import MeshLike, as_triangles
+from heat_igl.mesh.surface_points import SurfaceCurve
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
 
@@ -164,8 +164,7 @@ def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> 
     >>> heat_igl.geodesic_distance(mesh, row)[6:].round(6).tolist()
     [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
     """
-    mesh, closed = as_simplices(mesh), truth("closed", closed)
-    require_triangles(mesh)
+    mesh, closed = as_triangles(mesh, "curves along edges need", SourceError), truth("closed", closed)
     path = np.atleast_1d(as_array("vertices", vertices, SourceError))
     if path.ndim != 1 or path.dtype.kind not in "iu" or len(path) < 2:
         raise SourceError(f"vertices must be two vertex indices or more, not {path.dtype} of shape {path.shape}")
@@ -225,8 +224,7 @@ def region_boundary(
     >>> curve.is_closed, float(curve.lengths(mesh).sum())
     (True, 2.0)
     """
-    triangles = as_simplices(mesh)
-    require_triangles(triangles)
+    triangles = as_triangles(mesh, "curves around regions need", SourceError)
     if (faces is None) == (vertices is None):
         raise SourceError("give one mask of the region: faces or vertices")
     if faces is not None:

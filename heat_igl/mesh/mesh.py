@@ -15,7 +15,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import AccuracyWarning, MeshError, as_array
+from heat_igl.errors import AccuracyWarning, MeshError, as_array, raise_at_first
 from heat_igl.mesh import connectivity
 from heat_igl.mesh.report import MeshReport, mesh_report
 from heat_igl.mesh.triangulation import triangulated
@@ -58,13 +58,8 @@ def checked_positions(V: ArrayLike) -> FloatArray:
     with np.errstate(over="ignore"):
         positions = np.zeros((len(array), 3))
         positions[:, : array.shape[1]] = array
-    bad = ~np.isfinite(positions)
-    if bad.any():
-        row, column = (int(i) for i in np.argwhere(bad)[0])
-        raise MeshError(
-            f"V[{row}, {column}] is {positions[row, column]} ({int(bad.any(axis=1).sum())} of {len(positions)} "
-            "vertices are not finite): remove or repair these vertices"
-        )
+    remedy = "remove or repair these vertices"
+    raise_at_first(~np.isfinite(positions), "V", positions, "must be finite", remedy, MeshError)
     return positions
 
 

@@ -213,11 +213,11 @@ def as_simplices(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh:
     return found if isinstance(found, Mesh) else found.triangles
 
 
-def as_triangles(mesh: MeshLike, what: str) -> Mesh:
-    """`as_simplices`; a MeshError if they are tetrahedra: `what` needs triangles."""
+def as_triangles(mesh: MeshLike, what: str, error: type[ValueError] = MeshError) -> Mesh:
+    """`as_simplices`; an `error` if they are tetrahedra: `what` needs triangles."""
     found = as_simplices(mesh)
     if found.is_tetrahedral:
-        raise MeshError(f"{what} triangles, but the mesh is tetrahedral")
+        raise error(f"{what} triangles, but the mesh is tetrahedral")
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from heat_igl.errors import SourceError, as_array, raise_at_first, real_numbers, truth
 from heat_igl.mesh.mesh import Mesh
-from heat_igl.mesh.objects import MeshLike, as_simplices
+from heat_igl.mesh.objects import MeshLike, as_simplices, as_triangles
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 # A point lies on a side of the face if a barycentric coordinate is below this. For given coordinates: numbers of
@@ -236,12 +236,6 @@ def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
     return np.asarray(array / (a + b + c)[:, None])
 
 
-def require_triangles(mesh: Mesh) -> None:
-    """Raise a `SourceError` if the mesh is tetrahedral."""
-    if mesh.is_tetrahedral:
-        raise SourceError("points on faces need triangles, but the mesh is tetrahedral")
-
-
 def require_faces(faces: IntArray, n_faces: int, place: str = "") -> None:
     """Raise a `SourceError` if there is no such face; the message begins with `place` and names the first."""
     outside, remedy = (faces < 0) | (faces >= n_faces), f"indices run from 0 to {n_faces - 1}"
@@ -249,8 +243,7 @@ def require_faces(faces: IntArray, n_faces: int, place: str = "") -> None:
 
 
 def _in_space(mesh: MeshLike, faces: IntArray, barycentric: FloatArray) -> FloatArray:
-    mesh = as_simplices(mesh)
-    require_triangles(mesh)
+    mesh = as_triangles(mesh, "points on faces need", SourceError)
     require_faces(faces, mesh.n_faces)
     return np.asarray(np.einsum("kc,kcx->kx", barycentric, mesh.V[mesh.F[faces]]))
 
@@ -309,7 +302,7 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
     >>> bool(np.allclose(found.points.positions(mesh), mesh.V[:5])), found.gap.round(6).tolist()
     (True, [2.0, 2.0, 2.0, 2.0, 2.0])
     """
-    mesh = as_simplices(mesh)
+    mesh = as_triangles(mesh, "points on faces need", SourceError)
     return Projector(mesh).project(checked_points(positions))
 
 
@@ -355,7 +348,6 @@ class Projector:
     """Closest points on one mesh, for any number of queries."""
 
     def __init__(self, mesh: Mesh) -> None:
-        require_triangles(mesh)
         self._mesh = mesh
         self._tree = igl.AABB()
         self._tree.init(mesh.V, mesh.F)

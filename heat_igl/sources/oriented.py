@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import SourceError, raise_at_first
+from heat_igl.errors import SourceError, errors_at, raise_at_first
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
 from heat_igl.mesh.surface_points import require_faces, rows_in_space
 from heat_igl.sources.source_sets import on_simplex
@@ -146,10 +146,8 @@ def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray
             f"{name} is a mask of shape {mask.shape}; it must have {n} entries for vertices or {m} for faces"
             + (f", {why}" if n == m else "")
         )
-    try:
+    with errors_at(name):
         loops = region_boundary(mesh, vertices=mask) if len(mask) == n else region_boundary(mesh, faces=mask)
-    except SourceError as error:
-        raise SourceError(f"{name}: {error}") from None
     return (
         np.concatenate([loop.faces for loop in loops]),
         np.concatenate([loop.start for loop in loops]),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeGuard, cast
+from typing import Any, NamedTuple, TypeGuard, cast
 
 import numpy as np
 
-from heat_igl.errors import SourceError, real_numbers, refuse_masked
+from heat_igl.errors import SourceError, errors_at, raise_at_first, real_numbers, refuse_masked
 from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
 from heat_igl.mesh import ON_SIDE, Mesh, MeshPart, SurfaceCurve, SurfacePoints, connectivity
 from heat_igl.mesh.surface_points import points_beside, require_faces
@@ -20,8 +20,7 @@ _ACCEPTED = "a vertex index, a sequence of vertex indices, or a boolean mask wit
 _COARSEST = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class SourcePoints:
+class SourcePoints(NamedTuple):
     """Points (k,) in faces, the label of the source that each belongs to, and the value at which distance begins."""
 
     faces: IntArray
@@ -31,16 +30,10 @@ class SourcePoints:
 
     def joined(self, other: SourcePoints) -> SourcePoints:
         """These points and others."""
-        return SourcePoints(
-            np.concatenate([self.faces, other.faces]),
-            np.concatenate([self.barycentric, other.barycentric]),
-            np.concatenate([self.label, other.label]),
-            np.concatenate([self.offset, other.offset]),
-        )
+        return SourcePoints(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
-@dataclass(frozen=True, eq=False)
-class SourceSegments:
+class SourceSegments(NamedTuple):
     """Segments (s,) of curves, as `SourcePoints`."""
 
     faces: IntArray
@@ -99,7 +92,7 @@ class SourceSet:
         """The same sources with other offsets, of every vertex, point and segment."""
         k = len(self.vertices)
         of_points, of_segments = np.split(offsets[k:], [len(self.points.offset)])
-        points, segments = replace(self.points, offset=of_points), replace(self.segments, offset=of_segments)
+        points, segments = self.points._replace(offset=of_points), self.segments._replace(offset=of_segments)
         return replace(self, vertex_offset=offsets[:k], points=points, segments=segments)
 
 
@@ -188,8 +181,8 @@ def source_set(
     if part is not None:
         part.require_vertices(chosen.vertices, position=chosen.vertex_label)
         points, segments = chosen.points, chosen.segments
-        points = replace(points, faces=part.numbers_of(points.faces, position=points.label))
-        segments = replace(segments, faces=part.numbers_of(segments.faces, position=segments.label))
+        points = points._replace(faces=part.numbers_of(points.faces, position=points.label))
+        segments = segments._replace(faces=part.numbers_of(segments.faces, position=segments.label))
         chosen = replace(chosen, points=points, segments=segments)
     return chosen
 
@@ -243,14 +236,8 @@ def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
         is_float = array.dtype.kind == "f"
         found = f"floats such as {array[0]}; convert with int()" if is_float else f"{array.dtype} such as {array[0]!r}"
         raise SourceError(f"{name} must be {_ACCEPTED}, not {found}")
-    outside = (array < 0) | (array >= n)
-    if outside.any():
-        first = int(np.flatnonzero(outside)[0])
-        count = f" ({int(outside.sum())} of {len(array)} are not)" if len(array) > 1 else ""
-        raise SourceError(
-            f"{name}[{first}] = {array[first]} is no vertex{count}: the mesh has {n} vertices, so indices run from 0 "
-            f"to {n - 1}"
-        )
+    remedy = f"the mesh has {n} vertices, so indices run from 0 to {n - 1}"
+    raise_at_first((array < 0) | (array >= n), name, array, "is no vertex", remedy, SourceError)
     return np.asarray(array, dtype=np.int64)
 
 
@@ -268,10 +255,7 @@ def _checked_offsets(offsets: ArrayLike) -> FloatArray:
     if array.ndim > 1:
         raise SourceError(f"offsets must be one number or one for each source, not of shape {array.shape}")
     wrong = ~(np.isfinite(array) & (array >= 0))
-    if wrong.any():
-        first = int(np.flatnonzero(np.atleast_1d(wrong))[0])
-        which = f"offsets[{first}]" if array.ndim else "offsets"
-        raise SourceError(f"{which} = {np.atleast_1d(array)[first]} must be finite and not negative")
+    raise_at_first(wrong, "offsets", array, "must be finite and not negative", error=SourceError)
     return array
 
 
@@ -315,10 +299,8 @@ class _Builder:
                 self._curves.append((sources, int(label[0])))
         elif _holds_places(sources):
             for i, part in enumerate(sources):
-                try:
+                with errors_at(f"sources[{i}]"):
                     self.add(part)
-                except SourceError as error:
-                    raise SourceError(f"sources[{i}]: {error}") from None
         elif self._mesh is not None and are_positions(sources):
             self.add(points_beside(self._mesh, cast(ArrayLike, sources), "sources"))
         else:

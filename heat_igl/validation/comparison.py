@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from heat_igl.errors import (
     ReferenceSolverError,
     SourceError,
     names_guessed,
+    raise_at_first,
     real_numbers,
     shown,
 )
@@ -48,15 +49,8 @@ _NATIVE = {
 METHODS = (*_OWN, *_NATIVE)
 
 
-class Solver(Protocol):
-    """The interface of a method; `GeodesicSolver` has it."""
-
-    def distance(self, sources: IntArray, /) -> FloatArray:
-        """Distance (n,) from a set of sources."""
-        ...
-
-
-Prepare = Callable[[Any], Solver]
+Prepare = Callable[[Any], Any]
+"""From a mesh to an object with a method ``distance(sources)``, as `GeodesicSolver` has it."""
 Method = str | tuple[str, Prepare]
 
 
@@ -299,9 +293,7 @@ def _truths(
         given, label = np.atleast_2d(real_numbers("reference", reference)), "given distances"
     if given.shape != (len(sets), mesh.n_vertices):
         raise ValueError(f"reference must have shape ({len(sets)}, {mesh.n_vertices}), not {given.shape}")
-    if np.isnan(given).any():
-        case, vertex = np.argwhere(np.isnan(given))[0].tolist()
-        raise ValueError(f"reference[{case}, {vertex}] is NaN: vertices that no source reaches are inf")
+    raise_at_first(np.isnan(given), "reference", given, "must be a distance", "vertices out of reach are at inf")
     return label, given, None
 
 

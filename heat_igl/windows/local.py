@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from heat_igl.errors import SourceError, names_guessed, positive, shown
+from heat_igl.errors import SourceError, as_array, names_guessed, positive, raise_at_first, shown
 from heat_igl.kernels.mesh import checking
 from heat_igl.kernels.windows import windows
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, triangles_inside
@@ -303,21 +303,14 @@ def _with_empty_rows(found: sp.csr_array, rows: IntArray) -> sp.csr_array:
 
 
 def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:
-    try:
-        array = np.asarray(pairs)
-    except ValueError:
-        raise SourceError("pairs must be an array of shape (p, 2), not a ragged sequence") from None
+    array = as_array("pairs", pairs, SourceError)
     if array.ndim != 2 or array.shape[1] != 2:
         raise SourceError(f"pairs must be an array of shape (p, 2), but it has shape {array.shape}")
     if array.dtype.kind not in "iu":
         raise SourceError(f"pairs must hold indices of vertices, not {array.dtype}: convert with astype(int)")
-    outside = np.flatnonzero(((array < 0) | (array >= n)).any(axis=1))
-    if len(outside):
-        first = int(outside[0])
-        raise SourceError(
-            f"pairs[{first}] = {array[first].tolist()} names no two vertices ({len(outside)} of {len(array)} do not): "
-            f"the mesh has {n} vertices, so indices run from 0 to {n - 1}"
-        )
+    remedy = f"the mesh has {n} vertices, so indices run from 0 to {n - 1}"
+    outside = ((array < 0) | (array >= n)).any(axis=1)
+    raise_at_first(outside, "pairs", array, "must be two vertices", remedy, SourceError)
     return np.asarray(array, np.int64)
 
 
