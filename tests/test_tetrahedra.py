@@ -11,6 +11,8 @@ import heat_igl
 from heat_igl import GeodesicSolver, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
+from heat_igl.sources import source_set
+from heat_igl.sweep.lines import LineEngine
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 from heat_igl.validation.closed_forms import around_the_edge
 from heat_igl.validation.construction import carved, tetrahedra
@@ -211,6 +213,29 @@ def test_what_is_seen_is_at_the_length_of_the_line(seed):
         found = solver.distance(int(source))
         assert (found >= line * (1 - 1e-9)).all()
         np.testing.assert_allclose(found[seen], line[seen], rtol=1e-4)
+
+
+def test_the_line_behind_an_edge_stays_inside():
+    """Also where it passes between three vertices whose paths bend around this edge: a corner may stand behind them."""
+    steps, count = np.linspace(1e-3, 1 - 1e-3, 400)[:, None, None], 0
+    for seed in range(6):
+        mesh, full = caves(seed)
+        engine = LineEngine(MetricSimplices.in_space(mesh), is_halved=True)
+        for source in range(0, mesh.n_vertices, 9):
+            sources = source_set([source], mesh.n_vertices, mesh.F)
+            edges, way = engine._ways(np.array([source], np.int32), np.zeros(1), *engine._begun(sources))
+            bent = np.flatnonzero((way >= 0) & (way[edges[way]] == -1).all(axis=1))
+            ends = np.stack([np.full(len(bent), source), bent])
+            A, B = mesh.V[edges[way[bent]].T]
+            along = ((mesh.V[ends] - A) * (B - A)).sum(axis=2) / ((B - A) ** 2).sum(axis=1)
+            near = np.linalg.norm(mesh.V[ends] - A - along[..., None] * (B - A), axis=2)
+            bend = np.clip((along * near[::-1]).sum(axis=0) / np.maximum(near.sum(axis=0), 1e-12), 0, 1)[:, None]
+            places = 5 * (mesh.V[bent] + steps * (A + bend * (B - A) - mesh.V[bent]))
+            is_clear = (np.abs(places - np.rint(places)) > 1e-3).all(axis=2)
+            inside = full[tuple(np.floor(places).astype(int).clip(0, 4).T)].T
+            assert (inside | ~is_clear).mean(axis=0).min(initial=1) > 0.98
+            count += len(bent)
+    assert count > 5000
 
 
 @pytest.mark.parametrize("hollow", [0.0, 0.25], ids=["cube", "cavity"])

@@ -278,17 +278,14 @@ class _Bends(Ray):
     @cython.nogil
     def is_lit_from(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
         """Whether the source from which the way to v is straight sees the point of the edge at `share`."""
-        return self.way[v] == -1 and self.is_seen_by(self.sources[self.label[v]], x, _NONE)
+        return self.way[v] == -1 and self.is_seen_by(self.sources[self.label[v]], x)
 
     @cython.cfunc
     @cython.nogil
-    def is_seen_by(self, v: cython.int, x: cython.pointer[cython.const[cython.double]], lit: cython.int) -> cython.bint:
-        """Whether the line from v to a point of the edge `sought`, at `share`, stays in the tetrahedra.
-
-        It does if it passes between three vertices whose ways bend around the edge `lit`.
-        """
+    def is_seen_by(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
+        """Whether the line from v to a point of the edge `sought`, at `share`, stays in the tetrahedra."""
         line: cython.pointer[Line] = cython.address(self.line)
-        line.goal, line.stamp = x, lit
+        line.goal, line.stamp = x, _NONE
         line.goal_a = self.edges[self.sought, 1 if self.share > 1 - NUDGE else 0]
         line.goal_b = self.edges[self.sought, 0 if self.share < NUDGE else 1]
         return self.is_near(line, v) or self.follows(line, v)
@@ -448,7 +445,7 @@ class _Bends(Ray):
         self.offers[k].value = INFINITY
         self.around(i, cython.address(self.body.positions[v, 0]), True)
         self.sought = i
-        if not self.is_seen_by(v, self.bend, i):
+        if not self.is_seen_by(v, self.bend):
             self.mark_met(v)
             for c in range(1, 4):
                 self.offer_at(self.body.cells[self.line.t, (self.line.out + c) & 3], v)

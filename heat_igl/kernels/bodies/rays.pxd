@@ -13,7 +13,8 @@ cdef extern from *:
 # A line on its way through tetrahedra. It goes `forward` or against the axis `up`, from p; seen along it, it is at the
 # origin of `x` and `y`, where the corners are of the triangle through which it leaves tetrahedron t, in this order if
 # `sign` is 1; `out` is the fourth corner of t. It arrives where a tetrahedron `has` the vertices `goal_a` and `goal_b`,
-# bits 1 and 2, and between three vertices that see the goal, bit 4: for these, `lit` is `stamp`.
+# bits 1 and 2, and between three vertices that see the goal, bit 4: for these, `lit` is `stamp`. It meets the plane of
+# the triangle that was last tried at `ahead` / `of_all` along `up`.
 cdef struct Line:
     const double* origin
     const double* goal
@@ -27,7 +28,7 @@ cdef struct Line:
     int has[3]
     double x[3]
     double y[3]
-    double sign, least, slack
+    double sign, least, slack, ahead, of_all
     int side
 
 
@@ -55,9 +56,9 @@ cdef class Ray:
     cdef double[::1] begin
     cdef int[::1] label
     cdef int[::1] last_cone
+    cdef int[::1] last_wall
 
     cdef bint follows(self, Line* line, int v) noexcept nogil
-    cdef int begins(self, Line* line, int v, int i) noexcept nogil
     cdef bint is_near(self, Line* line, int v) noexcept nogil
     cdef bint arrives_from(self, Line* line, int begin) noexcept nogil
     cdef int arrives(self, Line* line, int begin, int into, int toward) noexcept nogil

@@ -142,33 +142,34 @@ class Ray:
     """Distances of the vertices of a body, and lines that are followed to see whether a way is clear.
 
     `sources`, `offset`, `d`, `begin` and `label` are those of `sight.look_around`. `last_cone` (n,) is the corner at
-    each vertex at which its last line began.
+    each vertex at which its last line began, and `last_wall` (n,) the one opposite the wall at which a line ended last.
     """
 
     def __init__(self, body: Body, sources, offset, d, begin, label):
         self.body, self.sources, self.offset, self.d, self.begin, self.label = body, sources, offset, d, begin, label
-        self.last_cone = np.full(d.shape[0], -1, np.int32)
+        self.last_cone, self.last_wall = np.full((2, d.shape[0]), -1, np.int32)
 
     def follows(self, line: cython.pointer[Line], v: cython.int) -> cython.bint:
         """Whether the line from v, which is not near its goal, stays in the tetrahedra."""
-        begin: cython.int = self.cone(line, v)
+        line.origin = cython.address(self.body.positions[v, 0])
+        self.aim(line, 0, -1, 0.0, -1)
+        # The next line is often hidden by the same wall.
+        begin: cython.int = self.last_wall[v]
+        if begin >= 0 and self.leaves(line, begin, -ON_SIDE):
+            far: cython.double = (1 - NUDGE) * fabs(line.of_all * (line.goal[line.up] - line.p_z))
+            if fabs(line.ahead) < far:
+                line.t, line.out = begin >> 2, begin & 3
+                return False
+        begin = self.cone(line, v)
         if begin >= 0:
             return self.arrives_from(line, begin)
         # Along faces and edges, several tetrahedra are as good to begin with, and some may end at a wall.
-        i: cython.int = self.begins(line, v, 0)
-        while i >= 0:
-            if self.arrives_from(line, self.body.incident[i]):
-                return True
-            self.aim(line, 0, -1, 0.0, -1)
-            i = self.begins(line, v, i + 1)
-        return False
-
-    def begins(self, line: cython.pointer[Line], v: cython.int, i: cython.int) -> cython.int:
-        """Where in `incident`, from i on, a corner at v is in whose tetrahedron the line begins; else -1."""
-        for k in range(max(i, self.body.first[v]), self.body.first[v + 1]):
+        for k in range(self.body.first[v], self.body.first[v + 1]):
             if self.leaves(line, self.body.incident[k], ON_SIDE):
-                return k
-        return -1
+                if self.arrives_from(line, self.body.incident[k]):
+                    return True
+                self.aim(line, 0, -1, 0.0, -1)
+        return False
 
     def is_near(self, line: cython.pointer[Line], v: cython.int) -> cython.bint:
         """Whether the goal is in a tetrahedron at v."""
@@ -203,6 +204,8 @@ class Ray:
             line.has[i] = _has(line, line.corner[i])
         for _steps in range(_MOST_STEPS):
             found: cython.int = _step(self.body, line)
+            if found == -1:
+                self.last_wall[self.body.cells[begin >> 2, begin & 3]] = 4 * line.t + line.out
             if found != 0:
                 return found
         return -2
@@ -227,15 +230,14 @@ class Ray:
         k: cython.int = self.last_cone[v]
         if k < 0:
             k = self.body.incident[self.body.first[v]]
-        line.origin = cython.address(self.body.positions[v, 0])
-        self.aim(line, 0, -1, 0.0, -1)
         for _turns in range(_MOST_TURNS):
             self.last_cone[v] = k
             if self.leaves(line, k, -ON_SIDE):
                 return k
             if line.least >= -line.slack:
                 return -1
-            t: cython.int = self.body.cells[k >> 2, 4 + line.side] >> 2
+            line.t, line.out = k >> 2, line.side
+            t: cython.int = self.body.cells[line.t, 4 + line.out] >> 2
             if t < 0:
                 return -1
             for i in range(4):
@@ -287,8 +289,9 @@ class Ray:
         of_a: cython.double = line.x[1] * line.y[2] - line.y[1] * line.x[2]
         of_b: cython.double = line.x[2] * line.y[0] - line.y[2] * line.x[0]
         of_c: cython.double = line.x[0] * line.y[1] - line.y[0] * line.x[1]
+        line.ahead, line.of_all = z[0] * of_a + z[1] * of_b + z[2] * of_c, of_a + of_b + of_c
         # The line meets the plane of the triangle ahead.
-        line.sign = line.forward if z[0] * of_a + z[1] * of_b + z[2] * of_c > 0 else -line.forward
+        line.sign = line.forward if line.ahead > 0 else -line.forward
         of_a, of_b, of_c = line.sign * of_a, line.sign * of_b, line.sign * of_c
         line.least = min(of_a, of_b, of_c)
         line.slack = ON_SIDE * (fabs(of_a) + fabs(of_b) + fabs(of_c))
