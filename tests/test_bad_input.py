@@ -288,10 +288,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: SurfacePoints([0], [[1, 0]]), r"barycentric must have shape \(1, 3\)"),
     (lambda _: SurfacePoints([0.5], [[1, 0, 0]]), "faces must be one face index or more, not float64"),
     (lambda _: SurfacePoints([], np.zeros((0, 3))), "faces must be one face index"),
-    (
-        lambda m: SurfacePoints([0, 80], CENTRE * 2).positions(m),
-        r"^faces\[1\] = 80 must be a face .1 of 2 are not.: indices run from 0 to 79",
-    ),
+    (lambda m: SurfacePoints([0, 80], CENTRE * 2).positions(m), r"^faces\[1\] = 80 must be a face .* from 0 to 79"),
     (lambda _: curve_on(GRID, [[0, 0, 0]]), "two corners of a curve or more, not 1"),
     (
         lambda _: curve_on(GRID, np.ones((2, 4))),
@@ -317,10 +314,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         for sources, pattern in (
             (OffsetSources([0, 1], [0.0, 1.0, 2.0]), "offsets has 3 entries for 2 sources: give one for each"),
             (OffsetSources([CURVE, 0], [1.0]), "offsets has 1 entries for 2 sources"),
-            (
-                SurfacePoints([0, 83], CENTRE * 2),
-                r"^faces\[1\] = 83 must be a face .1 of 2 are not.: indices run from 0 to 79",
-            ),
+            (SurfacePoints([0, 83], CENTRE * 2), r"^faces\[1\] = 83 must be a face .*: indices run from 0 to 79"),
             (SurfaceCurve([-1], [[1, 0, 0]], [[0, 1, 0]]), r"^faces\[0\] = -1 must be a face"),
             ([CURVE, 42], r"sources\[1\]: sources\[0\] = 42 is no vertex"),
             ([3, SurfacePoints([99], CENTRE)], r"sources\[1\]: faces\[0\] = 99 must be a face"),

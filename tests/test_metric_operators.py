@@ -11,7 +11,9 @@ import heat_igl
 from heat_igl import fibre_metric, metric_operators, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import Operators
+from heat_igl.reference import edge_paths
 from heat_igl.typing import FloatArray
+from heat_igl.validation.random_shapes import FAMILIES
 
 
 def distance(domain: Operators, source: Any = 0, method: str = "heat") -> FloatArray:
@@ -134,3 +136,10 @@ def test_wrong_metrics_are_refused(metric, message):
         metric_operators(shapes.grid(3), metric)
     # What is orthogonal to a flat mesh plays no part.
     assert metric_operators(shapes.grid(3), changed(4, np.diag([1, 1, -1]))).n_given == 16
+
+
+def test_flips_that_would_join_a_vertex_with_itself():
+    """A triangle between them is none in space: an error named a face that the mesh does not have."""
+    mesh = FAMILIES["random tetrahedra"](9)
+    domain = heat_igl.speed_operators(mesh, np.where(mesh.V[mesh.F].mean(axis=1)[:, 0] > 0.5, 50.0, 1.0))
+    assert (heat_igl.GeodesicSolver(domain).distance(0) <= edge_paths(mesh, 0) * (1 + 1e-9)).all()

@@ -431,14 +431,17 @@ class GeodesicSolver(BatchedSolver):
         derivative, see `differentiable_surface`. Of windows, the derivative is that of exact paths; of lines and the
         Hopf-Lax formula, it is a `SimplexDerivative`. ``phi`` is what `distance` returns, but for a metric or speed per
         face on triangles where `plan` names the Hopf-Lax formula: value and derivative are those of windows there, and
-        ``phi`` may differ from `distance` by the difference of both engines. ``method="exact"`` makes both the same.
-        ``pull_back.distance`` is what is differentiated: of the formula its fixed point, which ``phi`` is near.
+        ``phi`` may differ from `distance` by the difference of both engines. ``method="exact"`` makes both the same. In
+        tetrahedra with one tensor for all, both are of the formula. ``pull_back.distance`` is what is differentiated:
+        of the formula its fixed point, which ``phi`` is near.
         """
+        from heat_igl.sweep import HopfLaxEngine
         from heat_igl.sweep.simplex_engine import SimplexEngine
 
         chosen, domain = self._source_set(sources), self._domain
         # The formula interpolates tensors per face before it uses them: it has no derivatives by those given.
         if isinstance(asked := self._asked(chosen), SimplexEngine) and not getattr(domain, "metric", None):
+            asked = HopfLaxEngine(same) if (same := getattr(domain, "in_tensors", None)) else asked
             return asked.distance(chosen), asked.derivative(chosen)
         from heat_igl.geodesic.derivatives import DistanceDerivative, differentiable_surface
         from heat_igl.operators import SideLengths

@@ -346,7 +346,10 @@ def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, lapl
     is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
     fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
     if fits or not (mesh.measures > 0).all():
-        simplices = MetricSimplices.of_sides(mesh.V, triangulation.F, triangulation.l, least)
+        # A flip may join a vertex with itself, which is no triangle in space.
+        is_loop = (np.roll(triangulation.F, 1, axis=1) == triangulation.F).any()
+        used = glued if is_loop else triangulation
+        simplices = MetricSimplices.of_sides(mesh.V, used.F, used.l, least)
     else:
         simplices = _of_faces(mesh, g, least)
     return replace(domain, simplices=simplices)
@@ -367,8 +370,7 @@ class _TetrahedronOperators(Operators):
 
     def __init__(self, mesh: Mesh, g: FloatArray, least: float, root: FloatArray, group: Any = None) -> None:
         simplices = MetricSimplices.in_metric(mesh, g, least, group is None, root, group)
-        kept = g[:1].copy() if group is None else g  # at vertices, its inverse root is known
-        vars(self).update(_of=(mesh, simplices, kept, group), simplices=simplices, is_surface=False)
+        vars(self).update(_of=(mesh, simplices, g, group), simplices=simplices, is_surface=False)
 
     _of: tuple[Mesh, MetricSimplices, FloatArray, AnyArray | None]
 
@@ -386,6 +388,18 @@ class _TetrahedronOperators(Operators):
     def _made(self) -> Operators:
         return _of_tetrahedra(*self._of)
 
+    @property
+    def in_tensors(self) -> MetricSimplices | None:
+        """The simplices with the given tensors, where `simplices` have none since these are all the same."""
+        mesh, simplices, g, group = self._of
+        if not simplices.is_in_space:
+            return None
+        corners, (root, least) = mesh.F.astype(np.int32), inverse_root(g)
+        in_space = MetricSimplices(corners, mesh.n_vertices, mesh.V, float(np.sqrt(least[0])), is_given=True)
+        if group is not None:
+            return replace(in_space, tensors=g, group=group)
+        return replace(in_space, velocity=np.ascontiguousarray(root[:, *np.triu_indices(3)]), rows=corners)
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # an instance that is not filled yet, as in `pickle`
             raise AttributeError(name)
@@ -395,8 +409,7 @@ class _TetrahedronOperators(Operators):
 def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray, group: AnyArray | None) -> Operators:
     """The operators of tetrahedra with a metric on each or at each vertex for heat, and `simplices` for distance."""
     m, n = mesh.n_faces, mesh.n_vertices
-    at_corners = (simplices.metric(np.arange(m), corner) for corner in range(4))
-    g = g[group] if group is not None else g if simplices.velocity is None else np.asarray(sum(at_corners)) / 4
+    g = g[mesh.F].mean(axis=1) if group is None else g[group]
     # Each in a space of its own: edges times C have the lengths of the metric C C^T.
     corners = mesh.V[mesh.F]
     corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -137,6 +138,7 @@ class _FacetUpdate:
         centre = W.mean(axis=1)
         steep = np.einsum("kab,kbc,kc->ka", centre, _inverse(e), mean[:, 1:] - mean[:, :1])
         root, growth = np.sqrt(one * two), np.sqrt((steep**2).sum(axis=1)) / mean.mean(axis=1)
+        growth = _smaller(growth, self._most_growth(e, centre, mean / mean.mean(axis=1)[:, None]))
         even = near * (one + two) / (2 * root)
         half = growth * even / 2
         is_even = np.abs(half) < _ROUNDING
@@ -148,6 +150,12 @@ class _FacetUpdate:
         g = factor[:, None] * (along - by[:, 1:]) + (longer / two)[:, None] * mean[:, 1:]
         lean = factor[:, None] * (by[:, :1] - along - by[:, 1:]) - longer[:, None] * (mean[:, 1:] / one[:, None] - 1)
         return T, length, to_T + g, lean
+
+    def _most_growth(self, e: AnyArray, centre: AnyArray, speed: AnyArray) -> AnyArray:
+        """The largest gradient (k,) of the mean velocity that is used, as in `lengths_in_velocity`."""
+        sides = np.concatenate([e, e - np.roll(e, 1, axis=1)], axis=1) @ _inverse(centre)
+        longest, fastest = (reduce(_larger, x.T) for x in ((sides**2).sum(axis=2), speed))
+        return np.asarray(4 * np.sqrt(_larger(fastest**2 - 1, 0) / longest))
 
     def _anywhere(self, at: _Inputs) -> tuple[AnyArray, ...]:
         """What the value takes that is the same at all places on the facet."""
@@ -279,8 +287,8 @@ class SimplexDerivative(ABC):
         ------
         ValueError
             If g has another shape or is not finite at a reachable vertex, or if the solver does not use the given
-            tensors directly: tensors per tetrahedron that sample a smooth field, tensors per triangle, and one tensor
-            for all tetrahedra. Give the metric at the vertices then.
+            tensors directly: tensors per tetrahedron that sample a smooth field, and tensors per triangle. Give the
+            metric at the vertices then.
         """
         rows = gradient_rows(g, self.distance)
         self._require_given()
@@ -291,6 +299,12 @@ class SimplexDerivative(ABC):
         """The gradient (s,) by the offset of each source, as they were listed; `g` (n,) as for a call."""
         (row,), sources = gradient_rows(g, self.distance, 1), self._sources
         return np.asarray(np.bincount(sources.vertex_label, self._by_starts(row), sources.n_labels), np.float64)
+
+    def by_metric(self, g: ArrayLike) -> FloatArray:  # noqa: ARG002
+        """The gradient by the tensors given to `metric_operators`; a ValueError if there are none."""
+        raise ValueError("the solver knows no metric to change: make it on metric_operators or speed_operators")
+
+    by_speed = by_metric
 
     def push_forward(self, dV: ArrayLike) -> FloatArray:
         """Change of the distances (n,) when vertices move by dV (n, 3) and tensors are fixed; 0 if unreachable."""

@@ -19,7 +19,7 @@ def lengths_in_velocity(
     inverse, mean, widest, slack, growth
         As `SimplexUpdate` takes them, with `mean` in the metric of the centre.
     variation : float
-        Of triangles: how far the lengths of edges differ between the metrics of the corners, mean square of the share.
+        How far the lengths of edges differ between the metrics of the corners, mean square of the share.
     """
     size: cython.int = corners.shape[1]
     n_pairs: cython.int = size * (size - 1) // 2
@@ -42,9 +42,12 @@ def lengths_in_velocity(
         for i in range(velocity.shape[0]):
             invert(cython.address(velocity[i, 0]), cython.address(inverse[i, 0]))
         for s in range(m):
+            fastest: cython.double = 0.0
+            longest: cython.double = 0.0
             for k in range(6):
                 W[k] = 0.0
             for i in range(size):
+                fastest = max(fastest, mean_velocity(cython.address(velocity[rows[s, i], 0])))
                 for x in range(3):
                     for j in range(i):
                         e[3 * pair(i, j) + x] = V[corners[s, j], x] - V[corners[s, i], x]
@@ -58,6 +61,11 @@ def lengths_in_velocity(
             gradient(E + 3, rise + 1, size - 1, here)
             squares_of(W, here, 1, cython.address(growth[s]))
             growth[s] = sqrt(growth[s]) / mean_velocity(W)
+            for k in range(n_pairs):
+                longest = max(longest, mean[s, k])
+            # In a flat simplex, the arc over a long edge would leave it, for velocities far above those at the corners.
+            fastest /= mean_velocity(W)
+            growth[s] = min(growth[s], 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
             for i in range(size):
                 squares_of(cython.address(inverse[rows[s, i], 0]), e, n_pairs, squares + 6 * i)
                 for k in range(n_pairs):
@@ -71,8 +79,11 @@ def lengths_in_velocity(
                         if here[k] < slack[s] * mean[s, k]:
                             slack[s] = here[k] / mean[s, k]
             slack[s] = sqrt(slack[s])
-            for k in range(3 if size == 3 else 0):
-                one: cython.double = sqrt(min(squares[k], squares[6 + k], squares[12 + k]))
-                two: cython.double = sqrt(max(squares[k], squares[6 + k], squares[12 + k]))
-                variation += (two - one) * (two - one) / (3.0 * m * mean[s, k])
+            for k in range(n_pairs):
+                one: cython.double = squares[k]
+                two: cython.double = squares[k]
+                for i in range(1, size):
+                    one, two = min(one, squares[6 * i + k]), max(two, squares[6 * i + k])
+                two = sqrt(two) - sqrt(one)
+                variation += two * two / (n_pairs * m * mean[s, k])
     return *found, variation
