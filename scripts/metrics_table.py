@@ -5,7 +5,7 @@
     python scripts/metrics_table.py walls [octopus.mesh ...]   # bodies with concave walls, or these files
     python scripts/metrics_table.py layers [--border 24]       # layers of metrics
     python scripts/metrics_table.py faces [--edge 20]          # a metric per face
-    python scripts/metrics_table.py grids [--rows 48]          # pixels and voxels, beside fast marching
+    python scripts/metrics_table.py grids [--pixels 192] [--voxels 24]  # beside fast marching; several sides, or 0
     python scripts/metrics_table.py smooth [--rows 48]         # tensors that change smoothly in bodies
     python scripts/metrics_table.py choice [cow.obj ...]       # windows beside the Hopf-Lax formula
     python scripts/metrics_table.py polygons cow.obj --sources 8   # on the duals of these meshes, or their polygons
@@ -18,9 +18,9 @@ than 3000 vertices: "finer" is an upper bound. Edges around which paths bend; th
 largest differences, and how much the worst is below the straight line; milliseconds for a query, and those of heat.
 layers and faces: Delaunay triangles of random points, rotated, against shortest ways through ``--border`` points on
 each edge of a border, or on all; mean and largest error, also with half as many points, and per face of fim-python.
-grids: images of 4 x ``--rows`` pixels a side and blocks of half as many voxels as rows, at their centres, from one of
-them, beside scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and
-largest error in percent, and seconds of one query with its preparation; of the default also its memory.
+grids: images and blocks with so many ``--pixels`` and ``--voxels`` a side, at their centres, from one of them, beside
+scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and largest error in
+percent, seconds of one query with its preparation, and memory; of ``--fields`` 0 to 3 alone, in their order.
 smooth: a twisted cylinder and discs, and a cube with a speed that grows linearly, with tensors per simplex and at the
 vertices, times over those of fim-python, which takes those per simplex; "turning" is what `MOST_TURNING` is asked of.
 choice: what `hopf_lax_is_nearer` compares, and mean errors in closed form or against triangles cut into 4 or 16.
@@ -34,6 +34,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from importlib.util import find_spec
 from itertools import pairwise, product
 from typing import Any
@@ -422,14 +423,19 @@ def on_faces(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
 # Grids, beside fast marching.
 
 
-def grids(rows: int) -> Iterator[tuple[str, BoolArray, FloatArray, Callable[[FloatArray, int], FloatArray]]]:
-    """Names, masks, speeds at the centres, and exact distances from a centre, in the unit square and cube."""
-    for shape in ((4 * rows,) * 2, (rows // 2,) * 3):
+def grids(options: argparse.Namespace) -> Iterator[tuple[str, BoolArray, FloatArray, Callable[..., FloatArray], bool]]:
+    """Names, masks, speeds at centres, exact distances from one, and whether speeds are given per cell; a unit cube."""
+    for shape in [(k,) * 2 for k in options.pixels if k] + [(k,) * 3 for k in options.voxels if k]:
         *_, y, x = places = centres(shape)
         name, full, even = "pixels" if len(shape) == 2 else "voxels", np.ones(shape, bool), np.ones(shape)
-        yield f"{name}, one speed", full, even, straight
-        yield f"{name}, without a quarter", (x < 0.5) | (y < 0.5), even, around_the_edge
-        yield f"{name}, speed growing linearly, 1 : 20", full, 1 + 19 * places[0], hyperbolic
+        growing, linear = f"{name}, speed growing linearly, 1 : 20", 1 + 19 * places[0]
+        fields = [
+            (f"{name}, one speed", full, even, straight, False),
+            (f"{name}, without a quarter", (x < 0.5) | (y < 0.5), even, around_the_edge, False),
+            (f"{growing}, at vertices", full, linear, hyperbolic, False),
+            (f"{growing}, per cell", full, linear, hyperbolic, True),
+        ]
+        yield from (fields[k] for k in options.fields)
 
 
 def centres(shape: tuple[int, ...]) -> list[FloatArray]:
@@ -443,10 +449,12 @@ def hyperbolic(V: FloatArray, source: int, most: float = 20) -> FloatArray:
     return np.asarray(np.arccosh(1 + (most - 1) ** 2 * apart / (2 * speed * speed[source])) / (most - 1))
 
 
-def on_simplices(mask: BoolArray, speed: FloatArray, source: tuple[int, ...]) -> FloatArray:
+def on_simplices(per_cell: bool, mask: BoolArray, speed: FloatArray, source: tuple[int, ...]) -> FloatArray:
     domain = heat_igl.image_domain(mask, [1 / k for k in mask.shape])
     made: Mesh | Operators = domain.mesh
-    if np.ptp(speed) > 0:
+    if per_cell:
+        made = speed_operators(domain.mesh, domain.per_face(speed))
+    elif np.ptp(speed) > 0:
         height = domain.mesh.V[:, mask.ndim - 1] - domain.mesh.V[domain.index.flat[0], mask.ndim - 1]
         at_vertices = speed.flat[0] + 19 * height
         made = metric_operators(domain.mesh, np.eye(3) / np.maximum(at_vertices, 1)[:, None, None] ** 2)
@@ -480,21 +488,19 @@ def by_pykonal(mask: BoolArray, speed: FloatArray, source: tuple[int, ...]) -> F
     return np.asarray(solver.traveltime.values).reshape(mask.shape)
 
 
-GRIDS = {"default": on_simplices, "fmm": by_fmm, "konal": by_pykonal}
-
-
 def on_grids(options: argparse.Namespace, _: Random) -> Iterator[Row]:
-    for name, mask, speed, exact in grids(options.rows):
+    for name, mask, speed, exact, per_cell in grids(options):
         source = tuple(k // 3 for k in mask.shape)
         V = np.stack(
             [x.ravel() for x in reversed(centres(mask.shape))] + [np.zeros(mask.size)] * (3 - mask.ndim), axis=1
         )
         truth = np.where(mask, exact(V, int(np.ravel_multi_index(source, mask.shape))).reshape(mask.shape), 0)
         row: Row = {"grid": f"{name}, {' x '.join(map(str, mask.shape))}"}
-        for method, query in GRIDS.items():
+        methods = {"default": partial(on_simplices, per_cell), "fmm": by_fmm, "konal": by_pykonal}
+        for method, query in methods.items():
             with PeakMemory() as peak:
                 row[method] = timed(truth, query, mask, speed, source)
-            row[method]["kB"] = (peak.bytes or np.nan) / 1e3 / mask.sum()
+            row[method] |= {"kB": (peak.bytes or np.nan) / 1e3 / mask.sum(), "GiB": (peak.bytes or np.nan) / 2**30}
         yield row
 
 
@@ -652,11 +658,11 @@ def on_polygons(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
 
 
 def timed(exact: FloatArray, query: Callable[..., FloatArray], *arguments: Any) -> Row:
-    """Mean and largest error in percent, and seconds; nan if what it needs is not installed."""
+    """Mean and largest error in percent, and seconds; nan if what it needs, or memory, is not there."""
     try:
         start = time.process_time()
         found = query(*arguments)
-    except ImportError:
+    except (ImportError, MemoryError):
         return dict.fromkeys(("mean", "largest", "s"), np.nan)
     took, off = time.process_time() - start, np.abs(excess(found, exact))
     return {"mean": off.mean(), "largest": off.max(), "s": took}
@@ -706,7 +712,8 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
         default="default", fim="fim-python", **HALF
     )),
     "grids": (on_grids, {"grid": "{grid}"} | errors_and("s", default="default", fmm="scikit-fmm", konal="pykonal")
-        | {"default, kB per cell": "{default[kB]:.1f}"}),
+        | {"kB per cell": "{default[kB]:.1f}, {fmm[kB]:.1f}, {konal[kB]:.1f}"}
+        | {"GiB": "{default[GiB]:.2g}, {fmm[GiB]:.2g}, {konal[GiB]:.2g}"}),
     "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}", "turning": "{turning:.2g}",
         "fim-python, %": "{fim[mean]:.2g} and {fim[largest]:.2g}",
         **errors_and("time", face="per simplex", vertex="at the vertices"),
@@ -724,7 +731,8 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
 
 def main(argv: Sequence[str] | None = None) -> None:
     more = {"rows": 48, "points": 20_000, "sources": 3, "border": 24, "edge": 20, "count": 3}
-    options = parsed(__doc__, argv, "*", TABLES, **more)
+    lists = {"pixels": [192], "voxels": [24], "fields": [0, 1, 2, 3]}
+    options = parsed(__doc__, argv, "*", TABLES, **more, **lists)
     warnings.simplefilter("ignore", heat_igl.AccuracyWarning)  # that heat is wrong here is what the tables show
     measured, columns = TABLES[options.table]
     rows = collected(measured(options, np.random.default_rng(options.seed)))

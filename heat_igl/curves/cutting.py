@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
+import igl
 import numpy as np
 
 from heat_igl.curves.face_cutting import Point, cut_triangle
@@ -47,26 +48,13 @@ class MeshPiece:
 
         A MeshError if more than two faces meet at an edge, or neighbours are oriented differently.
         """
-        F = self.mesh.F
-        tail, head, apex = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel(), F.ravel()
-        third = {(a, b): c for a, b, c in zip(tail.tolist(), head.tolist(), apex.tolist(), strict=True)}
-        if len(third) < len(tail):
+        F, n = self.mesh.F, self.mesh.n_vertices
+        if len(np.unique(F[:, [1, 2, 0]] * n + F[:, [2, 0, 1]])) < F.size:
             raise MeshError("loops need an oriented manifold: two faces run along an edge in the same direction")
-        left = sorted(edge for edge in third if edge[::-1] not in third)
-        loops, seen = [], set()
-        for first in left:
-            edge, loop = first, []
-            while edge not in seen:
-                seen.add(edge)
-                loop.append(edge[0])
-                # Around the head, through the faces of one fan, to the next edge of the boundary.
-                a, b = edge[1], third[edge]
-                while (b, a) in third:
-                    b = third[b, a]
-                edge = (a, b)
-            if loop:
-                loops.append(np.array(loop))
-        return loops
+        # Where the piece touches itself, each of its fans gets a vertex of its own.
+        fan, vertex = connectivity.fans(F, n)
+        loops = [vertex[loop] for loop in igl.boundary_loop_all(fan.reshape(-1, 3))]
+        return sorted((np.roll(loop, -loop.argmin()) for loop in loops), key=np.ndarray.tolist)
 
 
 @dataclass(frozen=True, eq=False)

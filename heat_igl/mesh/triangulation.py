@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import igl
 import numpy as np
 
 from heat_igl.mesh.connectivity import enumerate_runs, next_in_run
@@ -15,16 +16,6 @@ _ROUNDING = 1e-12
 _NEARLY_PLANAR = 1e-2
 
 
-def triangle_fans(corners: IntArray, degree: IntArray) -> IntArray:
-    """Triangles (sum of (degree - 2), 3): each polygon as a fan around the first corner."""
-    if (degree == 3).all():
-        return corners.reshape(-1, 3)
-    begin = np.repeat(np.cumsum(degree) - degree, degree)
-    position = np.arange(len(corners))
-    second = position[(position > begin) & (position < begin + np.repeat(degree, degree) - 1)]
-    return np.stack([corners[begin[second]], corners[second], corners[second + 1]], axis=1)
-
-
 def triangulated(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[IntArray, IntArray]:
     """Triangles (sum of (degree - 2), 3) of polygons, one after the other, and the polygons (k,) that cross themselves.
 
@@ -33,9 +24,9 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[In
     instead (Meisters 1975), in the plane that its vector area is normal to. A polygon that crosses itself there keeps
     the fan; if it is nearly planar, it has no inside that triangles could fill.
     """
-    F = triangle_fans(corners, degree)
     if (degree == 3).all():
-        return F, np.empty(0, np.int64)
+        return corners.reshape(-1, 3), np.empty(0, np.int64)
+    F, _ = igl.polygons_to_triangles(corners, np.append(0, np.cumsum(degree)))
     wrong = _without_fan(V, F, corners, degree)
     end, end_of_fan = np.cumsum(degree), np.cumsum(degree - 2)
     crossed = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import igl
 import numpy as np
 
 from heat_igl.mesh import Mesh
@@ -122,8 +123,7 @@ def raised(points: FloatArray, height: AnyArray | float = 0.0) -> FloatArray:
 
 def compact(V: FloatArray, F: IntArray) -> Mesh:
     """The mesh of triangles or tetrahedra F without unreferenced vertices."""
-    used, numbers = np.unique(F, return_inverse=True)
-    return Mesh(V[used], numbers.reshape(F.shape))
+    return Mesh(*igl.remove_unreferenced(V, F)[:2])
 
 
 def tetrahedra(V: FloatArray) -> Mesh:
@@ -140,11 +140,7 @@ def carved(n: int, cut: Callable[[FloatArray], BoolArray]) -> Mesh:
 
 def joined(*parts: Mesh) -> Mesh:
     """Several meshes as components of one."""
-    first = np.cumsum([0, *(part.n_vertices for part in parts)])
-    return Mesh(
-        np.concatenate([part.V for part in parts]),
-        np.concatenate([part.F + begin for part, begin in zip(parts, first, strict=False)]),
-    )
+    return Mesh(*igl.combine([part.V for part in parts], [part.F for part in parts]))
 
 
 def merged(mesh: Mesh) -> Mesh:
