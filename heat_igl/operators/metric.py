@@ -370,7 +370,8 @@ class _TetrahedronOperators(Operators):
 
     def __init__(self, mesh: Mesh, g: FloatArray, least: float, root: FloatArray, group: Any = None) -> None:
         simplices = MetricSimplices.in_metric(mesh, g, least, group is None, root, group)
-        vars(self).update(_of=(mesh, simplices, g, group), simplices=simplices, is_surface=False)
+        kept = g[:1].copy() if group is None else g  # at vertices, its inverse root is known
+        vars(self).update(_of=(mesh, simplices, kept, group), simplices=simplices, is_surface=False)
 
     _of: tuple[Mesh, MetricSimplices, FloatArray, AnyArray | None]
 
@@ -398,7 +399,7 @@ class _TetrahedronOperators(Operators):
         in_space = MetricSimplices(corners, mesh.n_vertices, mesh.V, float(np.sqrt(least[0])), is_given=True)
         if group is not None:
             return replace(in_space, tensors=g, group=group)
-        return replace(in_space, velocity=np.ascontiguousarray(root[:, *np.triu_indices(3)]), rows=corners)
+        return replace(in_space, velocity=np.tile(root[0][np.triu_indices(3)], (mesh.n_vertices, 1)), rows=corners)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # an instance that is not filled yet, as in `pickle`
@@ -409,7 +410,8 @@ class _TetrahedronOperators(Operators):
 def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray, group: AnyArray | None) -> Operators:
     """The operators of tetrahedra with a metric on each or at each vertex for heat, and `simplices` for distance."""
     m, n = mesh.n_faces, mesh.n_vertices
-    g = g[mesh.F].mean(axis=1) if group is None else g[group]
+    at_corners = (simplices.metric(np.arange(m), corner) for corner in range(4))
+    g = g[group] if group is not None else g if simplices.velocity is None else np.asarray(sum(at_corners)) / 4
     # Each in a space of its own: edges times C have the lengths of the metric C C^T.
     corners = mesh.V[mesh.F]
     corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)
