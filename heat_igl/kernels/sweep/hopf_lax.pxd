@@ -14,11 +14,11 @@ cdef extern from *:
 cdef class HopfLax:
     cdef SimplexUpdate update
     cdef PriorityQueue waiting
-    # Visits from near to far that are left.
+    # Visits from near to far that are left, but for the first one to each vertex.
     cdef Py_ssize_t left
     cdef const int[:, ::1] corners
     cdef const int[::1] first, incident
-    cdef const unsigned char[::1] fixed
+    cdef unsigned char[::1] fixed
     cdef double[::1] d, pending
     cdef int[::1] label, n_visits
     # Distance at the nearest source, the change that is not handed on, and that of the slope of the last vertex.
@@ -34,7 +34,7 @@ cdef class HopfLax:
     cdef unsigned char[::1] state
     cdef double[::1] sum
 
-    cdef bint is_longer(self, int s, int c, int i) noexcept nogil
+    cdef void reach(self, int v) noexcept nogil
     cdef void wait(self, int v) noexcept nogil
     cdef void sharpen(self) noexcept nogil
     cdef void renew(self, int v) noexcept nogil

@@ -10,8 +10,8 @@ lead to one fixed point, which converges to the distance in a continuous metric 
 Its second differences along the edges of the facet are found from the slopes of distance at the corners, and are used
 as far as these agree with the distances, and with the metric of the simplex.
 
-Distances begin with those along edges. Vertices are visited from near to far, then in rounds, each after those it has
-its distance from.
+Distances begin with those along edges. Vertices are visited from near to far, some again, then in rounds, each after
+those it has its distance from.
 """
 
 import cython
@@ -44,47 +44,59 @@ class HopfLax:
         self.corners, self.first, self.incident = corners, first, incident
         self.update = SimplexUpdate(corners, *in_metric)
 
-    def shorten(self, d: cython.double[::1], label: cython.int[::1]) -> None:
-        """Lower distances `d` (n,) to paths along edges, in place; labels (n,) are handed on (Dijkstra 1959)."""
-        size: cython.int = self.corners.shape[1]
-        n_taken: cython.Py_ssize_t = 0
-        self.d, self.low, self.waiting = d, np.min(d), PriorityQueue(len(d))
+    def shorten(self, d: cython.double[::1], label: cython.int[::1], left: cython.Py_ssize_t = 0) -> None:
+        """Lower distances `d` (n,) to paths along edges, in place; labels (n,) are handed on (Dijkstra 1959).
+
+        With visits `left`, each vertex gets one when it is reached, and others as long as these last.
+        """
+        n, n_taken = len(d), 0
+        self.d, self.label, self.low, self.waiting, self.left = d, label, np.min(d), PriorityQueue(n), left
+        self.facet, self.pending, self.fixed = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n, np.uint8)
         with cython.nogil:
-            for s in range(self.corners.shape[0]):
-                for c in range(size):
-                    for i in range(size):
-                        if self.is_longer(s, c, i):
-                            self.wait(self.corners[s, c])
+            for v in range(self.d.shape[0]):
+                if d[v] < INFINITY and left > 0:
+                    self.wait(v)
+                elif d[v] < INFINITY and self.pending[v] == 0.0:
+                    self.reach(v)
             while self.waiting.count > 0:
                 n_taken += 1
                 if n_taken % ASK == 0 and is_interrupted():
                     break
                 v: cython.int = cython.cast(cython.int, self.waiting.first())
                 self.waiting.set_key(v, 0.0)
-                for k in range(self.first[v], self.first[v + 1]):
-                    s: cython.int = self.incident[k] // size
-                    c: cython.int = self.incident[k] % size
-                    for i in range(size):
-                        if self.is_longer(s, c, i):
-                            u: cython.int = self.corners[s, i]
-                            d[u] = d[v] + edge_length(self.update, s, c, i)
-                            label[u] = label[v]
-                            self.wait(u)
+                is_first: cython.bint = self.facet[v] < 0
+                if self.pending[v] == 0.0:
+                    # A source, and no other is nearer.
+                    self.fixed[v] = 1
+                elif self.left > 0:
+                    self.left -= not is_first
+                    self.renew(v)
+                if is_first:
+                    self.reach(v)
+        self.left = 0
         raise_caught()
 
-    def is_longer(self, s: cython.int, c: cython.int, i: cython.int) -> cython.bint:
-        """Whether corner i of simplex s is farther away than by the edge from corner c."""
-        near: cython.double = self.d[self.corners[s, c]]
-        far: cython.double = self.d[self.corners[s, i]]
-        # Not by rounding, which would pass along many edges.
-        return near < far and near + edge_length(self.update, s, c, i) < far * (1 - 1e-12)
+    def reach(self, v: cython.int) -> cython.void:
+        """Lower distances around v to those along edges from v, where vertices were not visited."""
+        size: cython.int = self.corners.shape[1]
+        for k in range(self.first[v], self.first[v + 1]):
+            s: cython.int = self.incident[k] // size
+            c: cython.int = self.incident[k] % size
+            for i in range(size):
+                u: cython.int = self.corners[s, i]
+                if self.facet[u] < 0 and self.d[v] < self.d[u]:
+                    far: cython.double = self.d[v] + edge_length(self.update, s, c, i)
+                    # Not by rounding, which would pass along many edges.
+                    if far < self.d[u] * (1 - 1e-12):
+                        self.d[u], self.label[u], self.pending[u] = far, self.label[v], INFINITY
+                        self.wait(u)
 
     def wait(self, v: cython.int) -> cython.void:
         """Let v wait, the nearest first."""
         self.waiting.set_key(v, 1.0 / (self.d[v] - self.low))
 
     def settle(self, d, label, offset):
-        """Lower distances, first to those along edges, then to those of second order, in place.
+        """Lower distances to those of second order, in place.
 
         Parameters
         ----------
@@ -103,45 +115,27 @@ class HopfLax:
         weight : (n,) float64
             How far T is of second order for a vertex: from 1 to 0, where T is linear.
         """
-        self.shorten(d, label)
         n, update = len(d), self.update
-        facet, place, weight = np.full(n, -1, np.int32), np.zeros((n, update.p)), np.ones(n)
-        slope, is_sloped = np.zeros((n, 3)), np.zeros(n, np.uint8)
-        # Nearer than a source to itself is another one.
-        fixed = d == np.append(offset, np.inf)[label]
-        step, pending = np.zeros(n), np.where(np.isfinite(d) & ~fixed, np.inf, 0.0)
-        self.label, self.pending = label, pending
-        self.facet, self.place, self.step, self.weight = facet, place, step, weight
+        place, weight, slope, is_sloped = np.zeros((n, update.p)), np.ones(n), np.zeros((n, 3)), np.zeros(n, np.uint8)
+        self.place, self.step, self.weight = place, np.zeros(n), weight
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
-        self.fixed = fixed.view(np.uint8)
-        update.d, update.label, update.low, update.offset = d, label, self.low, offset
+        update.d, update.label, update.low, update.offset = d, label, np.min(d), offset
         update.slope, update.is_sloped, update.weight = slope, is_sloped, weight
         self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
-        self.roots = np.argsort(d, kind="stable").astype(np.int32)
         # Changes add up along a path.
         self.settled = SETTLED * n ** (-1.0 / update.p)
+        # Where metrics are long in one direction, distances depend on larger ones, and this order takes too long.
+        self.shorten(d, label, n // 2)
+        self.roots = np.argsort(d, kind="stable").astype(np.int32)
         with cython.nogil:
             self.sharpen()
         raise_caught()
-        return facet, place, slope, is_sloped, weight
+        return np.asarray(self.facet), place, slope, is_sloped, weight
 
     def sharpen(self) -> cython.void:
-        """Second order, from near to far, then in rounds: each vertex after those it has its distance from."""
+        """Visit vertices in rounds, each after those it has its distance from."""
         v: cython.int
         is_settled: cython.bint = False
-        for v in range(self.d.shape[0]):
-            if self.pending[v] > 0.0:
-                self.wait(v)
-        # Where metrics are long in one direction, distances depend on larger ones, and this order takes too long.
-        self.left = 2 * self.d.shape[0]
-        while self.waiting.count > 0 and self.left > 0:
-            if self.left % ASK == 0 and is_interrupted():
-                return
-            self.left -= 1
-            v = cython.cast(cython.int, self.waiting.first())
-            self.waiting.set_key(v, 0.0)
-            self.renew(v)
-        self.left = 0
         while not is_settled and not is_interrupted():
             is_settled = True
             self.arrange()
@@ -174,7 +168,7 @@ class HopfLax:
             s: cython.int = self.incident[k] // size
             most: cython.double = change
             # T changes by an eighth, in the middle of an edge, of how far a slope changes along it.
-            for c in range(size):
+            for c in range(size if change < INFINITY else 0):
                 u: cython.int = self.corners[s, c]
                 by: cython.double = 0.0
                 for i in range(3):
@@ -182,7 +176,7 @@ class HopfLax:
                 most = max(most, fabs(by))
             for c in range(size):
                 u = self.corners[s, c]
-                if u == v or self.fixed[u] or not most > max(self.settled, self.pending[u]):
+                if u == v or self.fixed[u] or self.facet[u] < 0 or not most > max(self.settled, self.pending[u]):
                     continue
                 # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
                 if (
@@ -205,23 +199,35 @@ class HopfLax:
         best: cython.double = INFINITY
         best_at: cython.int = -1
         kept: cython.double[3]
-        # The facet of the last visit first: it rules out most of the others.
-        for k in range(self.first[v] - 1, self.first[v + 1]):
-            at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
-            if at < 0 or (at == self.facet[v] and k >= self.first[v]):
-                continue
-            s: cython.int = at // size
-            c: cython.int = at % size
-            value: cython.double = self.update.through(s, c, best)
-            if k < self.first[v]:
-                rise = -self.step[v]
-                for i in range(size - 1):
-                    rise -= self.place[v, i] * self.update.level[i]
-            # Facets that share the best place have equal values but for rounding: the first one stays.
-            if value + EQUAL * fabs(value) < best:
-                best, best_at = value, at
-                for i in range(size - 1):
-                    kept[i] = self.update.share[i]
+        # Without corners that were not visited, for which it would be done again, if it gets nearer by the others.
+        for is_open in range(2):
+            n_left: cython.int = 0
+            # The facet of the last visit first: it rules out most of the others.
+            for k in range(self.first[v] - 1, self.first[v + 1]):
+                at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
+                if at < 0 or (at == self.facet[v] and k >= self.first[v]):
+                    continue
+                s: cython.int = at // size
+                c: cython.int = at % size
+                has_open: cython.bint = False
+                for i in range(size):
+                    u: cython.int = self.corners[s, i]
+                    has_open |= i != c and self.facet[u] < 0 and not self.fixed[u]
+                n_left += has_open != is_open
+                if has_open != is_open:
+                    continue
+                value: cython.double = self.update.through(s, c, best)
+                if k < self.first[v]:
+                    rise = -self.step[v]
+                    for i in range(size - 1):
+                        rise -= self.place[v, i] * self.update.level[i]
+                # Facets that share the best place have equal values but for rounding: the first one stays.
+                if value + EQUAL * fabs(value) < best:
+                    best, best_at = value, at
+                    for i in range(size - 1):
+                        kept[i] = self.update.share[i]
+            if n_left == 0 or best < self.d[v] + EQUAL * fabs(best):
+                break
         if best_at < 0:
             return
         self.risen[v] += max(rise + best, 0.0)

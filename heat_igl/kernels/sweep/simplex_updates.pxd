@@ -19,10 +19,10 @@ cdef class SimplexUpdate(Facet):
     cdef double[::1] d
     # What bounds the values through each simplex.
     cdef double[::1] widest, slack, growths
-    # The source of each vertex, the offset of each, and the least distance.
+    # The source of each vertex, the offset of each, the least distance, and by how much T may sag on the facet.
     cdef int[::1] label
     cdef const double[::1] offset
-    cdef double low
+    cdef double low, most_sag
     # The derivative of distance by the position of each vertex, where it is known.
     cdef double[:, ::1] slope
     cdef unsigned char[::1] is_sloped

@@ -148,8 +148,14 @@ class SimplexUpdate(Facet):
         nearest: cython.double = self.face(s, c)
         # Between corners at one distance from a point, the square is less by at most a third of a squared edge.
         most: cython.double = 0.5 * self.widest[s]
+        if (nearest - best) * (nearest - self.low) >= most:
+            return INFINITY
+        for i in range(self.p):
+            if self.level[i] == INFINITY:
+                return INFINITY
         near: cython.double = max(nearest - self.low, sqrt(most))
         sag: cython.double = near - sqrt(max(near * near - most, 0.0))
+        self.most_sag = sag
         room: cython.double = (best + sag - nearest) / self.slack[s]
         if not room > 0.0:
             return INFINITY
@@ -193,6 +199,15 @@ class SimplexUpdate(Facet):
         if is_source and self.q > 1:
             # T is not linear on an edge to the source, and its square not quadratic.
             return self.along_edges()
+        L: cython.double = self.length(self.share)
+        low: cython.double = INFINITY
+        at: cython.double = 0.0
+        for i in range(self.p):
+            low = min(low, self.D[i] + self.g[i])
+            at += self.g[i] * self.share[i]
+        # No value is below the tangent plane here of that with T linear by more than T sags.
+        if L > 0.0 and self.start + L + low - at - self.most_sag >= limit:
+            return INFINITY
         for i in range(self.p):
             x[i] = self.trust(s, i)
             for j in range(i):
