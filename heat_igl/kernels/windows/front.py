@@ -58,7 +58,7 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
     s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
     s.n_all_lists = s.n_all_heap = 0
     s.free_list = -1
-    s.failed = s.meets_flat = s.is_shared = False
+    s.failed = s.meets_ties = s.is_shared = False
     s.n_windows = s.n_lists_done = s.n_waiting = 0
     s.n_nearest = s.n_crossed = 0
     s.lists, s.heap = cython.NULL, cython.NULL
@@ -240,7 +240,7 @@ def relax(
     if s.kind[v] == UNKNOWN:
         s.kind[v] = classify(s, v)
     if s.kind[v] == FLAT:
-        s.meets_flat = True
+        s.meets_ties = True
     elif s.kind[v] != PASSED:
         push(s, distance, s.n_half_edges + v)
 

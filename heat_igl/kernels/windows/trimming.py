@@ -6,6 +6,7 @@ The other path may run over an end of the half-edge (Xin and Wang 2009) or throu
 import cython
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.structures import (
+    BEYOND,
     JOINS,
     MARGIN,
     NARROW,
@@ -65,20 +66,15 @@ def _meeting(
     high: cython.double,
     at_low: cython.double,
     at_high: cython.double,
-    shift: cython.double,
-    room: cython.p_double,
+    error: cython.p_double,
 ) -> cython.double:
-    """The root of distance(u) - distance(w) + `shift` in the bracket [low, high].
+    """The root of distance(u) - distance(w) in the bracket [low, high], and a bound on its error.
 
     Newton's method with bisection; `at_low` and `at_high` are the values at both ends, of opposite signs. It ends as
-    soon as the step bounds the error: the second derivative of a distance is at most 1 / distance. On entry, `room` is
-    a margin of length; on return, it is how far on each side of the root windows must overlap. This covers the error of
-    the root and the part on which the difference is below the margin.
+    soon as the step bounds the error: the second derivative of a distance is at most 1 / distance.
     """
     x: cython.double = low + (high - low) * at_low / (at_low - at_high)
-    margin: cython.double = room[0]
-    slope: cython.double = 0.0
-    shift += u.offset - w.offset
+    shift: cython.double = u.offset - w.offset
     for _ in range(8):
         a = reach(u, x)
         b = reach(w, x)
@@ -94,117 +90,86 @@ def _meeting(
         x += step
         if 4.0 * bend * fabs(step) <= fabs(slope) and low <= x <= high:
             # Along this step, the derivative stays above half of its value.
-            room[0] = (bend * step * step + 2.0 * margin) / fabs(slope)
+            error[0] = bend * step * step / fabs(slope)
             return x
         if not (low < x < high):
             x = 0.5 * (low + high)
-    room[0] = high - low
+    error[0] = high - low
     return x
-
-
-@cython.cfunc
-@cython.nogil
-def _compare_squares(
-    u: cython.pointer(Window),
-    w: cython.pointer(Window),
-    low: cython.double,
-    high: cython.double,
-    until: cython.p_double,
-) -> cython.int:
-    """`_compare` for roots with equal offsets: then the difference of the squared distances is linear."""
-    # |x - u|^2 - |x - w|^2 = b - a x
-    a: cython.double = 2.0 * (u.x - w.x)
-    b: cython.double = (u.x - w.x) * (u.x + w.x) + (u.depth - w.depth) * (u.depth + w.depth)
-    at_low: cython.double = b - a * low
-    at_high: cython.double = b - a * high
-    reached: cython.double = fabs(low - u.x) + u.depth
-    margin: cython.double = 2.0 * ROUNDING * (u.offset + reached) * reached
-    if at_low < -margin and at_high < -margin:
-        return U_NEARER
-    if at_low > margin and at_high > margin:
-        return W_NEARER
-    if a == 0.0:
-        return UNDECIDED
-    a = 1.0 / a
-    if a < 0.0:
-        until[0] = high if at_high <= margin else (b - margin) * a
-        until[1] = low if at_low >= -margin else (b + margin) * a
-        return U_THEN_W
-    until[0] = low if at_low <= margin else (b - margin) * a
-    until[1] = high if at_high >= -margin else (b + margin) * a
-    return W_THEN_U
 
 
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _ordered(
-    u: cython.pointer(Window),
-    w: cython.pointer(Window),
-    low: cython.double,
-    high: cython.double,
-    at_low: cython.double,
-    at_high: cython.double,
-    slope_low: cython.double,
-    slope_high: cython.double,
-    margin: cython.double,
-    until: cython.p_double,
-) -> cython.int:
-    """`_compare` if u is nearer at `low` or equal; `at_` and `slope_` are distance(u) - distance(w) and its slope."""
-    if at_high < -margin:
-        # The difference has at most one extremum: where the line through both roots meets the half-edge.
-        if slope_low <= 0.0 or slope_high >= 0.0:
-            return U_NEARER
-        a = u.x - w.x
-        b = u.depth - w.depth
-        is_farther: cython.bint = u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2
-        return U_NEARER if is_farther and not (u.is_plane or w.is_plane) else UNDECIDED
-    if at_low < -margin and at_high > margin:
-        b = margin
-        a = _meeting(u, w, low, high, at_low, at_high, 0.0, cython.address(b))
-        until[0], until[1] = min(a + b, high), max(a - b, low)
-        return U_THEN_W
-    # The distances agree to rounding at one end, or at both.
-    until[0], until[1] = high, low
-    b = 0.0
-    if at_low < -margin:
-        if slope_high >= 0.0:
-            a = _meeting(u, w, low, high, at_low + margin, at_high + margin, margin, cython.address(b))
-            until[1] = max(a - b, low)
-        return U_THEN_W
-    if at_high > margin:
-        if slope_low >= 0.0:
-            a = _meeting(u, w, low, high, at_low - margin, at_high - margin, -margin, cython.address(b))
-            until[0] = min(a + b, high)
-        return U_THEN_W
-    return UNDECIDED
+def _is_farther(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+    """Whether the root of w is at least as far from that of u as it begins later, so u is nearer everywhere."""
+    a: cython.double = u.x - w.x
+    b: cython.double = u.depth - w.depth
+    return u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2 and not (u.is_plane or w.is_plane)
 
 
 @cython.cfunc
 @cython.nogil
 def _compare(
+    s: cython.pointer(Search),
     u: cython.pointer(Window),
     w: cython.pointer(Window),
     low: cython.double,
     high: cython.double,
     until: cython.p_double,
 ) -> cython.int:
-    """Which of two windows gives the smaller distance between two points, by more than rounding.
+    """Which of two windows to keep between two points of both: the nearer one, even if by less than rounding.
 
-    If the order differs at the two ends, `until` takes the points up to which u and w are needed.
+    If each is nearer at one end, `until` takes the points up to which u and w are needed.
     """
-    if u.offset == w.offset and not (u.is_plane or w.is_plane):
-        return _compare_squares(u, w, low, high, until)
-    a, b, c, d = reach(u, low), reach(w, low), reach(u, high), reach(w, high)
-    at_low, at_high = (u.offset - w.offset) + a - b, (u.offset - w.offset) + c - d
-    slope_low, slope_high = _change(u, w, low, a, b), _change(u, w, high, c, d)
-    margin = ROUNDING * (fabs(u.offset) + a)
-    # If w is nearer at the lower end, exchange u and w.
-    if at_low > margin or (at_low >= -margin and at_high < -margin):
-        order = _ordered(w, u, low, high, -at_low, -at_high, -slope_low, -slope_high, margin, until)
-        until[0], until[1] = until[1], until[0]
-        return W_NEARER if order == U_NEARER else W_THEN_U if order == U_THEN_W else UNDECIDED
-    return _ordered(u, w, low, high, at_low, at_high, slope_low, slope_high, margin, until)
+    at_low: cython.double
+    at_high: cython.double
+    slope_low: cython.double
+    slope_high: cython.double
+    margin: cython.double
+    is_square: cython.bint = u.offset == w.offset and not (u.is_plane or w.is_plane)
+    if is_square:
+        # The difference of the squared distances is linear: |x - u|^2 - |x - w|^2 = b - a x.
+        a = 2.0 * (u.x - w.x)
+        b = (u.x - w.x) * (u.x + w.x) + (u.depth - w.depth) * (u.depth + w.depth)
+        at_low, at_high = b - a * low, b - a * high
+        slope_low = slope_high = -a
+        c = fabs(low - u.x) + u.depth
+        margin = 2.0 * ROUNDING * (u.offset + c) * c
+    else:
+        a, b, c, d = reach(u, low), reach(w, low), reach(u, high), reach(w, high)
+        at_low, at_high = (u.offset - w.offset) + a - b, (u.offset - w.offset) + c - d
+        slope_low, slope_high = _change(u, w, low, a, b), _change(u, w, high, c, d)
+        margin = ROUNDING * (fabs(u.offset) + a)
+    # Where distances are equal to rounding at an end, another list may decide for the other one. So one is kept there
+    # only if it reaches all points ahead that the other reaches: it extends beyond, or its lines lean farther outward.
+    # If both end at one vertex, points between their last lines might otherwise be reached by neither.
+    beyond: cython.double = BEYOND * (high - low)
+    is_tie: cython.bint = fabs(at_low) <= margin and fabs(at_high) <= margin
+    u_low: cython.bint = at_low < -margin or slope_low <= 0.0 or u.start < w.start - beyond
+    u_high: cython.bint = at_high < -margin or slope_high >= 0.0 or u.stop > w.stop + beyond
+    w_low: cython.bint = at_low > margin or slope_low >= 0.0 or w.start < u.start - beyond
+    w_high: cython.bint = at_high > margin or slope_high <= 0.0 or w.stop > u.stop + beyond
+    is_safe: cython.bint
+    # The difference has at most one extremum: where the line through both roots meets the half-edge.
+    if at_low <= 0.0 and at_high <= 0.0:
+        is_safe = u_low and u_high and (slope_low <= 0.0 or slope_high >= 0.0 or _is_farther(u, w))
+        s.n_ties += is_tie and is_safe
+        return U_NEARER if is_safe else UNDECIDED
+    if at_low >= 0.0 and at_high >= 0.0:
+        is_safe = w_low and w_high and (slope_low >= 0.0 or slope_high <= 0.0 or _is_farther(w, u))
+        s.n_ties += is_tie and is_safe
+        return W_NEARER if is_safe else UNDECIDED
+    s.n_ties += is_tie
+    error: cython.double = 0.0
+    x: cython.double = b / a if is_square else _meeting(u, w, low, high, at_low, at_high, cython.address(error))
+    if at_low < 0.0:
+        until[0] = min(x + error, high) if w_high else high
+        until[1] = max(x - error, low) if u_low else low
+        return U_THEN_W
+    until[1] = min(x + error, high) if u_high else high
+    until[0] = max(x - error, low) if w_low else low
+    return W_THEN_U
 
 
 @cython.cfunc
@@ -243,7 +208,7 @@ def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window)) -> cyt
 
 @cython.cfunc
 @cython.nogil
-def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
+def _settle(s: cython.pointer(Search), u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
     """Trim two windows where the other is nearer. 1: nothing is left of u, 2: nothing of w, 4: w precedes u."""
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
@@ -251,7 +216,7 @@ def _settle(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
     first: cython.int = 4 * ((w.start < u.start) & (w.stop < u.stop))
     if _overlap_little(u, w):
         return first
-    order = _compare(u, w, low, high, until)
+    order = _compare(s, u, w, low, high, until)
     if order == U_NEARER:
         return _gives_way(u, w, low, high)
     if order == W_NEARER:
@@ -357,6 +322,7 @@ def _is_next(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bin
 @cython.cfunc
 @cython.nogil
 def _insert(
+    s: cython.pointer(Search),
     windows: cython.pointer(Window),
     k: cython.int,
     w: cython.pointer(Window),
@@ -372,12 +338,15 @@ def _insert(
     moved: Window
     u: cython.pointer(Window)
     narrow: cython.double = NARROW * length
+    s.n_ties = 0
     while j > 0:
         u = windows + (j - 1)
         if (is_many or (j == k and u.start <= w.start)) and _goes_on(u, w, length, is_many):
             u.start, u.stop = min(u.start, w.start), max(u.stop, w.stop)
             return k
-        outcome = _settle(u, w)
+        outcome = _settle(s, u, w)
+        # Which of three windows equal to rounding stays depends on the others in the list.
+        s.meets_ties = s.meets_ties or s.n_ties > 1
         if outcome == 1 or u.stop - u.start <= narrow:
             if j < k:
                 memmove(u, u + 1, (k - j) * cython.sizeof(Window))
@@ -439,7 +408,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
                 windows[k] = w[0]
             k += 1
         else:
-            k = _insert(windows, k, w, length, is_many)
+            k = _insert(s, windows, k, w, length, is_many)
     return k
 
 
@@ -502,7 +471,7 @@ def trim_by_kept(
         k = 0
         for i in range(n):
             u = kept[j]
-            if _settle(cython.address(u), windows + i) != 2:
+            if _settle(s, cython.address(u), windows + i) != 2:
                 windows[k] = windows[i]
                 k += 1
         n = k

@@ -8,9 +8,10 @@ distances that they have found, and trim windows by them, as one thread does. Th
 of the two parts go further than in a search on one thread, by the length of a round. If one part has much less work
 left, it gets a piece of the other. All decisions depend on the two queues alone, never on which thread is faster.
 
-The rounding of a distance depends on the faces that the path crosses, not on the thread. The exception are the halves
-of a window that are merged behind a flat vertex, since both must wait in one list: `_run_beside` then ends, and one
-thread repeats the search. Surfaces with flat parts have few windows in any case.
+The rounding of a distance depends on the faces that the path crosses, not on the thread. There are two exceptions: the
+halves of a window that are merged behind a flat vertex must wait in one list, and which of three windows equal to
+rounding stays depends on the list. `_run_beside` then ends, and one thread repeats the search. Surfaces with flat parts
+have few windows in any case.
 """
 
 import cython
@@ -372,7 +373,7 @@ def part(first: Front, second: Front) -> bool:
             free(s.news[i])
         for i in range(4):
             PyThread_free_lock(s.arrived[i])
-    return not (first.state.is_shared and (first.state.meets_flat or second.state.meets_flat))
+    return not (first.state.is_shared and (first.state.meets_ties or second.state.meets_ties))
 
 
 @cython.cfunc
@@ -518,7 +519,7 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
     """Process entries with keys below `until`; if that is infinite, until there is enough work for two threads."""
     entry: Entry
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
-        if until == INFINITY and _load(s) > s.plenty and not s.meets_flat:
+        if until == INFINITY and _load(s) > s.plenty and not s.meets_ties:
             return
         entry = _first(s)
         _carry(s, entry)
@@ -553,7 +554,7 @@ def _run_beside(s: cython.pointer(Search)) -> cython.void:
         p = s.parity
         s.first_key[p] = s.heap[0].key if s.n_heap > 0 else INFINITY
         s.load[p] = _load(s)
-        s.has_failed[p], s.met_flat[p] = s.failed, s.meets_flat
+        s.has_failed[p], s.met_ties[p] = s.failed, s.meets_ties
         _meet(s, p)
         # Distances that the other search has found are upper bounds.
         for i in range(o.n_news[p]):
@@ -562,7 +563,7 @@ def _run_beside(s: cython.pointer(Search)) -> cython.void:
         key = min(s.first_key[p], o.first_key[p])
         if s.has_failed[p] or o.has_failed[p] or key == INFINITY or key > s.last_key:
             break
-        if s.is_shared and (s.met_flat[p] or o.met_flat[p]):
+        if s.is_shared and (s.met_ties[p] or o.met_ties[p]):
             break
         is_alone = _balance(s)
         s.parity = 1 - p
