@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 
-from heat_igl.mesh.connectivity import unique_rows
+from heat_igl.mesh.connectivity import connected_components, unique_rows
 from heat_igl.typing import IntArray
 
 if TYPE_CHECKING:
@@ -44,9 +43,7 @@ def seam_pairs(mesh: Mesh) -> IntArray:
 def seam_originals(mesh: Mesh) -> IntArray:
     """The first vertex (n,) of those that become one with each when all `seam_pairs` are joined."""
     pairs, n = seam_pairs(mesh), mesh.n_vertices
-    a, b = np.concatenate([pairs[:, [0, 3]], pairs[:, [1, 2]]]).T
-    graph = sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
-    _, label = sp.csgraph.connected_components(graph, directed=False)
+    label = connected_components(np.concatenate([pairs[:, [0, 3]], pairs[:, [1, 2]]]), n)
     _, first = np.unique(label, return_index=True)
     return np.asarray(first[label], np.int64)
 
