@@ -258,11 +258,12 @@ class GeodesicSolver(BatchedSolver):
 
                 if domain.simplices.is_in_space:
                     return distance_plan("tetrahedra", method, tolerance), LineEngine(domain.simplices)
-                chosen = distance_plan("varying metric" if domain.surface else "separate simplices", method, tolerance)
+                fits = domain.has_surface
+                chosen = distance_plan("varying metric" if fits else "separate simplices", method, tolerance)
                 if chosen.engine == "hopf-lax":
-                    self._triangles = OperatorTriangles(domain) if domain.surface else None
+                    self._triangles = OperatorTriangles(domain) if fits else None
                     return chosen, HopfLaxEngine(domain.simplices)
-            if domain.surface is None:
+            if not domain.has_surface:
                 raise MeshError("distance is measured along simplices, and these operators know none: give the mesh")
             chosen = distance_plan("triangles", method, tolerance)
             return self._on_triangles(OperatorTriangles(domain), chosen)

@@ -232,6 +232,11 @@ class Operators:
         return self.surface if self.drawn_on is None else self.drawn_on
 
     @property
+    def has_surface(self) -> bool:
+        """Whether there is a `surface`, which may not be made yet."""
+        return self.surface is not None
+
+    @property
     def n_given(self) -> int:
         """Number of vertices of the mesh; n if none were added by refinement or as virtual ones."""
         given = self.source_surface

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import igl
@@ -101,13 +103,10 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
     check_measures(mesh)
     g = real_numbers("metric", metric)
     if g.shape == (mesh.n_vertices, 3, 3) and mesh.n_vertices != mesh.n_faces:
-        return _of_smooth_metric(mesh, *_checked_at_corners(g, mesh), laplacian)
+        return _of_smooth_metric(mesh, g, laplacian)
     if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, *_checked(g, mesh))
-    domain = operators_in_metric(mesh, *_checked(g, mesh)[:3], laplacian)
-    if domain.surface is None:
-        return domain
-    return replace(domain, metric=MetricSides(mesh, metric))
+        return _of_groups(mesh, *_checked(g, mesh))
+    return operators_in_metric(mesh, *_checked(g, mesh)[:3], laplacian, g)
 
 
 def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
@@ -168,11 +167,8 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     each = s[first, None, None]
     in_metric = np.eye(p) / each**2, 1 / float(s.max()), np.eye(p) * each
     if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, *in_metric, group)
-    domain = operators_in_metric(mesh, *in_metric)
-    if domain.surface is None:
-        return domain
-    return replace(domain, metric=MetricSides(mesh, np.eye(3) / s[:, None, None] ** 2))
+        return _of_groups(mesh, *in_metric, group)
+    return operators_in_metric(mesh, *in_metric, given=s)
 
 
 def fibre_metric(
@@ -268,11 +264,17 @@ def _squared_factor(name: str, given: ArrayLike, k: int) -> FloatArray:
 
 
 def operators_in_metric(
-    mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None = None, laplacian: Laplacian = "auto"
+    mesh: Mesh,
+    g: FloatArray,
+    least: float,
+    root: FloatArray | None = None,
+    laplacian: Laplacian = "auto",
+    given: FloatArray | None = None,
 ) -> Operators:
     """`metric_operators` of checked triangles and metrics g (m, 2, 2) in their planes.
 
-    No unit vector is shorter than `least` in it. The inverse root (m, 2, 2) may be given.
+    No unit vector is shorter than `least` in it. The inverse root (m, 2, 2) may be given, and that by which lengths are
+    differentiated: a metric, or speeds (m,).
     """
     corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
     along = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
@@ -282,17 +284,26 @@ def operators_in_metric(
         return _refracting(mesh, own, g, least, laplacian)
     # Triangles without area know no metric in their plane.
     has_area = bool((mesh.measures > 0).all())
-    return _unfolded(mesh, sides, _of_faces(mesh, g, least, root) if has_area else None, laplacian)
+    return _unfolded(mesh, sides, _of_faces(mesh, g, least, root) if has_area else None, laplacian, given)
 
 
-def _unfolded(mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian) -> Operators:
+def _unfolded(
+    mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian, given: FloatArray | None
+) -> Operators:
     """The operators of triangles with the lengths `sides` (m, 3), and with `simplices` where these are nearer."""
-    domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
-    if simplices is not None and not hopf_lax_is_nearer(
+    if simplices is not None and hopf_lax_is_nearer(
         simplices.measured[-1], mean_angle_defect(intrinsic_triangulation(mesh), True)
     ):
-        simplices = None
-    return replace(domain, simplices=simplices)
+        return _LaterOperators(mesh, simplices, _of_triangles, mesh, sides, simplices, laplacian, given)
+    return _of_triangles(mesh, sides, None, laplacian, given)
+
+
+def _of_triangles(
+    mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian, given: FloatArray | None
+) -> Operators:
+    domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
+    given = np.eye(3) / given[:, None, None] ** 2 if given is not None and given.ndim == 1 else given
+    return replace(domain, simplices=simplices, metric=None if given is None else MetricSides(mesh, given))
 
 
 def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None = None) -> MetricSimplices:
@@ -301,17 +312,19 @@ def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None =
     return MetricSimplices.in_metric(mesh, np.swapaxes(axes, 1, 2) @ g @ axes, least, root=root)
 
 
-def _of_smooth_metric(mesh: Mesh, g: FloatArray, least: float, root: FloatArray, laplacian: Laplacian) -> Operators:
-    """The operators of simplices with a metric (n, 3, 3) at each vertex, as `operators_in_metric`."""
+def _of_smooth_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian) -> Operators:
+    """The operators of simplices with a metric (n, 3, 3) at each vertex, after checks, as `operators_in_metric`."""
+    g, least, root = _checked_at_corners(g, mesh)
     if mesh.is_tetrahedral:
-        return _TetrahedronOperators(mesh, g, least, root)
+        return _of_groups(mesh, g, least, root)
     simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
-    axes = plane_axes(mesh)
-    inside = axes @ g[mesh.F].mean(axis=1) @ np.swapaxes(axes, 1, 2)
+    del root  # of each corner
     sides = simplices.edges[1].reshape(-1, 3)[:, ::-1]  # opposite each corner
     if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1])):
-        return _unfolded(mesh, sides, simplices, laplacian)
+        return _unfolded(mesh, sides, simplices, laplacian, None)
     # For heat: what each face says alone.
+    axes = plane_axes(mesh)
+    inside = axes @ g[mesh.F].mean(axis=1) @ np.swapaxes(axes, 1, 2)
     domain = operators_in_metric(mesh, inside, least, None, laplacian)
     return replace(domain, surface=None, simplices=simplices)
 
@@ -365,29 +378,41 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
     return replace(apart, l=sides, twin=twin)
 
 
-class _TetrahedronOperators(Operators):
-    """Those of tetrahedra in metrics of each `group` (m,) or vertex, made on first use: `simplices` need none."""
+def _of_groups(mesh: Mesh, g: FloatArray, least: float, root: FloatArray, group: Any = None) -> Operators:
+    """The operators of tetrahedra in metrics g (k, 3, 3) of each `group` (m,), or at each vertex."""
+    simplices = MetricSimplices.in_metric(mesh, g, least, group is None, root, group)
+    kept = g[:1].copy() if group is None else g  # at vertices, its inverse root is known
+    return _LaterOperators(mesh, simplices, _of_tetrahedra, mesh, simplices, kept, group)
 
-    def __init__(self, mesh: Mesh, g: FloatArray, least: float, root: FloatArray, group: Any = None) -> None:
-        simplices = MetricSimplices.in_metric(mesh, g, least, group is None, root, group)
-        kept = g[:1].copy() if group is None else g  # at vertices, its inverse root is known
-        vars(self).update(_of=(mesh, simplices, kept, group), simplices=simplices, is_surface=False)
 
-    _of: tuple[Mesh, MetricSimplices, FloatArray, AnyArray | None]
+class _LaterOperators(Operators):
+    """The operators of a mesh in a metric, made on first use: distance by `simplices` needs none."""
+
+    def __init__(self, mesh: Mesh, simplices: MetricSimplices, make: Callable[..., Operators], *of: Any) -> None:
+        vars(self).update(mesh=mesh, _make=make, _of=of, simplices=simplices, is_surface=not mesh.is_tetrahedral)
+
+    mesh: Mesh
+    _make: Callable[..., Operators]
+    _of: tuple[Any, ...]
 
     @property
     def n(self) -> int:
         """Number of vertices."""
-        return self._of[0].n_vertices
+        return self._made.n if self.is_surface else self.mesh.n_vertices
 
     @property
-    def longest_distances(self) -> FloatArray | None:
-        """Of each component."""
-        return self._made.longest_distances
+    def n_given(self) -> int:
+        """Number of vertices of the mesh."""
+        return self.mesh.n_vertices
+
+    @property
+    def has_surface(self) -> bool:
+        """Whether the triangles are one."""
+        return self.is_surface
 
     @cached_property
     def _made(self) -> Operators:
-        return _of_tetrahedra(*self._of)
+        return self._make(*self._of)
 
     @property
     def in_tensors(self) -> MetricSimplices | None:
@@ -405,6 +430,11 @@ class _TetrahedronOperators(Operators):
         if name.startswith("_"):  # an instance that is not filled yet, as in `pickle`
             raise AttributeError(name)
         return getattr(self._made, name)
+
+
+# Fields with a default, which is no attribute of an instance that is not made.
+for _name in ("lengths", "longest_distances", "metric", "surface"):
+    setattr(_LaterOperators, _name, property(attrgetter(f"_made.{_name}")))
 
 
 def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray, group: AnyArray | None) -> Operators:

@@ -17,6 +17,8 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Differences between tensors that are taken for rounding.
 _ROUNDING = 1e-9
+# The same between velocities at one vertex.
+_SAME = 1e-14
 # Rows and columns of the entries of a symmetric matrix on and above the diagonal.
 _ABOVE = np.triu_indices(3)
 
@@ -91,12 +93,13 @@ class MetricSimplices:
             W = _with_normal(np.swapaxes(axes, 2, 3) @ inside @ axes, across)
         else:
             W = (inverse_root(g)[0] if root is None else root)[:, None]
-        velocity: FloatArray | None = W[..., *_ABOVE]
+        velocity: Any = W[..., *_ABOVE]
+        del W, root
         rows: AnyArray = corners
         if not at_vertices:
             group = np.arange(len(corners), dtype=np.int32) if group is None else group
             planes = None if across is None else across[:, 0][:, *_ABOVE]
-            velocity, rows, fitted = _at_corners(mesh.V, corners, W[:, 0][:, *_ABOVE], group, planes)
+            velocity, rows, fitted = _at_corners(mesh.V, corners, velocity[:, 0], group, planes)
             least = min(least, fitted)
         if velocity is None:
             return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3)
@@ -104,7 +107,7 @@ class MetricSimplices:
             if not at_vertices:
                 inside = (np.eye(3) - across) @ _symmetric(velocity[rows]) @ (np.eye(3) - across)
                 velocity = _with_normal(inside, across)[..., *_ABOVE]
-            rows = np.arange(mesh.F.size, dtype=np.int32).reshape(mesh.F.shape)
+            velocity, rows = _shared(corners, mesh.n_vertices, velocity.reshape(-1, 6))
         velocity = np.ascontiguousarray(velocity).reshape(-1, 6)
         return cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows, at_vertices)
 
@@ -154,12 +157,16 @@ class MetricSimplices:
         e = self.place[ends[:, :, 0]] - self.place[ends[:, :, 1]]
         if self.is_in_space:
             lengths = np.linalg.norm(e, axis=2)
-        elif self.velocity is None:
+        elif self.velocity is None or self.rows is None:
             lengths = np.sqrt(self.measured[1])
         else:
             # Simpson's rule, with the geometric mean of both ends in the middle.
-            inverse = _symmetric(self.measured[0][self.rows])
-            a, b = (np.linalg.norm(np.einsum("mkxy,mky->mkx", inverse[:, k], e), axis=2) for k in (one, other))
+            inverse = self.measured[0]
+            a, b = (np.empty(e.shape[:2]) for _ in range(2))
+            for end, k in ((a, one), (b, other)):
+                for pair, corner in enumerate(k):
+                    w = _symmetric(inverse[self.rows[:, corner]]) @ e[:, pair, :, None]
+                    end[:, pair] = np.linalg.norm(w[..., 0], axis=1)
             lengths = (a + 4 * np.sqrt(a * b) + b) / 6
         return ends.reshape(-1, 2), lengths.ravel()
 
@@ -215,6 +222,18 @@ def _symmetric(above: FloatArray) -> FloatArray:
     full = np.empty((*above.shape[:-1], 3, 3))
     full[..., *_ABOVE] = full[..., *_ABOVE[::-1]] = above
     return full
+
+
+def _shared(F: AnyArray, n: int, velocity: FloatArray) -> tuple[FloatArray, AnyArray]:
+    """Velocities (r, 6) that corners in one plane share at their vertex, from (3 m, 6), and the rows (m, 3)."""
+    first, incident = incidence.corners_by_vertex(F, n)
+    velocity, is_new = velocity[incident], np.zeros(len(incident), bool)
+    is_new[first[:-1][np.diff(first) > 0]] = True
+    size = np.abs(velocity[:-1]).max(axis=1, keepdims=True)
+    is_new[1:] |= (np.abs(np.diff(velocity, axis=0)) > _SAME * size).any(axis=1)
+    rows = np.empty(F.size, np.int32)
+    rows[incident] = np.cumsum(is_new, dtype=np.int32) - np.int32(1)
+    return velocity[is_new], rows.reshape(F.shape)
 
 
 def equal_runs(values: AnyArray) -> tuple[IntArray, AnyArray]:

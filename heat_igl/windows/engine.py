@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -106,25 +106,36 @@ class OperatorTriangles(Triangles):
     """The triangles of a domain that has operators; a ValueError if they have no surface."""
 
     def __init__(self, domain: Operators) -> None:
-        surface = domain.surface
-        if surface is None:
+        if not domain.has_surface:
             raise ValueError("distance is unfolded along triangles, and this domain has none")
-        self.components = domain.components[: surface.unfolding.n]
-        self._surface, given, faces = surface, surface.given_faces, surface.faces
+        self._domain = domain
+
+    @cached_property
+    def components(self) -> IntArray:  # type: ignore[override]
+        """Component label (n,) of each vertex."""
+        return self._domain.components[: self.surface.unfolding.n]
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The triangles with their history."""
+        surface = cast("Surface", self._domain.surface)
+        given, faces = surface.given_faces, surface.faces
         # The margin of the heat method would lengthen paths. Lengths without positions are those of another metric.
         if surface.V is not None and given is not None and faces is not None and faces.lengthening != 0:
             from heat_igl.operators import unfolding_surface
 
-            self._surface = unfolding_surface(Mesh(surface.V, given), MARGIN)
+            return unfolding_surface(Mesh(surface.V, given), MARGIN)
+        return surface
 
     @property
-    def surface(self) -> Surface:
-        """The triangles with their history."""
-        return self._surface
+    def given_faces(self) -> IntArray:
+        """As for `Triangles`; those of a mesh are known before its operators."""
+        mesh = getattr(self._domain, "mesh", None)
+        return super().given_faces if mesh is None else mesh.F
 
     def tables(self) -> Tables:
         """Tables for distance from vertices."""
-        return from_triangulation(self._surface.unfolding)
+        return from_triangulation(self.surface.unfolding)
 
 
 @dataclass(frozen=True, eq=False)
