@@ -211,16 +211,16 @@ def test_few_triangles_with_random_speeds_are_no_smooth_field(seed):
 
 
 def test_flat_tetrahedra_do_not_shorten_distances():
-    """Against halved ones in the same linear velocity: 15 % off where arcs left flat tetrahedra."""
+    """Against halved ones in the same linear velocity: 10 % off where arcs left flat tetrahedra."""
     rng = np.random.default_rng(0)
     P = rng.standard_normal((80, 3))
     body = MetricSimplices.in_space(tetrahedra(P / np.linalg.norm(P, axis=1)[:, None] * rng.random((80, 1)) ** (1 / 3)))
-    speed, found = 1.5 + np.sin(3 * body.place[:, 0] + 2 * body.place[:, 1]), []
+    speed, found = 2 + np.sin(3 * body.place[:, 0] + 2 * body.place[:, 1]), []
     for _ in range(3):
         metric = np.eye(3) / speed[:, None, None] ** 2
         found.append(solver(Mesh(body.place, body.corners), metric).distance(0)[1:80])
         body, speed = body.halved(), body.halfway() @ speed
-    assert np.abs(found[0] / found[2] - 1).mean() < 0.05
+    assert np.abs(found[0] / found[2] - 1).mean() < 0.04
 
 
 @pytest.mark.filterwarnings("ignore:the metric turns farther")
@@ -243,6 +243,9 @@ def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
     mesh, _, g = twisted_disk(24, 6.0)
     with pytest.warns(AccuracyWarning, match=r"changes by a factor of 3\.\d or more at a tenth of the faces"):
         solver(mesh, g)
+    box = shapes.box(3)
+    with pytest.warns(AccuracyWarning, match="the metric varies farther .* corners of a face by 1.*% in the mean"):
+        solver(box, np.eye(3) / (1 + 99 * box.V[:, 2:, None]) ** 2)
     resolved = twisted_disk(48, 3.0)
     solver(resolved[0], resolved[2])
     GeodesicSolver(speed_operators(mesh, np.where(mesh.V[mesh.F].mean(axis=1)[:, 0] < 0, 1.0, 100.0)))

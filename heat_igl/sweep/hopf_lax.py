@@ -12,7 +12,7 @@ from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.operators.metric_derivatives import plane_axes
-from heat_igl.plan import MOST_TURNING
+from heat_igl.plan import MOST_TURNING, MOST_VARIATION
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
@@ -37,11 +37,15 @@ class HopfLaxEngine(SimplexEngine):
 
     def __init__(self, simplices: MetricSimplices) -> None:
         super().__init__(simplices)
-        if self.turning > MOST_TURNING:
+        varies = 100 * float(np.sqrt(simplices.measured[-1]))
+        turns = "the metric turns farther than the mesh resolves: over an edge, the ratio of its lengths in two "
+        turns += f"directions changes by a factor of {self.turning:.2g} or more at a tenth of the faces"
+        grows = "the metric varies farther than the mesh resolves: lengths of edges differ between the corners of a "
+        grows += f"face by {varies:.0f} % in the mean"
+        if self.turning > MOST_TURNING or varies > 100 * MOST_VARIATION:
             warn_caller(
-                "the metric turns farther than the mesh resolves: over an edge, the ratio of its lengths in two "
-                f"directions changes by a factor of {self.turning:.2g} or more at a tenth of the faces, and distance "
-                "may be wrong by several percent, and by tens at single vertices: take a finer mesh",
+                f"{turns if self.turning > MOST_TURNING else grows}, and distance may be wrong by several percent, and "
+                "by tens at single vertices: take a finer mesh",
                 AccuracyWarning,
             )
 
