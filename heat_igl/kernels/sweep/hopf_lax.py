@@ -182,7 +182,11 @@ class HopfLax:
                 if (
                     self.d[v] < self.d[u]
                     or self.facet[u] // size == s
-                    or ((change == INFINITY or self.d[v] < old) and self.update.through(s, c, self.d[u]) < self.d[u])
+                    or (
+                        (change == INFINITY or self.d[v] < old)
+                        and self.update.may_gain(s, c, self.incident[k] % size)
+                        and self.update.through(s, c, self.d[u]) < self.d[u]
+                    )
                 ):
                     self.pending[u] = most
                     if self.left > 0:

@@ -140,6 +140,15 @@ class SimplexUpdate(Facet):
             return INFINITY
         return self.level[0] + b * fb + e * fe + far
 
+    def may_gain(self, s: cython.int, c: cython.int, far: cython.int) -> cython.bint:
+        """Whether corner c of s may gain by `far`, which is farther: with T linear, only if angles at c are obtuse."""
+        sq = cython.address(self.mean[s, 0])
+        near: cython.double = self.d[self.corners[s, c]]
+        may: cython.bint = (self.d[self.corners[s, far]] - near) * (near - self.low) < 0.5 * self.widest[s]
+        for i in range(self.p + 1):
+            may |= i != c and i != far and sq[pair(c, far)] + sq[pair(c, i)] < sq[pair(i, far)]
+        return may
+
     def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
         """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
 
