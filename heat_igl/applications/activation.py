@@ -70,8 +70,8 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
         D = np.broadcast_to(D, (m, 3, 3))
     if D.shape not in ((m, 3, 3), (n, 3, 3)):
         raise ValueError(f"D must have shape (3, 3), {(m, 3, 3)} per face or {(n, 3, 3)} per vertex, not {D.shape}")
-    symmetric = symmetric_tensors("D", D)
-    least_eigenvalue("D", np.asarray(np.linalg.eigvalsh(symmetric)[:, 0]), D)
+    smallest = np.linalg.eigvalsh(symmetric_tensors("D", D))[:, 0]
+    least_eigenvalue("D", np.asarray(smallest), D)
     start = real_numbers("times", times)
     raise_at_first(~np.isfinite(start.ravel()), "times", start.ravel(), "must be finite", "leave out its site")
     first_time = float(start.min()) if start.size else 0.0
@@ -83,7 +83,7 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
             sources = OffsetSources(places, sources.offsets)
         # Wrong sites are named before anything is prepared.
         source_set(sources, n, None if simplices.is_tetrahedral else simplices.F)
-        inverse = np.linalg.inv(symmetric)
+        inverse = np.linalg.inv(D)
         solver = GeodesicSolver(metric_operators(simplices, (inverse + np.swapaxes(inverse, 1, 2)) / 2))
         return np.asarray(solver.distance(sources) + first_time)
     except SourceError as error:
