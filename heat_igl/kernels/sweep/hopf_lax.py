@@ -134,7 +134,6 @@ class HopfLax:
 
     def sharpen(self) -> cython.void:
         """Visit vertices in rounds, each after those it has its distance from."""
-        v: cython.int
         is_settled: cython.bint = False
         while not is_settled and not is_interrupted():
             is_settled = True
@@ -182,11 +181,7 @@ class HopfLax:
                 if (
                     self.d[v] < self.d[u]
                     or self.facet[u] // size == s
-                    or (
-                        (change == INFINITY or self.d[v] < old)
-                        and self.update.may_gain(s, c, self.incident[k] % size)
-                        and self.update.through(s, c, self.d[u]) < self.d[u]
-                    )
+                    or ((change == INFINITY or self.d[v] < old) and self.update.gains(s, c, self.incident[k] % size))
                 ):
                     self.pending[u] = most
                     if self.left > 0:
@@ -258,7 +253,6 @@ class HopfLax:
 
         Of several such orders that by distance is taken, whatever the numbers of vertices and the order of corners.
         """
-        v: cython.int
         size: cython.int = self.corners.shape[1]
         n_done: cython.int = 0
         so_far: cython.double = 0.0

@@ -33,7 +33,7 @@ cdef class SimplexUpdate(Facet):
     cdef double linear(self, int s, int c, double room) noexcept nogil
     cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
     cdef double across(self, int s, int c, double room) noexcept nogil
-    cdef bint may_gain(self, int s, int c, int far) noexcept nogil
+    cdef bint gains(self, int s, int c, int far) noexcept nogil
     cdef double through(self, int s, int c, double best) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
     cdef double curved(self, int s, int c, double limit) noexcept nogil

@@ -39,7 +39,6 @@ class SimplexUpdate(Facet):
     def face(self, s: cython.int, c: cython.int) -> cython.double:
         """Look at the facet opposite corner c of simplex s: sets `side` and `level`, returns the least distance."""
         k: cython.int = 0
-        i: cython.int
         nearest: cython.double = INFINITY
         for i in range(self.p + 1):
             if i != c:
@@ -86,7 +85,6 @@ class SimplexUpdate(Facet):
             along = 0.5 * (base + to - sq[pair(c, self.side[j])])
             far = sqrt(max(to * base - along * along, 0.0) / rest)
             along -= far * rise
-        value: cython.double
         if not along > 0.0:
             along, value = 0.0, self.level[i] + sqrt(to)
         elif along < base and rest > 0.0:
@@ -140,14 +138,14 @@ class SimplexUpdate(Facet):
             return INFINITY
         return self.level[0] + b * fb + e * fe + far
 
-    def may_gain(self, s: cython.int, c: cython.int, far: cython.int) -> cython.bint:
-        """Whether corner c of s may gain by `far`, which is farther: with T linear, only if angles at c are obtuse."""
+    def gains(self, s: cython.int, c: cython.int, far: cython.int) -> cython.bint:
+        """Whether corner c of s gains by `far`, which is farther: with T linear, only if angles at c are obtuse."""
         sq = cython.address(self.mean[s, 0])
-        near: cython.double = self.d[self.corners[s, c]]
-        may: cython.bint = (self.d[self.corners[s, far]] - near) * (near - self.low) < 0.5 * self.widest[s]
+        d: cython.double = self.d[self.corners[s, c]]
+        may: cython.bint = (self.d[self.corners[s, far]] - d) * (d - self.low) < 0.5 * self.widest[s]
         for i in range(self.p + 1):
             may |= i != c and i != far and sq[pair(c, far)] + sq[pair(c, i)] < sq[pair(i, far)]
-        return may
+        return may and self.through(s, c, d) < d
 
     def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
         """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
@@ -155,21 +153,17 @@ class SimplexUpdate(Facet):
         Its lower bound is what T linear and the nearest corner say, with some margin.
         """
         nearest: cython.double = self.face(s, c)
+        above: cython.double = nearest - best
         # Between corners at one distance from a point, the square is less by at most a third of a squared edge.
         most: cython.double = 0.5 * self.widest[s]
-        if (nearest - best) * (nearest - self.low) >= most:
-            return INFINITY
-        for i in range(self.p):
-            if self.level[i] == INFINITY:
-                return INFINITY
         near: cython.double = max(nearest - self.low, sqrt(most))
-        sag: cython.double = near - sqrt(max(near * near - most, 0.0))
-        self.most_sag = sag
-        room: cython.double = (best + sag - nearest) / self.slack[s]
-        if not room > 0.0:
+        farther: cython.double = self.level[0] + self.level[1] + self.level[2]  # the third of a triangle is 0
+        # Where T sags by no more than `above`, or a corner was not reached yet.
+        if above >= near or above * (2.0 * near - above) >= most or farther == INFINITY:
             return INFINITY
-        linear: cython.double = self.linear(s, c, room)
-        return self.curved(s, c, best) if linear - nearest < room else INFINITY
+        self.most_sag = near - sqrt(max(near * near - most, 0.0))
+        room: cython.double = (self.most_sag - above) / self.slack[s]
+        return self.curved(s, c, best) if self.linear(s, c, room) - nearest < room else INFINITY
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """What `Facet` knows of s and its metric, after `face`."""
