@@ -417,9 +417,9 @@ class _LaterOperators(Operators):
     @property
     def in_tensors(self) -> MetricSimplices | None:
         """The simplices with the given tensors, where `simplices` have none since these are all the same."""
-        mesh, simplices, g, group = self._of
-        if not simplices.is_in_space:
+        if self.is_surface or self.simplices is None or not self.simplices.is_in_space:
             return None
+        mesh, _, g, group = self._of
         corners, (root, least) = mesh.F.astype(np.int32), inverse_root(g)
         in_space = MetricSimplices(corners, mesh.n_vertices, mesh.V, float(np.sqrt(least[0])), is_given=True)
         if group is not None:
