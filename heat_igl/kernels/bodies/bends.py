@@ -70,7 +70,7 @@ def bend_around(
     one.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
     one.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
     one.fit_of = np.arange(e, dtype=np.int32) << _FIT_BITS
-    one.newest, one.best, one.met = np.full((3, n), _NONE, np.int32)
+    one.newest, one.met = np.full((2, n), _NONE, np.int32)
     one.met_by, one.waiting = np.full(e, _NONE, np.int32), PriorityQueue(n)
     one.line.lit = cython.address(one.way[0])
     is_shorter = np.ones(n, bool)
@@ -107,10 +107,10 @@ class _Bends(Ray):
     point along the edge.
 
     `fit_of` (e,) is the number of each edge, followed by `_FIT_BITS` that count how often it has been fitted. The edges
-    that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,) and whose shortest one,
-    unless it is done, is the `best` (n,). Each has `fit_of` its edge when it was made, whether it has been `asked` for,
-    and the value of the way, `INFINITY` once the line has been followed. All edges that were offered to a vertex are in
-    `lists` that begin at `met` (n,); `met_by` (e,) is the vertex whose lists put the last mark on an edge.
+    that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has `fit_of` its
+    edge when it was made, whether it has been `asked` for, and the value of the way, `INFINITY` once the line has been
+    followed. All edges that were offered to a vertex are in `lists` that begin at `met` (n,); `met_by` (e,) is the
+    vertex whose lists put the last mark on an edge.
     The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`, and `sought` is
     the edge to which the `line` goes.
     """
@@ -135,7 +135,6 @@ class _Bends(Ray):
     first_at_end: cython.int[::1]
     fit_of: cython.int[::1]
     newest: cython.int[::1]
-    best: cython.int[::1]
     met: cython.int[::1]
     met_by: cython.int[::1]
     offers: cython.pointer[_Offer]
@@ -161,6 +160,10 @@ class _Bends(Ray):
         b: cython.int = self.edges[i, 1]
         to_a: cython.double = self.d[a]
         to_b: cython.double = self.d[b]
+        for k in range(3):
+            x[k] = 0.5 * (self.body.positions[a, k] + self.body.positions[b, k])
+        self.turn_towards(a, x)
+        self.turn_towards(b, x)
         # The way to one end continues along the edge unless it is hidden at the other end.
         a_reaches: cython.bint = self.value(a, cython.address(self.body.positions[b, 0])) >= to_b * (1 - GAIN)
         b_reaches: cython.bint = self.value(b, cython.address(self.body.positions[a, 0])) >= to_a * (1 - GAIN)
@@ -173,14 +176,8 @@ class _Bends(Ray):
             self.share = 0.25 * j
             a_is_seen: cython.bint = a_reaches or self.is_lit_from(a, x)
             b_is_seen: cython.bint = b_reaches or self.is_lit_from(b, x)
-            if a_is_seen and b_is_seen:
-                self.at[i, j] = min(from_a, from_b)
-            elif a_is_seen:
-                self.at[i, j] = from_a
-            elif b_is_seen:
-                self.at[i, j] = from_b
-            else:
-                self.at[i, j] = max(from_a, from_b)
+            least: cython.double = min(from_a if a_is_seen else INFINITY, from_b if b_is_seen else INFINITY)
+            self.at[i, j] = least if least < INFINITY else max(from_a, from_b)
             if j == 2:
                 self.has_before[i] = self.way[a] > -2
                 if self.way[a] >= 0:
@@ -225,6 +222,22 @@ class _Bends(Ray):
             off: cython.double = 0.25 * j * size - self.along[i]
             if fabs(self.start[i] + sqrt(off * off + squared) - self.at[i, j]) > _MISFIT * size:
                 self.fits[i] = False
+
+    @cython.cfunc
+    @cython.nogil
+    def turn_towards(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
+        """Of the ways to v that are equally short since they bend at a vertex, choose the one to a point x near v."""
+        here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
+        if self.way[v] >= 0:
+            self.around(self.way[v], here, True)
+        if self.way[v] < 0 or 0 < self.share < 1:
+            return
+        end: cython.int = self.edges[self.way[v], 0 if self.share == 0 else 1]
+        for k in range(self.first_at_end[end], self.first_at_end[end + 1]):
+            i: cython.int = self.at_end[k]
+            is_equal: cython.bint = fabs(self.around(i, here, False) - self.d[v]) <= GAIN * self.d[v]
+            if is_equal and self.around(i, x, False) < self.value(v, x) and self.is_hidden_from_before(i, v):
+                self.way[v] = i
 
     @cython.cfunc
     @cython.nogil
@@ -341,8 +354,6 @@ class _Bends(Ray):
             return
         one: cython.pointer[_Offer] = cython.address(self.offers[self.n_offers])
         one.fit, one.next, one.asked, one.value = self.fit_of[i], self.newest[v], False, value
-        if self.best[v] < 0 or value * (1 + GAIN) < self.offers[self.best[v]].value:
-            self.best[v] = self.n_offers
         self.newest[v], self.n_offers = self.n_offers, self.n_offers + 1
         self.waiting.set_key(v, max(self.waiting.key[v], 1 / value))
 
@@ -397,35 +408,27 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def is_left(self, k: cython.int, v: cython.int) -> cython.bint:
-        """Whether an offer to v is still to be asked for."""
-        fit: cython.int = self.offers[k].fit
-        return fit == self.fit_of[fit >> _FIT_BITS] and self.offers[k].value < self.most(v)
-
-    @cython.cfunc
-    @cython.nogil
-    def shortest(self, v: cython.int) -> cython.void:
-        """Find the `best` candidate of v, of equal ones the oldest, and drop those that are done."""
+    def shortest(self, v: cython.int) -> cython.int:
+        """The candidate of v around which the way is the shortest, of equal ones the oldest; those that are done go."""
         least: cython.double = INFINITY
-        self.best[v] = _NONE
+        best: cython.int = _NONE
         link: cython.pointer[cython.int] = cython.address(self.newest[v])
         while link[0] >= 0:
             one: cython.pointer[_Offer] = cython.address(self.offers[link[0]])
-            if not self.is_left(link[0], v):
+            if one.fit != self.fit_of[one.fit >> _FIT_BITS] or one.value >= self.most(v):
                 link[0] = one.next
                 continue
             if one.value <= least * (1 + GAIN):
-                self.best[v], least = link[0], one.value
+                best, least = link[0], one.value
             link = cython.address(one.next)
         self.waiting.set_key(v, 1 / least)
+        return best
 
     @cython.cfunc
     @cython.nogil
     def ask(self, v: cython.int) -> cython.void:
         """Give v the way around its first candidate if the line is clear, and offer the edge to the neighbours."""
-        if self.best[v] < 0 or not self.is_left(self.best[v], v):
-            self.shortest(v)
-        k: cython.int = self.best[v]
+        k: cython.int = self.shortest(v)
         if k < 0:
             return
         i: cython.int = self.offers[k].fit >> _FIT_BITS
@@ -445,18 +448,17 @@ class _Bends(Ray):
         self.offers[k].value = INFINITY
         self.around(i, cython.address(self.body.positions[v, 0]), True)
         self.sought = i
-        if not self.is_seen_by(v, self.bend):
+        if self.is_seen_by(v, self.bend):
+            self.d[v], self.way[v] = value, i
+            self.begin[v] = value - self.body.away(v, self.bend)
+            self.label[v] = self.label[self.edges[i, 0 if self.share < 0.5 else 1]]
+            self.offer_around(i, v)
+            for m in range(self.first_at_end[v], self.first_at_end[v + 1]):
+                self.begin_around(self.at_end[m])
+        else:
             self.mark_met(v)
             for c in range(1, 4):
                 self.offer_at(self.body.cells[self.line.t, (self.line.out + c) & 3], v)
-            self.shortest(v)
-            return
-        self.d[v], self.way[v] = value, i
-        self.begin[v] = value - self.body.away(v, self.bend)
-        self.label[v] = self.label[self.edges[i, 0 if self.share < 0.5 else 1]]
-        self.offer_around(i, v)
-        for m in range(self.first_at_end[v], self.first_at_end[v + 1]):
-            self.begin_around(self.at_end[m])
         self.shortest(v)
 
     @cython.cfunc

@@ -170,9 +170,7 @@ class _Sight(Ray):
             if toward == begin % 4:
                 continue
             found: cython.int = self.arrives(line, begin, into, toward)
-            if found > 0:
-                return True
-            if found == -1 and self.is_blocked(line, room):
-                return False
+            if found > 0 or (found == -1 and self.is_blocked(line, room)):
+                return found > 0
             into = -1
         return False
