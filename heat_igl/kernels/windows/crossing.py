@@ -8,7 +8,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
     FLATNESS,
     LEFT_OF_APEX,
-    NARROW,
     RIGHT_OF_APEX,
     ROUNDING,
     Apex,
@@ -181,7 +180,7 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
         out.stop = w.stop * w.depth / (scale - lateral(w, w.stop) * apex.sin_left)
         if out.stop > apex.left_length:
             out.stop = apex.left_length
-    return out.stop - out.start > NARROW * apex.left_length
+    return out.stop > out.start
 
 
 @cython.cfunc
@@ -213,7 +212,7 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
         )
         if out.start < 0.0:
             out.start = 0.0
-    return out.stop - out.start > NARROW * apex.right_length
+    return out.stop > out.start
 
 
 @cython.cfunc

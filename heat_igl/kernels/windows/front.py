@@ -29,7 +29,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     FLAT,
     FLATNESS,
     JOINS,
-    NARROW,
     PASSED,
     ROUNDING,
     UNKNOWN,
@@ -501,7 +500,7 @@ def _emit_parallel(
     rise: cython.double = depth - ends[3 + c] * height
     norm: cython.double = sqrt(along * along + rise * rise)
     one: Window
-    if fabs(along) <= NARROW * norm or norm <= 0.0:
+    if fabs(along) <= ROUNDING * norm or norm <= 0.0:
         return  # the segment is perpendicular to the half-edge, so its lines are parallel to it
     one.depth = fabs(along) / norm
     one.x = (-rise if along > 0.0 else rise) / norm
@@ -517,7 +516,7 @@ def _emit_parallel(
     one.turn_x, one.turn_y = (depth * rise - x * along) / norm, 1.0 if along > 0.0 else -1.0
     one.side = 0
     one.is_plane = True
-    if one.stop - one.start > NARROW * length:
+    if one.stop > one.start:
         add(s, h, cython.address(one), 1, 0)
 
 

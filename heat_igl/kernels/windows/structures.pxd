@@ -169,8 +169,6 @@ cdef extern from *:
     #define ROUNDING 1e-14
     // The largest angle, in radians, by which the range of directions from a bend is widened.
     #define WIDEST 0.01
-    // Windows narrower than this fraction of a side are dropped.
-    #define NARROW 1e-14
     // Windows whose roots are closer than this fraction of their distance have the same root.
     #define SAME 2e-14
     // The directions of two halves of a window differ by less than this angle, the sum over a hundred flat vertices.
@@ -188,7 +186,7 @@ cdef extern from *:
     // The work per list in addition to its windows, as a number of windows.
     #define PER_LIST 4
     """
-    double ROUNDING, WIDEST, NARROW, SAME, TURNED, OVERLAP, BEYOND, MARGIN, FLATNESS
+    double ROUNDING, WIDEST, SAME, TURNED, OVERLAP, BEYOND, MARGIN, FLATNESS
     int PER_LIST
 
 

@@ -9,7 +9,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     BEYOND,
     JOINS,
     MARGIN,
-    NARROW,
     OVERLAP,
     ROUNDING,
     SAME,
@@ -304,8 +303,8 @@ def _goes_on(
         u.root == w.root
         and fabs(u.offset - w.offset) <= (SAME * (fabs(w.offset) + length) if w.is_plane else 0.0)
         and fabs(u.depth - w.depth) <= SAME * (fabs(w.x) + w.depth)
-        and u.start <= w.stop + NARROW * length
-        and w.start <= u.stop + NARROW * length
+        and u.start <= w.stop + ROUNDING * length
+        and w.start <= u.stop + ROUNDING * length
     )
 
 
@@ -337,7 +336,6 @@ def _insert(
     j: cython.int = k
     moved: Window
     u: cython.pointer(Window)
-    narrow: cython.double = NARROW * length
     s.n_ties = 0
     while j > 0:
         u = windows + (j - 1)
@@ -347,7 +345,7 @@ def _insert(
         outcome = _settle(s, u, w)
         # Which of three windows equal to rounding stays depends on the others in the list.
         s.meets_ties = s.meets_ties or s.n_ties > 1
-        if outcome == 1 or u.stop - u.start <= narrow:
+        if outcome == 1 or u.stop <= u.start:
             if j < k:
                 memmove(u, u + 1, (k - j) * cython.sizeof(Window))
             k -= 1
@@ -355,7 +353,7 @@ def _insert(
             if outcome == 2:
                 return k
             continue
-        if outcome == 2 or w.stop - w.start <= narrow:
+        if outcome == 2 or w.stop <= w.start:
             return k
         if outcome != 4 and not is_many:
             break
@@ -400,7 +398,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
         w = windows + i
         if not _cut_by_ends(w, from_tail - w.offset, from_head - w.offset):
             continue
-        if w.stop - w.start <= NARROW * length:
+        if w.stop <= w.start:
             continue
         # The usual case: the window follows the last one, and is not a half of it.
         if k == 0 or (not is_many and _is_next(windows + (k - 1), w)):
@@ -434,7 +432,7 @@ def is_covered(
             nearest = min(nearest, s.upper[s.vertex[previous_half_edge(h)]] + (length - at))
             for k in range(n):
                 w = windows + k
-                if w.start - 2.0 * NARROW * length <= at <= w.stop + 2.0 * NARROW * length:
+                if w.start - 2.0 * ROUNDING * length <= at <= w.stop + 2.0 * ROUNDING * length:
                     nearest = min(nearest, w.offset + reach(w, at))
             for k in range(2):
                 if s.kept != cython.NULL and s.kept[2 * h + k].start <= at <= s.kept[2 * h + k].stop:
