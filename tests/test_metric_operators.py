@@ -94,7 +94,10 @@ def test_a_metric_that_varies_by_rounding_is_constant():
 @pytest.mark.parametrize("ratio", [1.05, 3.0])
 @pytest.mark.parametrize("mesh", [shapes.icosphere(2), shapes.box(4)], ids=["triangles", "tetrahedra"])
 def test_distance_scales_with_the_unit_of_the_metric_and_of_positions(mesh, ratio):
-    """The trust in slopes on other planes asked for a speed of 1 across each. On coarse spheres windows are nearer."""
+    """The trust in slopes on other planes asked for a speed of 1 across each. On coarse spheres windows are nearer.
+
+    Powers of two change no digits: others round, which the Hopf-Lax formula may raise to what it takes for settled.
+    """
     for x in (mesh.V, mesh.V[mesh.F].mean(axis=1)):
         g = fibre_metric(np.cos(2 * x[:, [1, 2, 0]]), 1.0, ratio)
         is_surface = metric_operators(mesh, g).surface is not None
@@ -103,9 +106,9 @@ def test_distance_scales_with_the_unit_of_the_metric_and_of_positions(mesh, rati
         )
         for method in ["auto", "heat"] + ["exact", "sweep"] * is_surface:
             expected = distance(metric_operators(mesh, g), 5, method)
-            for unit in (1e-3, 7.0, 1e4):
+            for unit in (2.0**-10, 8.0, 2.0**13):
                 for domain in (metric_operators(mesh, unit**2 * g), metric_operators(Mesh(unit * mesh.V, mesh.F), g)):
-                    assert distance(domain, 5, method) == pytest.approx(unit * expected, rel=1e-7)
+                    assert distance(domain, 5, method) == pytest.approx(unit * expected, rel=1e-9)
 
 
 GOOD = np.tile(np.eye(3), (18, 1, 1))

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.kernels.mesh import incidence
-from heat_igl.kernels.sweep.simplex_metrics import lengths_in_velocity
+from heat_igl.kernels.sweep.simplex_metrics import add_misses, inverses, lengths_in_velocity, sums_around
 from heat_igl.mesh import Mesh
 from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -207,9 +207,9 @@ def inverse_root(g: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     The roots are those of |g| where g is not positive definite.
     """
-    sizes, axes = np.linalg.eigh(g)
-    root = (axes / np.sqrt(np.maximum(np.abs(sizes), np.finfo(float).tiny))[..., None, :]) @ np.swapaxes(axes, -1, -2)
-    return np.asarray(root), np.asarray(sizes[..., 0])
+    p = g.shape[-1]
+    root, sizes = inverses(np.ascontiguousarray(g).reshape(-1, p, p), True, 0.0)
+    return root.reshape(g.shape), sizes.min(axis=1).reshape(g.shape[:-2])
 
 
 def _with_normal(W: FloatArray, across: FloatArray) -> FloatArray:
@@ -253,14 +253,14 @@ def _at_corners(
     where they are. None if the field is smooth nowhere. The third result is the least length of a unit vector at
     vertices.
     """
-    at_vertex, share = _fitted(V, F, W, group, across)
+    first, incident = incidence.corners_by_vertex(F, len(V))
+    at_vertex, share = _fitted(V, F, W, group, across, first, incident)
     if not (share > _ROUNDING).any():
         return None, F, np.inf
-    sizes = np.linalg.eigvalsh(_symmetric(at_vertex))
-    share[sizes[:, 0] <= 0] = 0
+    sizes = inverses(_symmetric(at_vertex), False, 0.0)[1]
+    share[sizes.min(axis=1) <= 0] = 0
     of_simplex = reduce(np.minimum, (share[corner] for corner in F.T))
     # Corners that meet in a vertex have a row together where their velocities are equal.
-    first, incident = incidence.corners_by_vertex(F, len(V))
     v, simplex = np.repeat(np.arange(len(V), dtype=np.int32), np.diff(first)), incident // np.int32(F.shape[1])
     share, is_new = of_simplex[simplex], np.ones(len(v), bool)
     share[share >= 1 - _ROUNDING] = 1
@@ -278,37 +278,29 @@ def _at_corners(
 
 
 def _fitted(
-    V: FloatArray, F: AnyArray, W: FloatArray, group: AnyArray, across: FloatArray | None
+    V: FloatArray, F: AnyArray, W: FloatArray, group: AnyArray, across: FloatArray | None, *incident: AnyArray
 ) -> tuple[FloatArray, FloatArray]:
     """The velocity (n, 6) at each vertex of a linear function fitted around it, and how far it holds there, up to 1.
 
     It holds as far as it explains the variance around the vertex. What varies since triangles, with the projections
-    `across` (m, 6) on their normals, have other planes, counts as left.
+    `across` (m, 6) on their normals, have other planes, counts as left. `incident` are the corners by vertex.
     """
-    (m, size), n = F.shape, len(V)
+    m, size = F.shape
     off = np.where(_ABOVE[0] == _ABOVE[1], 1, np.sqrt(2))  # for the norm of symmetric matrices
     level = np.bincount(group) @ (W * off) / m
-    values = W * off - level
+    values = np.ascontiguousarray(W * off - level)
     X = V - V.mean(axis=0)
-    of_corners = sp.csr_array((np.ones(F.size, np.int32), F.ravel(), np.arange(0, F.size + 1, size)), shape=(m, n))
-    at = of_corners.T
-    count = of_corners.sum(axis=0, dtype=np.float64)
-    others = (at @ of_corners).astype(bool) @ count / size - 1
-    by = [np.ones(m), *(of_corners @ x / size for x in X.T)]
-    row = [*values.T, np.einsum("mk,mk->m", values, values), *([] if across is None else (across * off).T)]
+    square = np.einsum("mk,mk->m", values, values)
+    columns = np.column_stack([values, square, *([] if across is None else [across * off])])
     # Around a vertex: the simplices at it and at the other corners of these.
-    means = np.empty((n, 4, 4 + len(row)))
-    for k, column in enumerate([*by, *row]):
-        of_simplex = column if k < 4 else column[group]
-        for j, x in enumerate(by):
-            means[:, j, k] = at @ (of_corners @ (at @ (x * of_simplex)))
-    del by, row, x, column, of_simplex
+    means, around = sums_around(F, X, columns, group, *incident)
+    others = around / size - 1
     means /= np.maximum(means[:, :1, :1], 1)
     middle, mean, square = means[:, 0, 1:4], means[:, 0, 4:10], means[:, 0, 10]
     about = means[:, 1:, 1:10] - middle[:, :, None] * means[:, :1, 1:10]
     slope = about[..., 3:]
     variance = square - (mean**2).sum(axis=1)
-    inverse = np.linalg.pinv(about[..., :3], hermitian=True)
+    inverse = inverses(np.ascontiguousarray(about[..., :3]), False, 1e-15)[0]
     fitted = inverse @ slope
     explained = (fitted * slope).sum(axis=(1, 2))
     is_constant = variance <= _ROUNDING * ((level**2).sum() + square)
@@ -323,6 +315,6 @@ def _fitted(
     del means, mean, about, slope, inverse, fitted
     # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
     least = reduce(np.minimum, (share[corner] for corner in F.T))
-    for _, k in np.ndindex(3, 6):
-        found[:, k] += at @ ((values[group, k] - of_corners @ found[:, k] / size) * least) / np.maximum(count, 1)
+    for _ in range(3):
+        add_misses(found, F, values, group, least, incident[0])
     return (found + level) / off, share

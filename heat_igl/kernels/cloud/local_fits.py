@@ -3,7 +3,8 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.cloud.local_fits import DIAGONAL, LEAST_WEIGHT, TINY
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.heat_igl.kernels.rotation import diagonalize
+from cython.cimports.libc.math import sqrt
 
 
 def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][:, ::1]):
@@ -215,12 +216,7 @@ def _weighted_squares(local: cython.double[:, ::1], system: cython.double[:, ::1
 def _principal(work: cython.double[:, ::1], axes: cython.double[:, ::1], variances: cython.double[::1]) -> cython.void:
     """The axes of most, less and least variance, and the variances, ascending, of the covariance in rows 0 to 2."""
     x: cython.int
-    for x in range(3):
-        for y in range(3):
-            work[3 + x, y] = 1.0 if x == y else 0.0
-    for _sweep in range(30):
-        if not (_rotate(work, 0, 1) | _rotate(work, 0, 2) | _rotate(work, 1, 2)):
-            break
+    diagonalize(cython.address(work[0, 0]))
     lowest: cython.int = 0 if work[0, 0] <= work[1, 1] else 1
     highest: cython.int = 1 - lowest
     if work[2, 2] < work[lowest, lowest]:
@@ -232,35 +228,3 @@ def _principal(work: cython.double[:, ::1], axes: cython.double[:, ::1], varianc
     variances[0], variances[1], variances[2] = work[lowest, lowest], work[middle, middle], work[highest, highest]
     for x in range(3):
         axes[0, x], axes[1, x], axes[2, x] = work[3 + highest, x], work[3 + middle, x], work[3 + lowest, x]
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _rotate(work: cython.double[:, ::1], p: cython.int, q: cython.int) -> cython.bint:
-    """One rotation of Jacobi's eigenvalue algorithm; False if entry (p, q) is zero already.
-
-    Rows 3 to 5 of `work` gather the eigenvectors.
-    """
-    entry: cython.double = work[p, q]
-    if fabs(entry) <= 1e-17 * (fabs(work[p, p]) + fabs(work[q, q])):
-        return False
-    half: cython.double = 0.5 * (work[q, q] - work[p, p]) / entry
-    tangent: cython.double = 1.0 / (fabs(half) + sqrt(half * half + 1.0))
-    if half < 0.0:
-        tangent = -tangent
-    cosine: cython.double = 1.0 / sqrt(tangent * tangent + 1.0)
-    sine: cython.double = tangent * cosine
-    r: cython.int = 3 - p - q
-    work[p, p] -= tangent * entry
-    work[q, q] += tangent * entry
-    work[p, q] = work[q, p] = 0.0
-    along: cython.double = work[r, p]
-    across: cython.double = work[r, q]
-    work[r, p] = work[p, r] = cosine * along - sine * across
-    work[r, q] = work[q, r] = sine * along + cosine * across
-    x: cython.int
-    for x in range(3):
-        along, across = work[3 + p, x], work[3 + q, x]
-        work[3 + p, x], work[3 + q, x] = cosine * along - sine * across, sine * along + cosine * across
-    return True

@@ -1,9 +1,11 @@
-"""Kernel of lengths in simplices whose velocity is linear between the corners."""
+"""Kernels of velocities: inverse roots of tensors, fits around vertices, lengths where velocity is linear."""
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.rotation import diagonalize
 from cython.cimports.heat_igl.kernels.sweep.facets import gradient, invert, mean_velocity, pair, squares_of
-from cython.cimports.libc.math import sqrt
+from cython.cimports.libc.float import DBL_MIN
+from cython.cimports.libc.math import fabs, sqrt
 
 
 def lengths_in_velocity(
@@ -87,3 +89,112 @@ def lengths_in_velocity(
                 two = sqrt(two) - sqrt(one)
                 variation += two * two / (n_pairs * m * mean[s, k])
     return *found, variation
+
+
+def inverses(g: cython.const[cython.double][:, :, ::1], is_root: cython.bint, least: cython.double):
+    """The inverses, or inverse roots, of symmetric matrices (k, p, p), p = 2 or 3, by Jacobi's rotations.
+
+    Those of absolute eigenvalues, without those below the share `least` of the largest. Second: eigenvalues (k, p).
+    """
+    p: cython.int = g.shape[1]
+    found, values = np.zeros((g.shape[0], p, p)), np.empty((g.shape[0], p))
+    result: cython.double[:, :, ::1] = found
+    sizes: cython.double[:, ::1] = values
+    work: cython.double[18]
+    with cython.nogil:
+        for i in range(g.shape[0]):
+            for k in range(9):
+                work[k] = g[i, k // 3, k % 3] if k // 3 < p and k % 3 < p else 0.0
+            diagonalize(work)
+            largest: cython.double = max(fabs(work[0]), fabs(work[4]), fabs(work[8]))
+            for k in range(p):
+                sizes[i, k] = work[4 * k]
+                size: cython.double = fabs(work[4 * k])
+                if size < least * largest:
+                    continue
+                size = max(size, DBL_MIN)
+                size = 1.0 / (sqrt(size) if is_root else size)
+                for x in range(p):
+                    for y in range(p):
+                        result[i, x, y] += size * work[9 + 3 * k + x] * work[9 + 3 * k + y]
+    return found, values
+
+
+def sums_around(
+    corners: cython.const[cython.int][:, ::1],
+    X: cython.const[cython.double][:, ::1],
+    values: cython.const[cython.double][:, ::1],
+    group: cython.const[cython.int][::1],
+    first: cython.const[cython.int][::1],
+    incident: cython.const[cython.int][::1],
+):
+    """Sums (n, 4, 4 + c) of 1, x, y, z of centres, times these and the values (k, c), over simplices around vertices.
+
+    The values of simplices (m,) are those of their `group`. Simplices count as often as they meet one at the vertex.
+    Second are the numbers (n,) of corners that meet in the vertices around, counted once.
+    """
+    size: cython.int = corners.shape[1]
+    n_columns: cython.int = 4 + values.shape[1]
+    found, here = np.zeros((2, X.shape[0], 4, n_columns))
+    sums: cython.double[:, :, ::1] = found
+    at: cython.double[:, :, ::1] = here
+    row: cython.double[17]
+    row[0] = 1.0
+    counts, seen_from = np.zeros(X.shape[0], np.int32), np.full(X.shape[0], -1, np.int32)
+    count: cython.int[::1] = counts
+    seen: cython.int[::1] = seen_from
+    with cython.nogil:
+        for v in range(X.shape[0]):
+            for i in range(first[v], first[v + 1]):
+                for c in range(size):
+                    u: cython.int = corners[incident[i] // size, c]
+                    if seen[u] != v:
+                        seen[u] = v
+                        count[v] += first[u + 1] - first[u]
+        for s in range(corners.shape[0]):
+            for k in range(3):
+                row[1 + k] = 0.0
+                for c in range(size):
+                    row[1 + k] += X[corners[s, c], k] / size
+            for k in range(4, n_columns):
+                row[k] = values[group[s], k - 4]
+            for c in range(size):
+                for j in range(4):
+                    for k in range(n_columns):
+                        at[corners[s, c], j, k] += row[j] * row[k]
+        for s in range(corners.shape[0]):
+            for j in range(4):
+                for k in range(n_columns):
+                    total: cython.double = 0.0
+                    for c in range(size):
+                        total += at[corners[s, c], j, k]
+                    for c in range(size):
+                        sums[corners[s, c], j, k] += total
+    return found, counts
+
+
+def add_misses(
+    found: cython.double[:, ::1],
+    corners: cython.const[cython.int][:, ::1],
+    values: cython.const[cython.double][:, ::1],
+    group: cython.const[cython.int][::1],
+    weight: cython.const[cython.double][::1],
+    first: cython.const[cython.int][::1],
+) -> None:
+    """Add to what is `found` (n, c) at vertices by how much its means miss the values of simplices, times the weight.
+
+    At a vertex it is the mean over the simplices there.
+    """
+    size: cython.int = corners.shape[1]
+    missed: cython.double[:, ::1] = np.zeros_like(found)
+    with cython.nogil:
+        for s in range(corners.shape[0]):
+            for k in range(found.shape[1]):
+                miss: cython.double = values[group[s], k]
+                for c in range(size):
+                    miss -= found[corners[s, c], k] / size
+                for c in range(size):
+                    missed[corners[s, c], k] += weight[s] * miss
+        for v in range(found.shape[0]):
+            for k in range(found.shape[1]):
+                found[v, k] += missed[v, k] / max(first[v + 1] - first[v], 1)
