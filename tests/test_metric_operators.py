@@ -94,10 +94,7 @@ def test_a_metric_that_varies_by_rounding_is_constant():
 @pytest.mark.parametrize("ratio", [1.05, 3.0])
 @pytest.mark.parametrize("mesh", [shapes.icosphere(2), shapes.box(4)], ids=["triangles", "tetrahedra"])
 def test_distance_scales_with_the_unit_of_the_metric_and_of_positions(mesh, ratio):
-    """The trust in slopes on other planes asked for a speed of 1 across each. On coarse spheres windows are nearer.
-
-    Powers of two change no digits: others round, which the Hopf-Lax formula may raise to what it takes for settled.
-    """
+    """By powers of two, as others round, which the formula may raise to 1e-4. On coarse spheres windows are nearer."""
     for x in (mesh.V, mesh.V[mesh.F].mean(axis=1)):
         g = fibre_metric(np.cos(2 * x[:, [1, 2, 0]]), 1.0, ratio)
         is_surface = metric_operators(mesh, g).surface is not None

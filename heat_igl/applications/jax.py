@@ -18,14 +18,7 @@ with MissingExtraError.guard("heat_igl.applications.jax", "jax", "jax"):
 __all__ = ["geodesic_distance"]
 
 
-def geodesic_distance(
-    V: Any,
-    F: Any,
-    sources: Any,
-    *,
-    solver: GeodesicSolver | None = None,
-    **options: Any,
-) -> Any:
+def geodesic_distance(V: Any, F: Any, sources: Any, *, solver: GeodesicSolver | None = None, **options: Any) -> Any:
     """Distance from `sources`, differentiable by `V` in reverse mode, also under ``jax.jit``.
 
     Parameters

@@ -18,12 +18,7 @@ __all__ = ["geodesic_distance"]
 
 
 def geodesic_distance(
-    V: torch.Tensor,
-    F: Any,
-    sources: Any,
-    *,
-    solver: GeodesicSolver | None = None,
-    **options: Any,
+    V: torch.Tensor, F: Any, sources: Any, *, solver: GeodesicSolver | None = None, **options: Any
 ) -> torch.Tensor:
     """Distance from `sources`, differentiable by `V`.
 

@@ -100,11 +100,7 @@ def _choice(method: str | None, tolerance: float, **options: Any) -> SolverChoic
 
 
 def _measured(
-    mesh: Mesh | PointCloud,
-    sources: Any,
-    choice: SolverChoice,
-    cutoff: float | None,
-    region: BoolArray | None = None,
+    mesh: Mesh | PointCloud, sources: Any, choice: SolverChoice, cutoff: float | None, region: BoolArray | None = None
 ) -> tuple[FloatArray, list[Row]]:
     """The distance, and remarks on how it was found."""
     start = time.perf_counter()

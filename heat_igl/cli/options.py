@@ -228,8 +228,7 @@ PictureOption = Annotated[
     Path | None, typer.Option("--picture", help="PNG, PDF or SVG file for a picture.", callback=check_picture)
 ]
 CurveOutput = Annotated[
-    Path,
-    typer.Option("--output", help="OBJ, PLY, VTP, CSV, SVG or DXF file for the curves.", callback=check_curves),
+    Path, typer.Option("--output", help="OBJ, PLY, VTP, CSV, SVG or DXF file for the curves.", callback=check_curves)
 ]
 
 
@@ -270,8 +269,7 @@ def position(text: str, name: str = "--at") -> list[float]:
 
 DtypeOption = Annotated[str, typer.Option(help="Of the distances.", callback=one_of(("float16", "float32", "float64")))]
 MethodOption = Annotated[
-    str | None,
-    choice(DistanceMethod, "Default: auto, windows on triangles; heat with one of the options of heat."),
+    str | None, choice(DistanceMethod, "Default: auto, windows on triangles; heat with one of the options of heat.")
 ]
 TimeStepOption = Annotated[
     float | None, typer.Option(help="Heat: time step in squared mean edge lengths.", callback=positive)

@@ -94,10 +94,7 @@ def run_program(arguments: Sequence[str]) -> int:
         command(prog_name="heat-igl")
     try:
         # command.main is not used: the handling of errors and of Ctrl-C differs between versions of typer.
-        with (
-            _warnings_on_one_line(),
-            command.make_context("heat-igl", list(arguments) or ["--help"]) as context,
-        ):
+        with _warnings_on_one_line(), command.make_context("heat-igl", list(arguments) or ["--help"]) as context:
             command.invoke(context)
             sys.stdout.flush()
     except typer.Exit as error:

@@ -270,11 +270,7 @@ def _continued(
 
 
 def _new(
-    task: Task,
-    store: Store,
-    mesh: Mesh | PointCloud,
-    solver: Solver,
-    identity: Mapping[str, Any],
+    task: Task, store: Store, mesh: Mesh | PointCloud, solver: Solver, identity: Mapping[str, Any]
 ) -> tuple[MeshGroup, list[IntArray]]:
     """A new group for a mesh, with the sources."""
     source_sets = _source_sets(task.plan, mesh, solver)

@@ -18,13 +18,7 @@ from heat_igl.intrinsic import checked_indices
 from heat_igl.mesh import Mesh
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
-__all__ = [
-    "HeatGeodesicsData",
-    "exact_geodesic",
-    "heat_geodesic",
-    "heat_geodesics_precompute",
-    "heat_geodesics_solve",
-]
+__all__ = ["HeatGeodesicsData", "exact_geodesic", "heat_geodesic", "heat_geodesics_precompute", "heat_geodesics_solve"]
 
 
 def __getattr__(name: str) -> Any:

@@ -74,10 +74,7 @@ class PyGeodesicAlgorithmExact:
         return float(lengths.sum()), points[np.append(True, lengths > 0)]
 
     def geodesicDistances(
-        self,
-        source_indices: Sources | None = None,
-        target_indices: Sources | None = None,
-        max_distance: float = np.inf,
+        self, source_indices: Sources | None = None, target_indices: Sources | None = None, max_distance: float = np.inf
     ) -> tuple[FloatArray, AnyArray]:
         """Distance of target vertices from the nearest source vertex, and which source that is.
 

@@ -107,12 +107,7 @@ class SignedHeatSolver:
 
     @names_guessed
     def __init__(
-        self,
-        mesh: MeshLike,
-        *,
-        t_coef: float | None = None,
-        t: float | None = None,
-        backend: Backend = "auto",
+        self, mesh: MeshLike, *, t_coef: float | None = None, t: float | None = None, backend: Backend = "auto"
     ) -> None:
         is_default = t_coef is None and t is None
         options = SolverOptions(_T_COEF if is_default else t_coef, t, backend=backend)

@@ -122,11 +122,7 @@ class SourceAssembler:
     """
 
     def __init__(
-        self,
-        domain: Operators,
-        t: float | FloatArray,
-        mass_unit: float | FloatArray,
-        plain: bool = False,
+        self, domain: Operators, t: float | FloatArray, mass_unit: float | FloatArray, plain: bool = False
     ) -> None:
         self._domain, self._t = domain, t
         self._plain = plain

@@ -27,10 +27,7 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray
 # Formats of points alone.
 POINT_SUFFIXES = (".xyz", ".npy")
 # Formats of other libraries, whose objects `as_mesh` takes.
-_READ_ELSEWHERE = {
-    ".vtp": "pass pyvista.read(path), or write .vtu",
-    ".pcd": "pass open3d.io.read_point_cloud(path)",
-}
+_READ_ELSEWHERE = {".vtp": "pass pyvista.read(path), or write .vtu", ".pcd": "pass open3d.io.read_point_cloud(path)"}
 _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
 # Largest value of a colour, and the smallest difference from length 1 of what is no normal.
 _BRIGHTEST = 255

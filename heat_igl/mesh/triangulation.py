@@ -47,10 +47,7 @@ def _vector_areas(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[F
     following = next_in_run(corners, degree)
     origin = np.repeat(V[corners[begin]], degree, axis=0)
     one, other = V[corners] - origin, V[following] - origin
-    return (
-        np.add.reduceat(np.cross(one, other), begin),
-        np.maximum.reduceat(np.einsum("kx,kx->k", one, one), begin),
-    )
+    return (np.add.reduceat(np.cross(one, other), begin), np.maximum.reduceat(np.einsum("kx,kx->k", one, one), begin))
 
 
 def _without_fan(V: FloatArray, F: IntArray, corners: IntArray, degree: IntArray) -> BoolArray:

@@ -108,9 +108,7 @@ def cylinder(mesh: MeshLike, sources: Sources) -> FloatArray:
     radius = _common("distance from the z axis", np.linalg.norm(mesh.V[mesh.referenced, :2], axis=1))
     angle = np.arctan2(mesh.V[:, 1], mesh.V[:, 0])
     return _nearest(
-        mesh,
-        sources,
-        lambda source: np.hypot(radius * _turn(angle - angle[source]), mesh.V[:, 2] - mesh.V[source, 2]),
+        mesh, sources, lambda source: np.hypot(radius * _turn(angle - angle[source]), mesh.V[:, 2] - mesh.V[source, 2])
     )
 
 

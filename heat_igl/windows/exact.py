@@ -254,11 +254,7 @@ class ExactSurface:
         return ExactSolution(distance, origin, *to_targets, done.n_windows)
 
     def distance(
-        self,
-        sources: SourceSet,
-        cutoff: float = np.inf,
-        threads: int = 1,
-        than: FloatArray | None = None,
+        self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1, than: FloatArray | None = None
     ) -> FloatArray:
         """Distance (n,) as by `solve`, without the origins of the paths.
 

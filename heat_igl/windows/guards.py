@@ -55,11 +55,7 @@ class Invariants:
         self._l = _NO_LENGTHS if lengths is None else np.ascontiguousarray(lengths, np.float64)
 
     def contradiction(
-        self,
-        distance: FloatArray,
-        sources: SourceSet,
-        cutoff: float = np.inf,
-        than: FloatArray | None = None,
+        self, distance: FloatArray, sources: SourceSet, cutoff: float = np.inf, than: FloatArray | None = None
     ) -> str | None:
         """Which bound a distance (n,) violates, and where; None if it violates none.
 
@@ -239,9 +235,7 @@ class GuardedEngine(Engine):
 
 
 def guarded_windows(
-    triangles: Triangles,
-    V: FloatArray | None,
-    other: Callable[[Triangles], Engine] | None = None,
+    triangles: Triangles, V: FloatArray | None, other: Callable[[Triangles], Engine] | None = None
 ) -> GuardedEngine:
     """Windows on triangles with positions V (n, 3), if known; an `other` engine answers where they contradict
     themselves.

@@ -196,10 +196,7 @@ class MeshFastMarchingDistanceSolver:
         return SignedHeatSolver(self._mesh)
 
     def compute_distance(
-        self,
-        curves: Sequence[Sequence[Node]],
-        distances: Sequence[Sequence[float]] = (),
-        sign: bool = False,
+        self, curves: Sequence[Sequence[Node]], distances: Sequence[Sequence[float]] = (), sign: bool = False
     ) -> FloatArray:
         """Distance (n,) from the nodes of all curves; with `sign` from the curves, negative on their left.
 

@@ -117,9 +117,7 @@ def _shares(
 @cython.cfunc
 @cython.nogil
 def _average(
-    directions: cython.const[cython.float][:, ::1],
-    share: cython.float[:, ::1],
-    normal: cython.double[::1],
+    directions: cython.const[cython.float][:, ::1], share: cython.float[:, ::1], normal: cython.double[::1]
 ) -> cython.void:
     """The mean direction on the side of the largest ball; `share` takes the fourth powers."""
     mean: cython.float[12]

@@ -38,9 +38,7 @@ def breadth_first(
 
 
 def subgraph(
-    ends: cython.const[cython.int][::1],
-    neighbours: cython.const[cython.int][::1],
-    some: cython.const[cython.int][::1],
+    ends: cython.const[cython.int][::1], neighbours: cython.const[cython.int][::1], some: cython.const[cython.int][::1]
 ):
     """The graph among some vertices, numbered as they come: `ends` and `neighbours`, int32."""
     n: cython.Py_ssize_t = some.shape[0]

@@ -28,11 +28,7 @@ class TriangularSolves:
 
     def __init__(self, fronts, L):
         self.L = L
-        self.start, self.first_row, self.rows = (
-            fronts.start,
-            fronts.first_row,
-            fronts.rows,
-        )
+        self.start, self.first_row, self.rows = (fronts.start, fronts.first_row, fronts.rows)
         self.first_entry = fronts.first_entry
         self.pieces, self.piece_end = fronts.pieces, fronts.piece_end
         self.own_rows, self.above = fronts.own_rows, fronts.above
@@ -171,11 +167,7 @@ class TriangularSolves:
                     _subtract_below(panel + in_panel(j, columns, size), left, below, own + j * WIDTH)
                 for j in range(columns - 1, -1, -1):
                     for i in range(j + 1, columns):
-                        _subtract_row(
-                            own + j * WIDTH,
-                            panel[in_panel(j, i, size)],
-                            own + i * WIDTH,
-                        )
+                        _subtract_row(own + j * WIDTH, panel[in_panel(j, i, size)], own + i * WIDTH)
 
 
 @cython.cfunc
@@ -202,11 +194,7 @@ def _subtract_row(target: numbers, entry: cython.double, row: entries) -> cython
 @cython.inline
 @cython.nogil
 def _add_below(
-    panel: entries,
-    columns: cython.Py_ssize_t,
-    left: cython.Py_ssize_t,
-    own: entries,
-    below: numbers,
+    panel: entries, columns: cython.Py_ssize_t, left: cython.Py_ssize_t, own: entries, below: numbers
 ) -> cython.void:
     """Add the rows below the columns of a front, times `own`, to `below`; four columns per turn."""
     size: cython.Py_ssize_t = columns + left

@@ -92,9 +92,7 @@ def _append(
 
 
 def tree_pieces(
-    parent: cython.const[cython.longlong][::1],
-    entries: cython.const[cython.longlong][::1],
-    most: cython.double,
+    parent: cython.const[cython.longlong][::1], entries: cython.const[cython.longlong][::1], most: cython.double
 ):
     """Cut a tree of fronts into subtrees of at most `most` entries, small ones together.
 

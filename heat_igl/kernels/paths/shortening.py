@@ -429,13 +429,7 @@ class Shortener:
         return self.settle()
 
     def place_base(
-        self,
-        f: cython.int,
-        a: cython.int,
-        b: cython.int,
-        a_end: cython.int,
-        b_end: cython.int,
-        share: cython.double,
+        self, f: cython.int, a: cython.int, b: cython.int, a_end: cython.int, b_end: cython.int, share: cython.double
     ) -> cython.void:
         """Put the base `share` of the way from a to b: corners of the first face f, and of the last face."""
         for c in range(3):

@@ -98,11 +98,7 @@ def _may_reach(
 @cython.cfunc
 @cython.nogil
 def _reach_apex(
-    s: cython.pointer(Search),
-    h: cython.int,
-    windows: cython.pointer(Window),
-    n: cython.int,
-    apex: cython.pointer(Apex),
+    s: cython.pointer(Search), h: cython.int, windows: cython.pointer(Window), n: cython.int, apex: cython.pointer(Apex)
 ) -> cython.void:
     """Relax the apex by all windows, and set on which side of it the lines of each window pass."""
     x: cython.double
@@ -278,11 +274,7 @@ def _is_behind(
 @cython.cfunc
 @cython.nogil
 def _is_reached_between(
-    s: cython.pointer(Search),
-    h: cython.int,
-    windows: cython.pointer(Window),
-    n: cython.int,
-    apex: cython.pointer(Apex),
+    s: cython.pointer(Search), h: cython.int, windows: cython.pointer(Window), n: cython.int, apex: cython.pointer(Apex)
 ) -> cython.bint:
     """Whether the apex got a distance if it lies in a gap, due to rounding, between two halves of a window."""
     j: cython.int

@@ -174,10 +174,7 @@ def _compare(
 @cython.cfunc
 @cython.nogil
 def _gives_way(
-    u: cython.pointer(Window),
-    w: cython.pointer(Window),
-    low: cython.double,
-    high: cython.double,
+    u: cython.pointer(Window), w: cython.pointer(Window), low: cython.double, high: cython.double
 ) -> cython.int:
     """Remove from w the interval in which u is nearer. 2: nothing is left, 4: the rest precedes u, 0: it follows u."""
     if low <= w.start:

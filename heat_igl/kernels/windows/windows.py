@@ -70,12 +70,7 @@ class Front:
     arrays: object
 
     def __init__(
-        self,
-        tables,
-        found,
-        tolerance: cython.double,
-        leaving=None,
-        position: cython.const[cython.double][::1] = None,
+        self, tables, found, tolerance: cython.double, leaving=None, position: cython.const[cython.double][::1] = None
     ) -> None:
         s: cython.pointer(Search) = cython.address(self.state)
         emitted, ranked, touched = np.full(tables.n, np.inf), np.empty(tables.n), np.empty(tables.n, np.int32)
