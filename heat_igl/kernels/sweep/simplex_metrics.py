@@ -140,17 +140,10 @@ def sums_around(
     at: cython.double[:, :, ::1] = here
     row: cython.double[17]
     row[0] = 1.0
-    counts, seen_from = np.zeros(X.shape[0], np.int32), np.full(X.shape[0], -1, np.int32)
+    counts, times = np.zeros((2, X.shape[0]), np.int32)
     count: cython.int[::1] = counts
-    seen: cython.int[::1] = seen_from
+    met: cython.int[::1] = times
     with cython.nogil:
-        for v in range(X.shape[0]):
-            for i in range(first[v], first[v + 1]):
-                for c in range(size):
-                    u: cython.int = corners[incident[i] // size, c]
-                    if seen[u] != v:
-                        seen[u] = v
-                        count[v] += first[u + 1] - first[u]
         for s in range(corners.shape[0]):
             for k in range(3):
                 row[1 + k] = 0.0
@@ -162,14 +155,19 @@ def sums_around(
                 for j in range(4):
                     for k in range(n_columns):
                         at[corners[s, c], j, k] += row[j] * row[k]
-        for s in range(corners.shape[0]):
-            for j in range(4):
-                for k in range(n_columns):
-                    total: cython.double = 0.0
-                    for c in range(size):
-                        total += at[corners[s, c], j, k]
-                    for c in range(size):
-                        sums[corners[s, c], j, k] += total
+        for v in range(X.shape[0]):
+            for i in range(first[v], first[v + 1]):
+                for c in range(size):
+                    met[corners[incident[i] // size, c]] += 1
+            for i in range(first[v], first[v + 1]):
+                for c in range(size):
+                    u: cython.int = corners[incident[i] // size, c]
+                    if met[u] > 0:
+                        count[v] += first[u + 1] - first[u]
+                        for j in range(4):
+                            for k in range(n_columns):
+                                sums[v, j, k] += met[u] * at[u, j, k]
+                        met[u] = 0
     return found, counts
 
 
