@@ -140,7 +140,11 @@ def carved(n: int, cut: Callable[[FloatArray], BoolArray]) -> Mesh:
 
 def joined(*parts: Mesh) -> Mesh:
     """Several meshes as components of one."""
-    return Mesh(*igl.combine([part.V for part in parts], [part.F for part in parts]))
+    first = np.cumsum([0, *(part.n_vertices for part in parts)])
+    return Mesh(
+        np.concatenate([part.V for part in parts]),
+        np.concatenate([part.F + begin for part, begin in zip(parts, first, strict=False)]),
+    )
 
 
 def merged(mesh: Mesh) -> Mesh:
