@@ -13,6 +13,7 @@ from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import points_beside
 from heat_igl.operators import metric_operators
 from heat_igl.operators.metric import least_eigenvalue, symmetric_tensors
+from heat_igl.operators.metric_simplices import inverse_root
 from heat_igl.sources import OffsetSources, Sources, are_positions, source_set
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -70,8 +71,7 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
         D = np.broadcast_to(D, (m, 3, 3))
     if D.shape not in ((m, 3, 3), (n, 3, 3)):
         raise ValueError(f"D must have shape (3, 3), {(m, 3, 3)} per face or {(n, 3, 3)} per vertex, not {D.shape}")
-    smallest = np.linalg.eigvalsh(symmetric_tensors("D", D))[:, 0]
-    least_eigenvalue("D", np.asarray(smallest), D)
+    least_eigenvalue("D", inverse_root(symmetric_tensors("D", D))[1], D)
     start = real_numbers("times", times)
     raise_at_first(~np.isfinite(start.ravel()), "times", start.ravel(), "must be finite", "leave out its site")
     first_time = float(start.min()) if start.size else 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any
 
@@ -80,8 +80,7 @@ class MetricSimplices:
         p, corners = mesh.F.shape[1] - 1, mesh.F.astype(np.int32)
         if p == 3 and np.abs(g - g[0]).max() <= _ROUNDING * np.abs(g[0]).max():
             # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
-            mapped = cls.in_space(Mesh((mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(g[0]), mesh.F))
-            return replace(mapped, is_given=False)
+            return cls(mesh.F, mesh.n_vertices, (mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(g[0]))
         across = None
         if p == 2:
             axes = plane_axes(mesh)[:, None]
