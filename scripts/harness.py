@@ -206,8 +206,8 @@ def on_sphere(n: int, rng: np.random.Generator) -> FloatArray:
 
 
 def subdivided(mesh: Mesh) -> Mesh:
-    """Four triangles for each, on the same surface."""
-    return Mesh(*shapes.quartered(mesh.V, mesh.F))
+    """Four triangles for each of a manifold, on the same surface."""
+    return Mesh(*igl.upsample(mesh.V, mesh.F, 1))
 
 
 def drawn(mesh: Mesh, count: int, seed: int = 0) -> list[int]:

@@ -114,20 +114,6 @@ def disk(n: int) -> Mesh:
     return Mesh(np.column_stack([V, np.zeros(len(V))]), np.concatenate(faces))
 
 
-def quartered(V: FloatArray, F: IntArray) -> tuple[FloatArray, IntArray]:
-    """Four triangles for each, on the same surface: vertices in the middles of edges, in the order of the faces."""
-    edges, first, edge = np.unique(
-        np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)),
-        axis=0,
-        return_index=True,
-        return_inverse=True,
-    )
-    order = np.argsort(first)
-    (a, b, c), (ab, bc, ca) = F.T, (len(V) + np.argsort(order)[edge].reshape(-1, 3)).T
-    corners = np.stack([a, ab, ca, b, bc, ab, ab, bc, ca, bc, c, ca], axis=1)
-    return np.concatenate([V, V[edges[order]].mean(axis=1)]), corners.reshape(-1, 3)
-
-
 def icosphere(subdivisions: int) -> Mesh:
     """The unit sphere by subdivision of an icosahedron, with 10 * 4^subdivisions + 2 vertices.
 
@@ -140,7 +126,7 @@ def icosphere(subdivisions: int) -> Mesh:
             f"subdivisions must be at most {_MOST_SUBDIVISIONS}, not {subdivisions}: each quadruples faces"
         )
     for _ in range(int(subdivisions)):
-        V, F = quartered(V, F)
+        V, F = igl.upsample(V, F, 1)
         V /= np.linalg.norm(V, axis=1, keepdims=True)
     return Mesh(V / np.linalg.norm(V, axis=1, keepdims=True), F)
 
