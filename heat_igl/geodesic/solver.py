@@ -319,37 +319,6 @@ class GeodesicSolver(BatchedSolver):
         domain = self._domain
         return len(domain.weights) if isinstance(domain, Operators) else domain.n_faces
 
-    @names_guessed
-    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
-        """Distance from the nearest source.
-
-        Parameters
-        ----------
-        sources : sources
-            A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`
-            where distance begins at other values than 0, or a list of such.
-        cutoff : float, optional
-            Distances beyond this are ``inf``; a search by windows ends there.
-
-        Returns
-        -------
-        (n,) float64
-            In the mesh's unit: 0 at the sources (their offset where they have one, unless another source is nearer),
-            ``inf`` at vertices that no source reaches, never negative or NaN.
-
-        Raises
-        ------
-        SourceError
-            If `sources` does not describe places on the mesh.
-        ValueError
-            If `cutoff` is not positive.
-        """
-        limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
-        distance: FloatArray = self._with_copies(self._asked(chosen).distance(chosen, limit, n_threads()))
-        if limit < np.inf:
-            distance[distance > limit] = np.inf
-        return distance
-
     def _nearer(self, vertex: int, than: FloatArray) -> FloatArray:
         """Distance (n,) from a vertex where it is smaller than `than` (n,), the distance from others; else ``inf``."""
         return np.asarray(self._with_copies(self._engine.nearer(self._source_set(vertex), than, n_threads())))
@@ -530,8 +499,10 @@ class GeodesicSolver(BatchedSolver):
             require_resolved(chosen, h)
         return chosen
 
-    def _answers(self, source_sets: list[SourceSet], cutoff: float = np.inf) -> tuple[FloatArray, list[None]]:
-        rows = [self._asked(sources).distance(sources, cutoff) for sources in source_sets]
+    def _answers(
+        self, source_sets: list[SourceSet], cutoff: float = np.inf, threads: int = 1
+    ) -> tuple[FloatArray, list[None]]:
+        rows = [self._asked(sources).distance(sources, cutoff, threads) for sources in source_sets]
         return self._with_copies(np.stack(rows)), [None] * len(rows)
 
 

@@ -74,11 +74,11 @@ class BatchedSolver(ABC):
 
     @abstractmethod
     def _answers(
-        self, source_sets: list[SourceSet], cutoff: float = np.inf
+        self, source_sets: list[SourceSet], cutoff: float = np.inf, threads: int = 1
     ) -> tuple[FloatArray, Sequence[AnswerCheck | None]]:
         """Distances (k, n) from k sets of sources, and by how much each violates bounds; on any thread.
 
-        What is beyond the cutoff may be left ``inf``.
+        What is beyond the cutoff may be left ``inf``. A search may use `threads` threads.
         """
 
     @cached_property
@@ -93,6 +93,48 @@ class BatchedSolver(ABC):
     def _complaint(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck | None) -> str | None:  # noqa: ARG002
         """The text of a warning about an answer (n,), if one is due; in the order of the sets, on one thread."""
         return None
+
+    @names_guessed
+    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
+        """Distance from the nearest source.
+
+        Parameters
+        ----------
+        sources : sources
+            A vertex, a sequence of vertices, a mask (n,) of bool, `SurfacePoints`, a `SurfaceCurve`, `OffsetSources`
+            where distance begins at other values than 0, or a list of such.
+        cutoff : float, optional
+            Distances beyond this are ``inf``; a search by windows ends there.
+
+        Returns
+        -------
+        (n,) float64
+            In the mesh's unit: 0 at the sources (their offset where they have one, unless another source is nearer),
+            ``inf`` at vertices that no source reaches, never negative or NaN.
+
+        Raises
+        ------
+        SourceError
+            If `sources` does not describe places on the mesh.
+        ValueError
+            If `cutoff` is not positive.
+
+        Warns
+        -----
+        AccuracyWarning
+            By heat, if it underflowed on the way, so that distances beyond are too short; if the answer is off by more
+            than 3.5 % in the mean or 12.5 % of the largest distance at a vertex, compared with another engine, as the
+            first three from such sources are; from points and curves on polygons, if it leaves bounds that need no
+            reference by so much that it is wrong (see `AnswerCheck`).
+        """
+        limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
+        (distance,), (check,) = self._answers([chosen], limit, n_threads())
+        complaint = self._complaint(distance, chosen, check)
+        if complaint is not None:
+            warn_caller(complaint, AccuracyWarning)
+        if limit < np.inf:
+            distance[distance > limit] = np.inf
+        return np.asarray(distance)
 
     @names_guessed
     def distances(

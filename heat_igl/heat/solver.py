@@ -255,26 +255,6 @@ class HeatMethodSolver(BatchedSolver):
     def _n_faces(self) -> int:
         return len(self._parts.operators.weights)
 
-    @names_guessed
-    def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:
-        """Distance (n,) from the nearest source: arguments, values and errors as for `GeodesicSolver.distance`.
-
-        Warns
-        -----
-        AccuracyWarning
-            If heat underflowed on the way, so that distances beyond are too short; if the answer is off by more than
-            3.5 % in the mean or 12.5 % of the largest distance at a vertex, compared with another engine, as the first
-            three from such sources are; from points and curves on polygons, if it leaves bounds that need no reference
-            by so much that it is wrong (see `AnswerCheck`).
-        """
-        limit = checked_cutoff(cutoff)
-        chosen = self._source_set(sources)
-        (distance,), (check,) = self._answers([chosen])
-        _warn(self._complaint(distance, chosen, check))
-        if limit < np.inf:
-            distance[distance > limit] = np.inf
-        return np.asarray(distance)
-
     def _source_set(self, sources: Sources) -> SourceSet:
         surface = self.operators.source_surface
         faces = None if surface is None else surface.given_faces
@@ -289,6 +269,7 @@ class HeatMethodSolver(BatchedSolver):
         self,
         source_sets: list[SourceSet],
         cutoff: float = np.inf,  # noqa: ARG002
+        threads: int = 1,  # noqa: ARG002 - the linear solver's
     ) -> tuple[FloatArray, list[AnswerCheck]]:
         """Distances (k, n) from k sets of sources, and by how much they left bounds: the method from end to end."""
         terms = self._source_terms(source_sets)
