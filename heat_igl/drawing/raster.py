@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.mesh.connectivity import enumerate_runs
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 
@@ -135,8 +136,8 @@ def _candidates(low: IntArray, high: IntArray) -> Iterator[tuple[IntArray, IntAr
         before = int(ends[start - 1]) if start else 0
         stop = max(start + 1, int(np.searchsorted(ends, before + _CHUNK, side="right")))
         chunk = faces[start:stop]
-        face = np.repeat(chunk, count[chunk])
-        place = np.arange(len(face)) - np.repeat(ends[start:stop] - count[chunk] - before, count[chunk])
+        which, place = enumerate_runs(count[chunk])
+        face = chunk[which]
         row, column = np.divmod(place, size[face, 0])
         yield face, row + low[face, 1], column + low[face, 0]
         start = stop

@@ -265,14 +265,12 @@ class GeodesicSolver(BatchedSolver):
                     return chosen, HopfLaxEngine(domain.simplices)
             if not domain.has_surface:
                 raise MeshError("distance is measured along simplices, and these operators know none: give the mesh")
-            chosen = distance_plan("triangles", method, tolerance)
+        chosen = distance_plan("points" if isinstance(domain, PointCloud) else "triangles", method, tolerance)
+        if isinstance(domain, Operators):
             return self._on_triangles(OperatorTriangles(domain), chosen)
         if isinstance(domain, PointCloud):
-            chosen = distance_plan("points", method, tolerance)
             # For a sweep, as for heat, slivers between points are lengthened a little.
-            triangles = MeshTriangles(domain.triangles, None, orients=False)
-            return self._on_triangles(triangles, chosen)
-        chosen = distance_plan("triangles", method, tolerance)
+            return self._on_triangles(MeshTriangles(domain.triangles, None, orients=False), chosen)
         return self._on_triangles(MeshTriangles(domain), chosen)
 
     def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:

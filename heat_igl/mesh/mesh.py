@@ -157,8 +157,7 @@ class Mesh:
 
     def _hold(self, positions: FloatArray, faces: IntArray) -> None:
         positions.setflags(write=False)
-        object.__setattr__(self, "V", positions)
-        object.__setattr__(self, "F", faces)
+        vars(self).update(V=positions, F=faces)
         used = positions if self.referenced.all() else positions[self.referenced]
         # By columns, which takes a tenth of the time.
         with np.errstate(over="ignore"):

@@ -92,8 +92,7 @@ class PointCloud:
         for array in (positions, directions):
             if array is not None:
                 array.setflags(write=False)
-        object.__setattr__(self, "P", positions)
-        object.__setattr__(self, "normals", directions)
+        vars(self).update(P=positions, normals=directions)
 
     def __repr__(self) -> str:
         return f"PointCloud({self.n_vertices} points{'' if self.normals is None else ' with normals'})"

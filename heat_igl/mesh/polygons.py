@@ -80,10 +80,7 @@ class PolygonMesh:
         for array in (corners, degree):
             array.setflags(write=False)
         triangles = Mesh.of_polygons(positions, corners, degree, partial(_named, corners, degree))
-        object.__setattr__(self, "V", triangles.V)
-        object.__setattr__(self, "corners", corners)
-        object.__setattr__(self, "degree", degree)
-        object.__setattr__(self, "triangles", triangles)
+        vars(self).update(V=triangles.V, corners=corners, degree=degree, triangles=triangles)
 
     def __repr__(self) -> str:
         return f"PolygonMesh({self.n_vertices} vertices, {self.n_faces} polygons)"

@@ -61,8 +61,7 @@ class SurfacePoints:
 
     def __post_init__(self) -> None:
         faces = _face_indices("faces", self.faces)
-        object.__setattr__(self, "faces", faces)
-        object.__setattr__(self, "barycentric", _coordinates("barycentric", self.barycentric, len(faces)))
+        vars(self).update(faces=faces, barycentric=_coordinates("barycentric", self.barycentric, len(faces)))
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -121,12 +120,9 @@ class SurfaceCurve:
 
     def __post_init__(self) -> None:
         faces = _face_indices("faces", self.faces)
-        if self.mesh is not None:
-            object.__setattr__(self, "mesh", as_simplices(self.mesh))
-        object.__setattr__(self, "faces", faces)
-        object.__setattr__(self, "start", _coordinates("start", self.start, len(faces)))
-        object.__setattr__(self, "end", _coordinates("end", self.end, len(faces)))
-        object.__setattr__(self, "is_closed", truth("is_closed", self.is_closed))
+        ends = {name: _coordinates(name, getattr(self, name), len(faces)) for name in ("start", "end")}
+        mesh, is_closed = self.mesh, truth("is_closed", self.is_closed)
+        vars(self).update(ends, faces=faces, is_closed=is_closed, mesh=None if mesh is None else as_simplices(mesh))
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -176,17 +172,14 @@ def unchecked_curve(
 ) -> SurfaceCurve:
     """A `SurfaceCurve` of int64 faces (s,), and float64 coordinates (s, 3) that are known to be right."""
     curve = object.__new__(SurfaceCurve)
-    values = {"faces": faces, "start": start, "end": end, "is_closed": is_closed, "mesh": mesh}
-    for name, value in values.items():
-        object.__setattr__(curve, name, value)
+    vars(curve).update(faces=faces, start=start, end=end, is_closed=is_closed, mesh=mesh)
     return curve
 
 
 def unchecked_points(faces: IntArray, barycentric: FloatArray) -> SurfacePoints:
     """`SurfacePoints` of int64 faces (k,), and float64 coordinates (k, 3) that are known to be right."""
     points = object.__new__(SurfacePoints)
-    object.__setattr__(points, "faces", faces)
-    object.__setattr__(points, "barycentric", barycentric)
+    vars(points).update(faces=faces, barycentric=barycentric)
     return points
 
 
