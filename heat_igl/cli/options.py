@@ -76,14 +76,9 @@ def described(path: Path, mesh: Mesh | PointCloud) -> Row:
 
 def print_rows(rows: Sequence[Row], json_file: Path | None = None) -> None:
     """Print names and texts as two columns; also as JSON to a file, or to standard output in their place."""
-    if json_file is not None:
-        print_json(as_dictionary(rows), json_file)
-    if json_file == _STANDARD_OUTPUT:
-        return
     width = max(len(row[0]) for row in rows)
-    console = Console(highlight=False, soft_wrap=True)  # no wrapping, so that pipes receive one line per row
-    for name, text, *_ in rows:
-        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {text}"))
+    lines = [Text.assemble((f"{name:{width}}", "bold"), f"  {text}\n") for name, text, *_ in rows]
+    print_report(as_dictionary(rows), Text.assemble(*lines), json_file)
 
 
 def as_dictionary(rows: Sequence[Row]) -> dict[str, Any]:
@@ -104,12 +99,13 @@ def print_json(content: Mapping[str, Any], json_file: Path) -> None:
         temporary.write_bytes(text.encode("utf8"))
 
 
-def print_report(content: Mapping[str, Any], text: str, json_file: Path | None) -> None:
+def print_report(content: Mapping[str, Any], text: str | Text, json_file: Path | None) -> None:
     """Print a text, and write the content as JSON to a file, or print it in place of the text."""
     if json_file is not None:
         print_json(content, json_file)
     if json_file != _STANDARD_OUTPUT:
-        print(text, end="")
+        # No wrapping, so that pipes receive one line per row.
+        Console(highlight=False, soft_wrap=True, markup=False, emoji=False).print(text, end="")
 
 
 def wrote(*paths: Path | None) -> list[Row]:

@@ -195,6 +195,12 @@ def integers(values: FloatArray, where: Callable[[int], str], what: str = "index
     return values.astype(np.int64)
 
 
+def of_corner(degree: IntArray, cell_at: Callable[[int], str]) -> Callable[[int], str]:
+    """Where the cell of the i-th corner stands in a file, by the number of corners (m,) and the place of each cell."""
+    end = np.cumsum(degree)
+    return lambda i: cell_at(int(np.searchsorted(end, i, side="right")))
+
+
 def numbered(path: Path, kind: str, base: int) -> Callable[[int], str]:
     """Where the i-th vertex or cell stands in a file, for errors."""
     return lambda i: f"{path}, {kind} {i + base} (counted from {base})"
@@ -214,14 +220,13 @@ def check(
     if bad.any():
         where = vertex_at(int(np.argmax(bad)))
         raise MeshError(f"{where}: a coordinate is not finite ({int(bad.sum())} of {n} vertices): repair or remove it")
-    end = np.cumsum(degree)
     bad = (corners < 0) | (corners >= n)
     if bad.any():
         first = int(np.argmax(bad))
-        where = cell_at(int(np.searchsorted(end, first, side="right")))
         raise MeshError(
-            f"{where}: there is no vertex {corners[first] + base}, the file has {n} vertices, counted from {base} "
-            f"({int(bad.sum())} such indices): the file is damaged or written by another convention"
+            f"{of_corner(degree, cell_at)(first)}: there is no vertex {corners[first] + base}, the file has {n} "
+            f"vertices, counted from {base} ({int(bad.sum())} such indices): the file is damaged or written by another "
+            "convention"
         )
     bad = which_repeat_a_vertex(corners, degree)
     if bad.any():

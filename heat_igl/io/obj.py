@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError
-from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, integers, warn_if_cut
+from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, integers, of_corner, warn_if_cut
 from heat_igl.mesh import Mesh
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import FloatArray, IntArray
@@ -43,11 +43,11 @@ def read(path: Path, data: bytes) -> Contents:
     text.refuse(F_lines, short, f"a face needs three corners or more ({int(short.sum())} lines have fewer)")
     values, _ = text.numbers(F_lines, skip=1, up_to_slash=True)
     degree = text.count[F_lines] - 1
-    end = np.cumsum(degree)
-    number = integers(values, lambda i: text.where(F_lines[np.searchsorted(end, i, side="right")]))
-    if (number == 0).any():
-        line = F_lines[np.searchsorted(end, np.argmax(number == 0), side="right")]
-        raise text.error(line, f"vertex 0 ({int((number == 0).sum())} such indices): OBJ counts vertices from 1")
+    number = integers(values, of_corner(degree, lambda i: text.where(F_lines[i])))
+    zero = number == 0
+    text.refuse(
+        np.repeat(F_lines, degree), zero, f"vertex 0 ({int(zero.sum())} such indices): OBJ counts vertices from 1"
+    )
     if (number < 0).any():
         # -1 is the last vertex before this line.
         above = np.repeat(np.cumsum(is_v)[F_lines], degree)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, integers, ragged, warn_if_cut
+from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, integers, of_corner, ragged, warn_if_cut
 from heat_igl.mesh import Mesh
 from heat_igl.typing import FloatArray, IntArray
 
@@ -73,11 +73,7 @@ def _polygons(text: Text, lines: IntArray) -> Cells:
         raise text.error(
             lines[i], f"a face of {degree[i]} corners needs at least three, and an index for each behind the number"
         )
-    end = np.cumsum(degree)
-    corners = integers(
-        values[ragged(start + 1, degree)], lambda i: text.where(lines[np.searchsorted(end, i, side="right")])
-    )
-    return Cells(corners, degree)
+    return Cells(integers(values[ragged(start + 1, degree)], of_corner(degree, lambda i: text.where(lines[i]))), degree)
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:

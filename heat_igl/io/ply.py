@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.io.contents import Cells, Contents, Text, check, integers, numbered, ragged, warn_if_cut
+from heat_igl.io.contents import Cells, Contents, Text, check, integers, numbered, of_corner, ragged, warn_if_cut
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -244,11 +244,7 @@ def read(path: Path, data: bytes) -> Contents:
     if (degree < 3).any():
         i = int(np.argmax(degree < 3))
         raise MeshError(f"{face_at(i)}: {degree[i]} corners; a face needs three ({int((degree < 3).sum())} have fewer)")
-    end = np.cumsum(degree)
-    corners = integers(
-        faces[name].values.astype(np.float64), lambda i: face_at(int(np.searchsorted(end, i, side="right")))
-    )
-    cells = Cells(corners, degree)
+    cells = Cells(integers(faces[name].values.astype(np.float64), of_corner(degree, face_at)), degree)
     check(V, cells, numbered(path, "vertex", 0), face_at)
     if not header.order:
         warn_if_cut(path, data, int(cells.corners[-1]) or len(V), len(V))
