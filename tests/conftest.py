@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import heat_igl
-from heat_igl.reference import guarded
+from heat_igl.reference import guarded, native
 from heat_igl.validation.zoo import SHAPES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -80,13 +80,9 @@ def mean_error(d: np.ndarray, truth: np.ndarray) -> float:
 
 
 def pygeodesic_distance(mesh: heat_igl.Mesh, source: int) -> np.ndarray:
-    """Exact distance (n,) by pygeodesic; ``inf`` at unused vertices, which it does not take."""
-    geodesic = pytest.importorskip("pygeodesic.geodesic")
-    used, F = np.unique(mesh.F, return_inverse=True)
-    algorithm = geodesic.PyGeodesicAlgorithmExact(mesh.V[used], F.reshape(-1, 3))
-    d = np.full(mesh.n_vertices, np.inf)
-    d[used] = algorithm.geodesicDistances(np.searchsorted(used, [source]))[0]
-    return d
+    """Exact distance (n,) by pygeodesic."""
+    pytest.importorskip("pygeodesic")
+    return native.pygeodesic_exact(mesh.V, mesh.F, np.array([source]), mesh.components)["distance"]
 
 
 @pytest.fixture

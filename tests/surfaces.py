@@ -101,9 +101,7 @@ def random_disk(n: int, seed: int) -> Mesh:
 
 def sheared(mesh: Mesh, shear: float) -> Mesh:
     """Still flat and convex, but most faces are not those of its Delaunay triangulation."""
-    V = mesh.V.copy()
-    V[:, 0] += shear * V[:, 1]
-    return Mesh(V, mesh.F)
+    return Mesh(mesh.V + shear * mesh.V[:, 1:2] * [1, 0, 0], mesh.F)
 
 
 def with_point(mesh: Mesh, face: int, barycentric: np.ndarray) -> Mesh:
@@ -121,13 +119,8 @@ def moebius_strip(around: int, across: int, half_width: float = 0.4) -> Mesh:
     s = np.linspace(-half_width, half_width, across + 1)
     T, S = np.meshgrid(t, s, indexing="ij")
     V = np.stack([(1 + S * np.cos(T / 2)) * np.cos(T), (1 + S * np.cos(T / 2)) * np.sin(T), S * np.sin(T / 2)], axis=-1)
-    faces = []
-    for i in range(around):
-        for j in range(across):
-            a, b = i * (across + 1) + j, i * (across + 1) + j + 1
-            c, d = (a + across + 1, b + across + 1) if i < around - 1 else (across - j, across - j - 1)
-            faces += [[a, c, b], [b, c, d]]
-    return Mesh(V.reshape(-1, 3), faces)
+    F, n = shapes.lattice_faces(around + 1, across + 1)[:, ::-1], around * (across + 1)
+    return Mesh(V.reshape(-1, 3), np.where(n > F, F, n + across - F))
 
 
 def bent_pages() -> Mesh:
