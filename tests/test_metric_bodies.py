@@ -430,7 +430,8 @@ def test_the_value_of_a_derivative_is_the_distance(at):
         (np.diag([1, np.inf, 1]), 0, r"D\[0\] = .* must be finite"),
         (1e200 * np.eye(3), 0, r"D\[0\] = .* take another unit"),
         (np.eye(3), np.inf, r"times\[0\] = inf must be finite"),
-        (np.eye(3), [0, 1], "times has 2 entries for 1 sites"),
+        (np.eye(3), [0, 1], r"times must be one number, or 1, one for each of the sites, not of shape \(2,\)"),
+        (np.eye(3), [-1e308, 1e308], r"times\[1\] = 1e\+308 must be finite, also after the first \(1 of 2"),
         (np.triu(np.ones((3, 3))), 0, r"D\[0\] = .* must be symmetric"),
     ],
 )
@@ -447,8 +448,14 @@ def test_wrong_tissue_is_refused(D, times, message):
     square, place = shapes.grid(4), np.array([0.3, 0.6, 0])
     times = activation_times(square, np.diag([4.0, 1, 1]), place, 2.0)
     assert times == pytest.approx(2 + np.linalg.norm((square.V - place) * [0.5, 1, 1], axis=1))
-    with pytest.raises(SourceError, match=r"sites\[0\] is 1.41 away"):
-        activation_times(square, np.eye(3), [2.0, 2, 0])
+    for sites, wrong in (
+        ([2.0, 2, 0], r"sites\[0\] is 1.41 away"),
+        ([0, np.nan, 0], r"sites\[0\] = \[0.0, nan, 0.0\] must be finite"),
+        ([SurfacePoints([0], [[1, 0, 0]]), [25]], r"sites\[1\]: sites\[0\] = 25 is no vertex"),
+        (np.ones(25, int), "sites are 25 integers 0 and 1"),
+    ):
+        with pytest.raises(SourceError, match=f"^{wrong}"):
+            activation_times(square, np.eye(3), sites)
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from typing import cast
 
 import numpy as np
 
-from heat_igl.errors import SourceError, raise_at_first, real_numbers
+from heat_igl.errors import raise_at_first, real_numbers
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import points_beside
@@ -73,20 +72,17 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
         raise ValueError(f"D must have shape (3, 3), {(m, 3, 3)} per face or {(n, 3, 3)} per vertex, not {D.shape}")
     least_eigenvalue("D", inverse_root(symmetric_tensors("D", D))[1], D)
     start = real_numbers("times", times)
-    raise_at_first(~np.isfinite(start.ravel()), "times", start.ravel(), "must be finite", "leave out its site")
-    first_time = float(start.min()) if start.size else 0.0
-    try:
-        with np.errstate(over="ignore"):
-            sources = OffsetSources(sites, start - first_time)
-        if are_positions(sites) and not simplices.is_tetrahedral:
-            places = points_beside(simplices, cast(ArrayLike, sites), "sites")
-            sources = OffsetSources(places, sources.offsets)
-        # Wrong sites are named before anything is prepared.
-        source_set(sources, n, None if simplices.is_tetrahedral else simplices.F)
-        inverse = np.linalg.inv(D)
-        solver = GeodesicSolver(metric_operators(simplices, (inverse + np.swapaxes(inverse, 1, 2)) / 2))
-        return np.asarray(solver.distance(sources) + first_time)
-    except SourceError as error:
-        # In the words of this function.
-        words = re.sub(r"\bsource(s?)\b", r"site\1", re.sub(r"\boffsets\b", "times", str(error)))
-        raise SourceError(words) from None
+    first_time = start.min(initial=np.inf, where=np.isfinite(start))
+    with np.errstate(over="ignore", invalid="ignore"):
+        after = start - first_time
+    wrong = ~np.isfinite(after.ravel())
+    raise_at_first(wrong, "times", start.ravel(), "must be finite, also after the first", "leave out its site")
+    if are_positions(sites) and not simplices.is_tetrahedral:
+        sites = points_beside(simplices, cast(ArrayLike, sites), "sites")
+    # Wrong sites are named before anything is prepared.
+    k = source_set(sites, n, None if simplices.is_tetrahedral else simplices.F, name="sites").n_labels
+    if start.shape not in ((), (k,)):
+        raise ValueError(f"times must be one number, or {k}, one for each of the sites, not of shape {start.shape}")
+    inverse = np.linalg.inv(D)
+    solver = GeodesicSolver(metric_operators(simplices, (inverse + np.swapaxes(inverse, 1, 2)) / 2))
+    return np.asarray(solver.distance(OffsetSources(sites, after)) + first_time)

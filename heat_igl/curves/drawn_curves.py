@@ -111,7 +111,7 @@ def curve_on(
     0.5
     """
     mesh, closed = as_triangles(mesh, "curves need"), truth("closed", closed)
-    corners = checked_points(positions)
+    corners = checked_points("positions", positions)
     if len(corners) < 2:
         raise SourceError(f"positions must be two corners of a curve or more, not {len(corners)}")
     solver = GeodesicPathSolver(mesh)

@@ -223,7 +223,9 @@ def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
     a, b, c = array.T
     wrong = ~(np.isfinite(a + b + c) & (np.minimum(np.minimum(a, b), c) >= -ON_SIDE_COMPUTED))
     raise_at_first(wrong, name, array, "must be finite and not negative", error=SourceError)
-    raise_at_first(np.abs(a + b + c - 1) > ON_SIDE_COMPUTED, name, array, "must sum to 1", error=SourceError)
+    missed = np.abs(a + b + c - 1) > ON_SIDE_COMPUTED
+    remedy = f"it sums to {array[missed.argmax()].sum():.12g}"
+    raise_at_first(missed, name, array, "must sum to 1", remedy, SourceError)
     array = np.maximum(array, 0.0)
     a, b, c = array.T
     return np.asarray(array / (a + b + c)[:, None])
@@ -296,7 +298,7 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
     (True, [2.0, 2.0, 2.0, 2.0, 2.0])
     """
     mesh = as_triangles(mesh, "points on faces need", SourceError)
-    return Projector(mesh).project(checked_points(positions))
+    return Projector(mesh).project(checked_points("positions", positions))
 
 
 def points_beside(mesh: Mesh, positions: ArrayLike, name: str = "positions") -> SurfacePoints:
@@ -305,7 +307,8 @@ def points_beside(mesh: Mesh, positions: ArrayLike, name: str = "positions") -> 
     Errors are those of `closest_points`, and a SourceError if one of the positions, called `name`, is farther from the
     surface than the mean length of an edge.
     """
-    found, nearness = closest_points(mesh, positions), float(mesh.edge_lengths.mean())
+    mesh = as_triangles(mesh, "points on faces need", SourceError)
+    found, nearness = Projector(mesh).project(checked_points(name, positions)), float(mesh.edge_lengths.mean())
     far = np.flatnonzero(found.gap > nearness)
     if len(far):
         raise SourceError(
@@ -315,14 +318,14 @@ def points_beside(mesh: Mesh, positions: ArrayLike, name: str = "positions") -> 
     return found.points
 
 
-def checked_points(positions: ArrayLike) -> FloatArray:
-    """`positions` as a new (k, 3) float64 array, k at least 1; the errors are those of `closest_points`."""
-    array = rows_in_space("positions", positions)
+def checked_points(name: str, positions: ArrayLike) -> FloatArray:
+    """`positions` as a new (k, 3) float64 array, k at least 1; errors are those of `closest_points` and say `name`."""
+    array = rows_in_space(name, positions)
     if not len(array):
-        raise SourceError(f"positions must have shape (k, 3), a row for each, not {array.shape}")
-    raise_at_first(~np.isfinite(array).all(axis=1), "positions", array, "must be finite", error=SourceError)
+        raise SourceError(f"{name} must have shape (k, 3), a row for each, not {array.shape}")
+    raise_at_first(~np.isfinite(array).all(axis=1), name, array, "must be finite", error=SourceError)
     far, remedy = (abs(array) > _FARTHEST).any(axis=1), "so that squares do not overflow"
-    raise_at_first(far, "positions", array, f"must be within {_FARTHEST:.0e}", remedy, SourceError)
+    raise_at_first(far, name, array, f"must be within {_FARTHEST:.0e}", remedy, SourceError)
     return array
 
 

@@ -156,8 +156,11 @@ def source_set(
     *,
     part: MeshPart | None = None,
     originals: IntArray | None = None,
+    name: str = "sources",
 ) -> SourceSet:
     """All that a user may pass as sources, as one checked object; a `SourceError` names the first that is none.
+
+    The error calls them `name`.
 
     Sources are counted as they are given: the i-th vertex of a sequence, the i-th set entry of a mask, the i-th of
     `SurfacePoints`, a curve as one; over the entries of a list, which may be nested, one after another. The domain has
@@ -169,7 +172,7 @@ def source_set(
         # Most queries, at a tenth of the cost.
         chosen = SourceSet(np.array([int(sources)]), np.zeros(1, np.int64), np.zeros(1), NO_POINTS, NO_SEGMENTS, 1)
     else:
-        builder = _Builder(n, F, mesh)
+        builder = _Builder(n, F, mesh, name)
         builder.add(sources)
         chosen = builder.finish()
     if originals is not None:
@@ -269,8 +272,8 @@ def _holds_places(sources: object) -> TypeGuard[Sequence[Any]]:
 class _Builder:
     """Collects the parts of a set and counts the sources."""
 
-    def __init__(self, n: int, F: IntArray | None, mesh: Mesh | None) -> None:
-        self._n, self._F, self._mesh = n, F, mesh
+    def __init__(self, n: int, F: IntArray | None, mesh: Mesh | None, name: str) -> None:
+        self._n, self._F, self._mesh, self._name = n, F, mesh, name
         self._offset = np.empty(0)  # of each source so far
         self._vertices: list[tuple[IntArray, IntArray]] = []
         self._points: list[tuple[SurfacePoints, IntArray]] = []
@@ -299,14 +302,14 @@ class _Builder:
                 self._curves.append((sources, int(label[0])))
         elif _holds_places(sources):
             for i, part in enumerate(sources):
-                with errors_at(f"sources[{i}]"):
+                with errors_at(f"{self._name}[{i}]"):
                     self.add(part)
         elif self._mesh is not None and are_positions(sources):
-            self.add(points_beside(self._mesh, cast(ArrayLike, sources), "sources"))
+            self.add(points_beside(self._mesh, cast(ArrayLike, sources), self._name))
         else:
-            vertices = named_vertices(sources, self._n)
+            vertices = named_vertices(sources, self._n, self._name)
             if len(vertices) == self._n > 2 and vertices.max() <= 1:
-                raise SourceError(f"sources are {self._n} integers 0 and 1: a mask must be boolean, so astype(bool)")
+                raise SourceError(f"{self._name} are {self._n} integers 0 and 1: a mask must be boolean: astype(bool)")
             self._vertices.append((vertices, self._counted(len(vertices))))
 
     def _counted(self, k: int) -> IntArray:
