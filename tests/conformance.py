@@ -147,12 +147,6 @@ def _convex(mesh: Mesh) -> Domain:
     return _of_mesh(mesh, truth=partial(straight, mesh.V))
 
 
-def _pages() -> Domain:
-    """Three flat pages at a spine; any two of them lie in one plane if they are unfolded."""
-    mesh = shapes.book(3, 18)
-    return _of_mesh(mesh, truth=partial(on_pages, mesh.V))
-
-
 def _tensor(dimensions: int) -> np.ndarray:
     """One constant metric, by half longer in one direction."""
     axes = Rotation.from_rotvec([0.0, 0.0, 0.5] if dimensions == 2 else [0.3, 0.8, 0.2]).as_matrix()
@@ -185,7 +179,7 @@ _MAKE: dict[str, Callable[[], Domain]] = {
     "handle": lambda: _of_mesh(perturbed(shapes.torus(36, 60), 0.25)),
     "boundary": lambda: _convex(flat_perturbed(shapes.disk(19))),
     "one side": lambda: _of_mesh(moebius_strip(150, 8)),
-    "non-manifold": _pages,
+    "non-manifold": lambda: _of_mesh(mesh := shapes.book(3, 18), truth=partial(on_pages, mesh.V)),
     "polygons": lambda: Domain("polygons", (mesh := dual_of_sphere(3)).V, mesh.polygons, truth=partial(arcs, mesh.V)),
     "points": lambda: Domain("points", P := on_sphere(1500), None, truth=partial(arcs, P)),
     "points with normals": lambda: Domain("points", P := on_sphere(1500), None, P, partial(arcs, P)),

@@ -6,6 +6,7 @@ from conftest import flat_perturbed
 
 import heat_igl
 from heat_igl import Mesh, SurfaceCurve, curve_on, cut, edge_curve, isolines, shapes
+from heat_igl.heat.curve_sides import total_length
 from heat_igl.mesh import connectivity
 
 
@@ -21,12 +22,6 @@ def random_loop(mesh: Mesh, seed: int) -> SurfaceCurve:
     """A closed polyline over a unit square that crosses itself."""
     corners = np.random.default_rng(seed).uniform(0.05, 0.95, (7, 2))
     return curve_on(mesh, np.column_stack([corners, np.zeros(7)]), closed=True)
-
-
-def drawn_length(mesh: Mesh, curve: SurfaceCurve) -> float:
-    """The length of the segments, whether or not each begins where the one before ends."""
-    ends = (np.einsum("sc,scx->sx", b, mesh.V[mesh.F[curve.faces]]) for b in (curve.start, curve.end))
-    return float(np.linalg.norm(np.subtract(*ends), axis=1).sum())
 
 
 def wild_segments(mesh: Mesh, count: int, seed: int) -> SurfaceCurve:
@@ -83,7 +78,7 @@ def test_the_surface_stays_and_curves_become_edges(name):
     every = curves if isinstance(curves, list) else [curves]
     length = np.linalg.norm(np.diff(found.mesh.V[found.edges], axis=1)[:, 0], axis=1)
     for i, curve in enumerate(every):
-        assert length[found.curve == i].sum() == pytest.approx(drawn_length(mesh, curve), rel=1e-12)
+        assert length[found.curve == i].sum() == pytest.approx(total_length(mesh, curve), rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -111,11 +111,6 @@ def test_time_step_is_raised_when_heat_would_not_cross():
 STRIP = shapes.strip(3000, 1)
 
 
-def cold_solver() -> HeatMethodSolver:
-    """On a domain whose extent is understated, so that heat runs out."""
-    return HeatMethodSolver(dataclasses.replace(operators(STRIP), longest_distance=1.0), magnitude="unit")
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -129,7 +124,8 @@ def cold_solver() -> HeatMethodSolver:
     ],
 )
 def test_a_warning_points_at_the_line_that_calls_the_package(call, message):
-    solver = cold_solver()
+    # Heat runs out on a domain whose extent is understated.
+    solver = HeatMethodSolver(dataclasses.replace(operators(STRIP), longest_distance=1.0), magnitude="unit")
     with pytest.warns(AccuracyWarning, match=message) as caught:
         call(solver)
     lines = {(warning.filename, warning.lineno) for warning in caught}
@@ -250,12 +246,6 @@ def test_icosphere_of_655362_vertices():
 # --- The same numbers as libigl's own heat method, where both do the same
 
 
-def libigl_distance(mesh: Mesh, t: float, source: int) -> np.ndarray:
-    data = igl.HeatGeodesicsData()
-    igl.heat_geodesics_precompute(mesh.V, mesh.F, t, data)
-    return np.asarray(igl.heat_geodesics_solve(data, np.array([source], np.int64)))
-
-
 @pytest.mark.parametrize("name", ["cow.obj", "bunny.obj"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_cotan_agrees_with_libigl(name, seed):
@@ -264,7 +254,9 @@ def test_cotan_agrees_with_libigl(name, seed):
     inner = np.flatnonzero(mesh.referenced & ~mesh.boundary)
     source = int(np.random.default_rng(seed).choice(inner))
     solver = HeatMethodSolver(mesh, laplacian="cotan", boundary="average")
-    expected = libigl_distance(mesh, solver.t, source)
+    data = igl.HeatGeodesicsData()
+    igl.heat_geodesics_precompute(mesh.V, mesh.F, solver.t, data)
+    expected = igl.heat_geodesics_solve(data, np.array([source]))
     expected = np.maximum(expected - expected[source], 0)
     difference = np.abs(solver.distance(source) - expected)
     assert difference.max() <= 1e-6 * mesh.longest_distance

@@ -8,11 +8,6 @@ import heat_igl
 from heat_igl import Mesh, geodesic_errors, parcel_distances, shapes, smooth
 
 
-def some_labels(n: int) -> np.ndarray:
-    """Five parcels of unequal size with gaps between their names, and a fifth of the vertices in none."""
-    return np.random.default_rng(4).choice([-1, 0, 3, 4, 9, 20], n, p=[0.2, 0.1, 0.3, 0.2, 0.15, 0.05])
-
-
 def all_distances(mesh: Mesh) -> np.ndarray:
     return np.stack([heat_igl.geodesic_distance(mesh, v, method="exact") for v in range(mesh.n_vertices)])
 
@@ -35,7 +30,9 @@ def cases():
 @pytest.mark.parametrize("case", range(3))
 def test_parcel_distances_are_those_of_the_full_matrix(cases, case):
     mesh, region, distance = cases[case]
-    labels = some_labels(mesh.n_vertices)
+    # Five parcels of unequal size with gaps between their names, and a fifth of the vertices in none.
+    share, n = [0.2, 0.1, 0.3, 0.2, 0.15, 0.05], mesh.n_vertices
+    labels = np.random.default_rng(4).choice([-1, 0, 3, 4, 9, 20], n, p=share)
     inside = np.isfinite(distance).any(axis=1)
     parcels = [np.flatnonzero((labels == name) & inside) for name in (0, 3, 4, 9, 20)]
     blocks = [[distance[np.ix_(a, b)] for b in parcels] for a in parcels]
