@@ -87,6 +87,36 @@ def test_heat_takes_a_split_model_as_one(torn):
     )
 
 
+@pytest.mark.filterwarnings("ignore:heat is off")
+def test_a_metric_takes_a_split_model_as_one(torn):
+    whole, joined, was = torn
+    source = int(np.argmax(joined.originals != np.arange(len(was))))
+    jump = np.where(whole.V[whole.F].mean(axis=1)[:, 2] > 0, 1.0, 2.0)
+    for operators in (
+        lambda mesh: heat_igl.speed_operators(mesh, np.full(mesh.n_faces, 2.0)),
+        lambda mesh: heat_igl.speed_operators(mesh, jump),
+        lambda mesh: heat_igl.metric_operators(mesh, np.eye(3) * np.exp(mesh.V[:, :1, None])),
+    ):
+        for solver in (heat_igl.GeodesicSolver, heat_igl.HeatMethodSolver):
+            found, truth = solver(operators(joined)), solver(operators(whole))
+            # Beside a jump, which edges are flipped for heat depends on the numbers of vertices.
+            np.testing.assert_allclose(found.distance(source), truth.distance(was[source])[was], rtol=0.02, atol=1e-9)
+        with pytest.raises(ValueError, match="seams of this mesh were merged"):
+            heat_igl.GeodesicSolver(operators(joined)).distance_vjp(source)
+
+
+def test_copies_in_other_domains_have_the_values_of_the_first():
+    bar = shapes.box(2)
+    apart = as_mesh((bar.V[bar.F].reshape(-1, 3), np.arange(bar.F.size).reshape(-1, 4)), merge="vertices")
+    with pytest.raises(ValueError, match="seams of this mesh were merged"):
+        heat_igl.GeodesicSolver(apart).distance_vjp(0)
+    cloud = heat_igl.PointCloud(np.concatenate([shapes.grid(9).V, shapes.grid(9).V[:4]]))
+    for mesh in (apart, cloud):
+        P = mesh.V if mesh is apart else mesh.P
+        times = heat_igl.activation_times(mesh, np.diag([4.0, 1, 1]), len(P) - 1)
+        assert times == pytest.approx(np.linalg.norm((P - P[-1]) * [0.5, 1, 1], axis=1), rel=1e-3, abs=1e-9)
+
+
 def test_a_slit_that_leaves_one_piece_is_closed():
     n = 24
     angle, height = np.meshgrid(np.linspace(0, 2 * np.pi, n + 1), np.arange(5.0))

@@ -15,7 +15,7 @@ from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.kernels.windows import paths as kernels
 from heat_igl.mesh import Mesh, PointCloud
-from heat_igl.operators import MetricSides, SideLengths, Surface
+from heat_igl.operators import MetricSides, Operators, SideLengths, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import gradient_rows, velocities
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
@@ -235,14 +235,11 @@ class DistanceDerivative:
         return on_faces
 
 
-def differentiable_surface(surface: Surface, sources: SourceSet, mesh: Mesh | PointCloud | None) -> Surface:
-    """The surface, if a distance from `sources` on it has a derivative.
-
-    A ValueError if it is that of a point cloud, if vertices were merged, or if a curve is among the sources.
-    """
-    if isinstance(mesh, PointCloud):
+def require_differentiable(domain: Mesh | PointCloud | Operators, sources: SourceSet) -> None:
+    """A ValueError if the domain is a point cloud or has merged vertices, or if a curve is among the sources."""
+    if isinstance(domain, PointCloud):
         raise ValueError("derivatives need a surface of triangles, and the domain is a point cloud: take its triangles")
-    if mesh is not None and mesh.has_copies:
+    if domain.has_copies:
         raise ValueError(
             "derivatives need vertices none of which is a copy of another, and seams of this mesh were merged"
         )
@@ -250,7 +247,6 @@ def differentiable_surface(surface: Surface, sources: SourceSet, mesh: Mesh | Po
         raise ValueError(
             "derivatives are there for vertices and points, and a curve is among the sources: place points on it"
         )
-    return surface
 
 
 class PathLengths:

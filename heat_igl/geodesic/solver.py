@@ -214,7 +214,6 @@ class GeodesicSolver(BatchedSolver):
         self._part = None if region is None else MeshPart.of(self._domain, region)
         if self._part is not None:
             self._domain = self._part.mesh
-        self._mesh = None if isinstance(self._domain, Operators) else self._domain
         self._triangles: Triangles | None = None
         self._engine: Engine
         self._plan, self._engine = self._prepared()
@@ -317,6 +316,10 @@ class GeodesicSolver(BatchedSolver):
         domain = self._domain
         return len(domain.weights) if isinstance(domain, Operators) else domain.n_faces
 
+    @property
+    def _numbered(self) -> Mesh | PointCloud | Operators:
+        return self._domain
+
     def _nearer(self, vertex: int, than: FloatArray) -> FloatArray:
         """Distance (n,) from a vertex where it is smaller than `than` (n,), the distance from others; else ``inf``."""
         return np.asarray(self._with_copies(self._engine.nearer(self._source_set(vertex), than, n_threads())))
@@ -396,26 +399,27 @@ class GeodesicSolver(BatchedSolver):
         """Distance ``phi`` and its derivative: ``pull_back(g)`` for g (n,) is dV (n, 3), see `DistanceDerivative`.
 
         Arguments and errors as for `distance`; a ValueError also if the engine is a sweep, and for what has no
-        derivative, see `differentiable_surface`. Of windows, the derivative is that of exact paths; of lines and the
+        derivative, see `require_differentiable`. Of windows, the derivative is that of exact paths; of lines and the
         Hopf-Lax formula, it is a `SimplexDerivative`. ``phi`` is what `distance` returns, but for a metric or speed per
         face on triangles where `plan` names the Hopf-Lax formula: value and derivative are those of windows there, and
         ``phi`` may differ from `distance` by the difference of both engines. ``method="exact"`` makes both the same. In
         tetrahedra with one tensor for all, both are of the formula. ``pull_back.distance`` is what is differentiated:
         of the formula its fixed point, which ``phi`` is near.
         """
+        from heat_igl.geodesic.derivatives import DistanceDerivative, require_differentiable
         from heat_igl.sweep import HopfLaxEngine
         from heat_igl.sweep.simplex_engine import SimplexEngine
 
         chosen, domain = self._source_set(sources), self._domain
+        require_differentiable(domain, chosen)
         # The formula interpolates tensors per face before it uses them: it has no derivatives by those given.
         if isinstance(asked := self._asked(chosen), SimplexEngine) and not getattr(domain, "metric", None):
             asked = HopfLaxEngine(same) if (same := getattr(domain, "in_tensors", None)) else asked
             return asked.distance(chosen), asked.derivative(chosen)
-        from heat_igl.geodesic.derivatives import DistanceDerivative, differentiable_surface
         from heat_igl.operators import SideLengths
 
         engine = self._windows("derivatives are those of")
-        surface = differentiable_surface(cast(Triangles, self._triangles).surface, chosen, self._mesh)
+        surface = cast(Triangles, self._triangles).surface
         sides = domain.metric if isinstance(domain, Operators) else SideLengths(cast(Mesh, domain))
         distance = engine.distance(chosen, np.inf, n_threads())
         return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_faces)

@@ -28,6 +28,7 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from heat_igl.heat.checking import AnswerCheck  # loads the sweep
     from heat_igl.mesh import Mesh, PointCloud
+    from heat_igl.operators import Operators
 
 
 class LabelledDistance(NamedTuple):
@@ -56,8 +57,6 @@ class LabelledDistance(NamedTuple):
 class BatchedSolver(ABC):
     """A solver for k sets of sources at a time, asked for any number of them."""
 
-    _mesh: Mesh | PointCloud | None = None
-
     @property
     @abstractmethod
     def n_vertices(self) -> int:
@@ -67,6 +66,11 @@ class BatchedSolver(ABC):
     @abstractmethod
     def _n_faces(self) -> int:
         """Faces of the domain, by which the memory of a block is estimated."""
+
+    @property
+    @abstractmethod
+    def _numbered(self) -> Mesh | PointCloud | Operators:
+        """What knows which vertices are copies of others."""
 
     @abstractmethod
     def _source_set(self, sources: Sources) -> SourceSet:
@@ -84,7 +88,7 @@ class BatchedSolver(ABC):
     @cached_property
     def _originals(self) -> IntArray | None:
         """The vertex (n,) whose values each takes, where seams were merged or points are equal."""
-        return None if self._mesh is None or not self._mesh.has_copies else self._mesh.originals
+        return self._numbered.originals if self._numbered.has_copies else None
 
     def _with_copies(self, values: AnyArray) -> AnyArray:
         """Values (..., n) in which copies have those of their originals."""

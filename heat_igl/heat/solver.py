@@ -94,6 +94,7 @@ class HeatMethodSolver(BatchedSolver):
     (2, 2562)
     """
 
+    _mesh: Mesh | PointCloud | None = None
     _parts: SolverParts
     _part: MeshPart | None = None
 
@@ -254,6 +255,10 @@ class HeatMethodSolver(BatchedSolver):
     @property
     def _n_faces(self) -> int:
         return len(self._parts.operators.weights)
+
+    @property
+    def _numbered(self) -> Mesh | PointCloud | Operators:
+        return self.operators if self._mesh is None else self._mesh
 
     def _source_set(self, sources: Sources) -> SourceSet:
         surface = self.operators.source_surface

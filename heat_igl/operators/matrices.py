@@ -174,6 +174,8 @@ class Operators:
         The triangles that points and curves refer to, where these are not `surface`: those of polygons.
     fans : PolygonFans or None
         Of polygons, the triangles of `surface` before any flip, to which points and curves are carried.
+    originals : (n_given,) int64 or None
+        The vertex whose distance each takes, see `Mesh.originals`; None if it is its own.
 
     Examples
     --------
@@ -207,6 +209,7 @@ class Operators:
     metric: MetricSides | None = None
     drawn_on: Surface | None = None
     fans: PolygonFans | None = None
+    originals: IntArray | None = None
 
     def __repr__(self) -> str:
         return f"Operators({self.n} vertices, {len(self.weights)} faces)"
@@ -241,6 +244,11 @@ class Operators:
         """Number of vertices of the mesh; n if none were added by refinement or as virtual ones."""
         given = self.source_surface
         return self.n if given is None or given.faces is None else given.faces.n
+
+    @property
+    def has_copies(self) -> bool:
+        """Whether some vertices take the distance of others."""
+        return self.originals is not None and bool((self.originals != np.arange(self.n_given)).any())
 
     @property
     def dimension(self) -> int:

@@ -303,7 +303,8 @@ def _of_triangles(
 ) -> Operators:
     domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
     given = np.eye(3) / given[:, None, None] ** 2 if given is not None and given.ndim == 1 else given
-    return replace(domain, simplices=simplices, metric=None if given is None else MetricSides(mesh, given))
+    metric = None if given is None else MetricSides(mesh, given)
+    return replace(domain, simplices=simplices, metric=metric, originals=mesh.originals)
 
 
 def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None = None) -> MetricSimplices:
@@ -390,6 +391,7 @@ class _LaterOperators(Operators):
 
     def __init__(self, mesh: Mesh, simplices: MetricSimplices, make: Callable[..., Operators], *of: Any) -> None:
         vars(self).update(mesh=mesh, _make=make, _of=of, simplices=simplices, is_surface=not mesh.is_tetrahedral)
+        vars(self).update(originals=mesh.originals)
 
     mesh: Mesh
     _make: Callable[..., Operators]
@@ -483,6 +485,7 @@ def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths
         longest_distance=float(longest.max()),
         longest_distances=longest,
         surface=None,
+        originals=mesh.originals,
     )
 
 
