@@ -70,7 +70,7 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
         D = np.broadcast_to(D, (m, 3, 3))
     if D.shape not in ((m, 3, 3), (n, 3, 3)):
         raise ValueError(f"D must have shape (3, 3), {(m, 3, 3)} per face or {(n, 3, 3)} per vertex, not {D.shape}")
-    least_eigenvalue("D", inverse_root(symmetric_tensors("D", D))[1], D)
+    least_eigenvalue("D", inverse_root(symmetric_tensors("D", D))[2][:, 0], D)
     start = real_numbers("times", times)
     first_time = start.min(initial=np.inf, where=np.isfinite(start))
     with np.errstate(over="ignore", invalid="ignore"):

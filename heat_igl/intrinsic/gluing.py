@@ -108,7 +108,7 @@ def _require_one_length(lengths: FloatArray, twin: AnyArray) -> None:
 def intrinsic_triangulation(mesh: Mesh, margin: float | None = None) -> IntrinsicTriangulation:
     """The triangles of `mesh` by their edge lengths; degenerate ones are mollified, see `mollify`."""
     edges, exponent = HalfEdges.of_mesh(mesh)
-    lengths = np.ldexp(edges.length, exponent).reshape(-1, 3)
+    lengths = np.ldexp(edges.length, exponent, out=edges.length).reshape(-1, 3)
     return _mollified(lengths, mesh.F, mesh.n_vertices, edges.twin, edges.aligned, margin)
 
 
@@ -116,8 +116,8 @@ def _mollified(
     l: FloatArray, F: IntArray, n: int, twin: AnyArray, aligned: AnyArray, margin: float | None = None
 ) -> IntrinsicTriangulation:
     added = mollify(l, F, margin)
-    longer, twin, aligned = l + added, twin.astype(np.int64), aligned.astype(bool)
-    return IntrinsicTriangulation(F, longer, twin, aligned, n, lengthening=float(added.max()))
+    l += added
+    return IntrinsicTriangulation(F, l, twin.astype(np.int64), aligned.astype(bool), n, lengthening=float(added.max()))
 
 
 def lengths_to_divide_by(mesh: Mesh) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import names_guessed, raise_at_first, real_numbers
-from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, lay_out, mollify
+from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intrinsic_triangulation, mollify
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
@@ -103,7 +103,9 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
     check_measures(mesh)
     g = real_numbers("metric", metric)
     if g.shape == (mesh.n_vertices, 3, 3) and mesh.n_vertices != mesh.n_faces:
-        return _of_smooth_metric(mesh, g, laplacian)
+        checked = _checked_at_corners(g, mesh)
+        del g
+        return _of_smooth_metric(mesh, *checked, laplacian)
     if mesh.is_tetrahedral:
         return _of_groups(mesh, *_checked(g, mesh))
     return operators_in_metric(mesh, *_checked(g, mesh)[:3], laplacian, g)
@@ -151,7 +153,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     5.0
     """
     mesh = as_simplices(mesh)
-    (m, p), s = (mesh.n_faces, mesh.F.shape[1] - 1), real_numbers("speed", speed)
+    m, s = mesh.n_faces, real_numbers("speed", speed)
     if s.shape != (m,):
         raise ValueError(
             f"speed must have shape ({m},), one per face, not {s.shape}: speed[mesh.F].mean(axis=1) of one per vertex"
@@ -165,7 +167,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
     first, group = equal_runs(s) if mesh.is_tetrahedral else (slice(None), None)
     each = s[first, None, None]
-    in_metric = np.eye(p) / each**2, 1 / float(s.max()), np.eye(p) * each
+    in_metric = np.eye(3) / each**2, 1 / float(s.max()), (each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None)
     if mesh.is_tetrahedral:
         return _of_groups(mesh, *in_metric, group)
     return operators_in_metric(mesh, *in_metric, given=s)
@@ -267,24 +269,26 @@ def operators_in_metric(
     mesh: Mesh,
     g: FloatArray,
     least: float,
-    root: FloatArray | None = None,
+    root: Any = None,
     laplacian: Laplacian = "auto",
     given: FloatArray | None = None,
 ) -> Operators:
-    """`metric_operators` of checked triangles and metrics g (m, 2, 2) in their planes.
+    """`metric_operators` of checked triangles and metrics g (m, 3, 3).
 
-    No unit vector is shorter than `least` in it. The inverse root (m, 2, 2) may be given, and that by which lengths are
+    No unit vector is shorter than `least` in it. The inverse root may be given, and that by which lengths are
     differentiated: a metric, or speeds (m,).
     """
-    corners = lay_out(igl.edge_lengths(mesh.V, mesh.F))
-    along = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
-    own = np.sqrt(((along @ g) * along).sum(axis=2))
+    on_each = MetricSimplices(mesh.F, mesh.n_vertices, mesh.V, tensors=g, group=np.arange(mesh.n_faces))
+    own = np.sqrt(on_each.measured[1])[:, ::-1]
+    del on_each
     sides = _common_lengths(mesh, own)
     if sides is None:
         return _refracting(mesh, own, g, least, laplacian)
     # Triangles without area know no metric in their plane.
     has_area = bool((mesh.measures > 0).all())
-    return _unfolded(mesh, sides, _of_faces(mesh, g, least, root) if has_area else None, laplacian, given)
+    return _unfolded(
+        mesh, sides, MetricSimplices.in_metric(mesh, g, least, root=root) if has_area else None, laplacian, given
+    )
 
 
 def _unfolded(
@@ -307,26 +311,17 @@ def _of_triangles(
     return replace(domain, simplices=simplices, metric=metric, originals=mesh.originals)
 
 
-def _of_faces(mesh: Mesh, g: FloatArray, least: float, root: FloatArray | None = None) -> MetricSimplices:
-    """Triangles with a metric g (m, 2, 2) in the plane of each."""
-    axes = plane_axes(mesh)
-    return MetricSimplices.in_metric(mesh, np.swapaxes(axes, 1, 2) @ g @ axes, least, root=root)
-
-
-def _of_smooth_metric(mesh: Mesh, g: FloatArray, laplacian: Laplacian) -> Operators:
-    """The operators of simplices with a metric (n, 3, 3) at each vertex, after checks, as `operators_in_metric`."""
-    g, least, root = _checked_at_corners(g, mesh)
+def _of_smooth_metric(mesh: Mesh, g: Any, least: float, root: Any, laplacian: Laplacian) -> Operators:
+    """The operators of simplices with what `_checked_at_corners` returns."""
     if mesh.is_tetrahedral:
         return _of_groups(mesh, g, least, root)
     simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
-    del root  # of each corner
     sides = simplices.edges[1].reshape(-1, 3)[:, ::-1]  # opposite each corner
     if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1])):
         return _unfolded(mesh, sides, simplices, laplacian, None)
     # For heat: what each face says alone.
-    axes = plane_axes(mesh)
-    inside = axes @ g[mesh.F].mean(axis=1) @ np.swapaxes(axes, 1, 2)
-    domain = operators_in_metric(mesh, inside, least, None, laplacian)
+    at_corners = (simplices.metric(np.arange(mesh.n_faces), corner) for corner in range(3))
+    domain = operators_in_metric(mesh, np.asarray(sum(at_corners)) / 3, least, None, laplacian)
     return replace(domain, surface=None, simplices=simplices)
 
 
@@ -365,7 +360,7 @@ def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, lapl
         used = glued if is_loop else triangulation
         simplices = MetricSimplices.of_sides(mesh.V, used.F, used.l, least)
     else:
-        simplices = _of_faces(mesh, g, least)
+        simplices = MetricSimplices.in_metric(mesh, g, least)
     return replace(domain, simplices=simplices)
 
 
@@ -379,7 +374,7 @@ def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
     return replace(apart, l=sides, twin=twin)
 
 
-def _of_groups(mesh: Mesh, g: FloatArray, least: float, root: FloatArray, group: Any = None) -> Operators:
+def _of_groups(mesh: Mesh, g: FloatArray, least: float, root: Any, group: Any = None) -> Operators:
     """The operators of tetrahedra in metrics g (k, 3, 3) of each `group` (m,), or at each vertex."""
     simplices = MetricSimplices.in_metric(mesh, g, least, group is None, root, group)
     kept = g[:1].copy() if group is None else g  # at vertices, its inverse root is known
@@ -422,11 +417,11 @@ class _LaterOperators(Operators):
         if self.is_surface or self.simplices is None or not self.simplices.is_in_space:
             return None
         mesh, _, g, group = self._of
-        corners, (root, least) = mesh.F.astype(np.int32), inverse_root(g)
-        in_space = MetricSimplices(corners, mesh.n_vertices, mesh.V, float(np.sqrt(least[0])), is_given=True)
+        corners, (root, _, sizes) = mesh.F.astype(np.int32), inverse_root(g)
+        in_space = MetricSimplices(corners, mesh.n_vertices, mesh.V, float(np.sqrt(sizes[0, 0])), is_given=True)
         if group is not None:
             return replace(in_space, tensors=g, group=group)
-        return replace(in_space, velocity=np.tile(root[0][np.triu_indices(3)], (mesh.n_vertices, 1)), rows=corners)
+        return replace(in_space, velocity=np.tile(root[0], (mesh.n_vertices, 1)), rows=corners)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # an instance that is not filled yet, as in `pickle`
@@ -489,8 +484,8 @@ def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths
     )
 
 
-def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray, Any]:
-    """The metric (k, p, p), least length and inverse root in planes of triangles, or of groups (m,) of tetrahedra."""
+def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, Any, Any]:
+    """The metric (k, 3, 3) of triangles, or of groups (m,) of tetrahedra, its least length and `inverse_root`."""
     m, p = mesh.n_faces, mesh.F.shape[1] - 1
     shapes = [(m, 3, 3), (mesh.n_vertices, 3, 3)] + [(m, 2, 2)] * (p == 2)
     if g.shape not in (shapes[0], *shapes[2:]):
@@ -499,25 +494,20 @@ def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray, 
             f"metric must have shape {' or '.join(map(str, shapes))}, one per face or vertex, not {g.shape}{remedy}"
         )
     symmetric = symmetric_tensors("metric", g)
-    if p < g.shape[1]:
+    if g.shape[1] == 2:
         axes = plane_axes(mesh)
-        symmetric = np.asarray(axes @ symmetric @ np.swapaxes(axes, 1, 2), np.float64)
+        symmetric = np.swapaxes(axes, 1, 2) @ symmetric @ axes
     first, group = equal_runs(symmetric) if p == 3 else (slice(None), slice(None))
-    root, smallest = inverse_root(symmetric[first])
-    return symmetric[first], float(np.sqrt(least_eigenvalue("metric", smallest[group], g))), root, group
+    root = inverse_root(symmetric[first], mesh)
+    return symmetric[first], float(np.sqrt(least_eigenvalue("metric", root[2][group, 0], g))), root, group
 
 
-def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, FloatArray]:
-    """The metric (n, 3, 3) from one per vertex, and on faces its least length and inverse root."""
+def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[Any, float, Any]:
+    """Of tetrahedra the metric (n, 3, 3) at vertices, else None; its least length and `inverse_root`."""
     symmetric = symmetric_tensors("metric", g)
-    if mesh.is_tetrahedral:
-        root, sizes = inverse_root(symmetric)
-        smallest = np.where(mesh.referenced, sizes, np.inf)
-    else:
-        axes, smallest = plane_axes(mesh)[:, None], np.full(mesh.n_vertices, np.inf)
-        root, sizes = inverse_root(axes @ symmetric[mesh.F] @ np.swapaxes(axes, 2, 3))
-        np.minimum.at(smallest, mesh.F, sizes)
-    return symmetric, float(np.sqrt(least_eigenvalue("metric", smallest, g))), root
+    root = inverse_root(symmetric, mesh, True)
+    smallest = np.where(mesh.referenced, root[2][:, 0], np.inf)
+    return symmetric if mesh.is_tetrahedral else None, float(np.sqrt(least_eigenvalue("metric", smallest, g))), root
 
 
 def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
@@ -527,7 +517,7 @@ def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
     raise_at_first(~np.isfinite(size), name, g, "must be finite")
     apart = np.abs(g[:, *above] - g[:, *above[::-1]]).max(axis=1)
     raise_at_first(apart > _ROUNDING * size, name, g, "must be symmetric")
-    return np.asarray((g + np.swapaxes(g, 1, 2)) / 2)
+    return np.asarray((g + np.swapaxes(g, 1, 2)) / 2) if apart.any() else g
 
 
 def least_eigenvalue(name: str, smallest: FloatArray, g: FloatArray) -> float:

@@ -10,13 +10,13 @@ from heat_igl.typing import ArrayLike, FloatArray
 
 def plane_axes(mesh: Mesh) -> FloatArray:
     """Axes (m, 2, 3) of triangles: along the edge from corner 0 to corner 1, and towards corner 2; 0 without area."""
-    corners, least = mesh.V[mesh.F], np.finfo(float).tiny
-    x = corners[:, 1] - corners[:, 0]
+    axes, least = mesh.V[mesh.F[:, 1:]], np.finfo(float).tiny
+    axes -= mesh.V[mesh.F[:, :1]]
+    x, y = axes[:, 0], axes[:, 1]
     x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), least)
-    y = corners[:, 2] - corners[:, 0]
     y -= np.einsum("mk,mk->m", x, y)[:, None] * x
     y /= np.maximum(np.linalg.norm(y, axis=1, keepdims=True), least)
-    return np.stack([x, y], axis=1)
+    return axes
 
 
 class SideLengths:

@@ -32,6 +32,8 @@ from heat_igl.plan import (
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 _MOST_SAMPLES = 1000
+# Faces whose angles are in memory at once.
+_AT_A_TIME = 2**16
 
 
 def fit_for_heat(
@@ -162,6 +164,9 @@ def mean_angle_defect(triangulation: IntrinsicTriangulation, at_boundary: bool =
     chosen[:] = False
     chosen[vertices] = True
     faces = np.flatnonzero(chosen[F[:, 0]] | chosen[F[:, 1]] | chosen[F[:, 2]])
-    total = np.bincount(F[faces].ravel(), corner_angles(triangulation.l[faces]).ravel(), n)[vertices]
+    total = np.zeros(n)
+    for some in np.array_split(faces, len(faces) // _AT_A_TIME + 1):
+        np.add.at(total, F[some], corner_angles(triangulation.l[some]))
+    total = total[vertices]
     defect = np.where(is_outer[vertices], np.maximum(total - np.pi, 0.0), np.abs(2 * np.pi - total))
     return float(defect.mean())

@@ -3,9 +3,24 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.rotation import diagonalize
-from cython.cimports.heat_igl.kernels.sweep.facets import gradient, invert, mean_velocity, pair, squares_of
+from cython.cimports.heat_igl.kernels.sweep.facets import (
+    cross,
+    gradient,
+    invert,
+    mean_velocity,
+    multiply,
+    pair,
+    squares_of,
+)
 from cython.cimports.libc.float import DBL_MIN
-from cython.cimports.libc.math import fabs, sqrt
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
+
+# The variance of velocities, and differences between those at one vertex, as a share of them, that are rounding.
+_ROUNDING = cython.declare(cython.double, 1e-9)
+_SAME = cython.declare(cython.double, 1e-14)
+
+# How often each entry on and above the diagonal occurs in a symmetric matrix.
+_OFTEN = cython.declare(cython.double[6], [1.0, 2.0, 2.0, 1.0, 2.0, 1.0])
 
 
 def lengths_in_velocity(
@@ -91,108 +106,219 @@ def lengths_in_velocity(
     return *found, variation
 
 
-def inverses(g: cython.const[cython.double][:, :, ::1], is_root: cython.bint, least: cython.double):
-    """The inverses, or inverse roots, of symmetric matrices (k, p, p), p = 2 or 3, by Jacobi's rotations.
+def velocities_at_corners(
+    corners: cython.const[cython.int][:, ::1],
+    at_vertex: cython.const[cython.double][:, ::1],
+    own: cython.const[cython.double][:, ::1],
+    group: cython.const[cython.int][::1],
+    share: cython.const[cython.double][::1],
+    axes: cython.const[cython.double][:, :, ::1],
+    is_metric: cython.bint,
+):
+    """Velocities (r, 6) of simplices at their corners, equal ones at a vertex once, and the row (m, p + 1) of each.
 
-    Those of absolute eigenvalues, without those below the share `least` of the largest. Second: eigenvalues (k, p).
+    They are a `share` (m,) of what is known `at_vertex` (n, 6), and else that of the `group` (m,) of the simplex, its
+    `own` (k, 6): both are velocities, or metrics. Of triangles with `axes` (m, 2, 3) in their planes, else (0, 2, 3),
+    they are those in the plane, and across it the mean: trust in slopes asks it. Third are the smallest and largest
+    eigenvalue (n, 2) there, if they were asked for.
     """
-    p: cython.int = g.shape[1]
-    found, values = np.zeros((g.shape[0], p, p)), np.empty((g.shape[0], p))
-    result: cython.double[:, :, ::1] = found
-    sizes: cython.double[:, ::1] = values
-    work: cython.double[18]
+    # What is not written to of the first array takes no memory.
+    found, sizes = np.empty((corners.size, 6)), np.tile([np.inf, 0.0], (len(at_vertex), 1))
+    number, last = np.empty_like(corners), np.full(len(at_vertex), -1, np.int32)
+    velocity: cython.double[:, ::1] = found
+    extremes: cython.double[:, ::1] = sizes
+    row: cython.int[:, ::1] = number
+    row_at: cython.int[::1] = last
+    count: cython.int = 0
+    in_plane: cython.bint = axes.shape[0] > 0
+    base: cython.double[9]
     with cython.nogil:
-        for i in range(g.shape[0]):
+        for s in range(corners.shape[0]):
             for k in range(9):
-                work[k] = g[i, k // 3, k % 3] if k // 3 < p and k % 3 < p else 0.0
-            diagonalize(work)
-            largest: cython.double = max(fabs(work[0]), fabs(work[4]), fabs(work[8]))
-            for k in range(p):
-                sizes[i, k] = work[4 * k]
-                size: cython.double = fabs(work[4 * k])
-                if size < least * largest:
-                    continue
-                size = max(size, DBL_MIN)
-                size = 1.0 / (sqrt(size) if is_root else size)
-                for x in range(p):
-                    for y in range(p):
-                        result[i, x, y] += size * work[9 + 3 * k + x] * work[9 + 3 * k + y]
-    return found, values
+                base[k] = axes[s, k // 3, k % 3] if in_plane and k < 6 else k % 4 == 0
+            for c in range(corners.shape[1]):
+                v: cython.int = corners[s, c]
+                W = cython.address(velocity[count, 0])
+                for k in range(6):
+                    W[k] = share[s] * at_vertex[v, k]
+                    if share[s] < 1.0:
+                        W[k] += (1.0 - share[s]) * own[group[s], k]
+                if in_plane or is_metric:
+                    _transform(W, base, 2 if in_plane else 3, is_metric, cython.address(extremes[v, 0]))
+                size: cython.double = 0.0
+                change: cython.double = INFINITY if row_at[v] < 0 else 0.0
+                for k in range(6 if row_at[v] >= 0 else 0):
+                    size = max(size, fabs(velocity[row_at[v], k]))
+                    change = max(change, fabs(W[k] - velocity[row_at[v], k]))
+                if change > _SAME * size:
+                    row_at[v] = count
+                    count += 1
+                row[s, c] = row_at[v]
+    return found[:count], number, sizes
 
 
-def sums_around(
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _transform(
+    W: cython.p_double, base: cython.p_double, p: cython.int, is_root: cython.bint, extremes: cython.p_double
+) -> cython.void:
+    """Replace a symmetric matrix by its part in the span of p orthonormal vectors `base`, or the inverse root of that.
+
+    Of a root, eigenvalues are absolute. Across a plane it gets the mean in the plane.
+    """
+    w: cython.double[3]
+    U: cython.double[9]
+    work: cython.double[18]
+    for k in range(9):
+        work[k] = U[k] = 0.0
+    for k in range(p):
+        multiply(W, base + 3 * k, w)
+        for x in range(3 * p):
+            work[3 * k + x // 3] += w[x % 3] * base[x]
+    diagonalize(work)
+    for k in range(p):
+        extremes[0], extremes[1] = min(extremes[0], work[4 * k]), max(extremes[1], work[4 * k])
+        w[k] = 1.0 / sqrt(max(fabs(work[4 * k]), DBL_MIN)) if is_root else work[4 * k]
+        for x in range(3 * p):
+            U[3 * k + x % 3] += work[9 + 3 * k + x // 3] * base[x]
+    if p == 2:
+        w[2] = 0.5 * (w[0] + w[1])
+        cross(base, base + 3, U + 6)
+    for k in range(6):
+        W[k] = 0.0
+    for k in range(3):
+        i: cython.int = 0
+        for x in range(3):
+            for y in range(x, 3):
+                W[i] += w[k] * U[3 * k + x] * U[3 * k + y]
+                i += 1
+
+
+def fits_around(
     corners: cython.const[cython.int][:, ::1],
     X: cython.const[cython.double][:, ::1],
-    values: cython.const[cython.double][:, ::1],
+    W: cython.const[cython.double][:, ::1],
     group: cython.const[cython.int][::1],
+    across: cython.const[cython.double][:, ::1],
     first: cython.const[cython.int][::1],
     incident: cython.const[cython.int][::1],
 ):
-    """Sums (n, 4, 4 + c) of 1, x, y, z of centres, times these and the values (k, c), over simplices around vertices.
+    """Linear functions fitted to velocities of simplices around vertices: their values there, and how far they hold.
 
-    The values of simplices (m,) are those of their `group`. Simplices count as often as they meet one at the vertex.
-    Second are the numbers (n,) of corners that meet in the vertices around, counted once.
+    Simplices (m,) have the velocity W (k, 6) of their `group` at their centres. Those that meet a simplex of the vertex
+    count, once for each corner that they share with one.
+
+    Returns
+    -------
+    found, share : (n, 6), (n,) float64
+        The share, up to 1, is how far the function holds: by how much it explains more than 3/4 of the variance around
+        the vertex. Of triangles, what varies since the projections `across` (m, 6) on their normals do, counts as not
+        explained; of tetrahedra these are (0, 6).
     """
     size: cython.int = corners.shape[1]
-    n_columns: cython.int = 4 + values.shape[1]
-    found, here = np.zeros((2, X.shape[0], 4, n_columns))
-    sums: cython.double[:, :, ::1] = found
-    at: cython.double[:, :, ::1] = here
-    row: cython.double[17]
+    n_columns: cython.int = 35 if across.shape[0] == 0 else 41
+    # Products of 1, x, y, z with 1, x, y, z and velocity, each pair once; the square of velocity; and `across`.
+    sums, found, shares = np.zeros((len(X), n_columns)), np.zeros((len(X), 6)), np.zeros(len(X))
+    at: cython.double[:, ::1] = sums
+    result: cython.double[:, ::1] = found
+    share: cython.double[::1] = shares
+    met: cython.int[::1] = np.zeros(len(X), np.int32)
+    level: cython.double[::1] = np.bincount(group) @ W / len(group)
+    row: cython.double[10]
+    mean: cython.double[41]
+    work: cython.double[18]
+    slope: cython.double[18]
     row[0] = 1.0
-    counts, times = np.zeros((2, X.shape[0]), np.int32)
-    count: cython.int[::1] = counts
-    met: cython.int[::1] = times
     with cython.nogil:
         for s in range(corners.shape[0]):
-            for k in range(3):
-                row[1 + k] = 0.0
-                for c in range(size):
-                    row[1 + k] += X[corners[s, c], k] / size
-            for k in range(4, n_columns):
-                row[k] = values[group[s], k - 4]
+            for k in range(9):
+                row[1 + k] = W[group[s], k - 3] - level[k - 3] if k > 2 else 0.0
+            for k in range(3 * size):
+                row[1 + k % 3] += X[corners[s, k // 3], k % 3] / size
             for c in range(size):
+                u: cython.int = corners[s, c]
+                i: cython.int = 0
                 for j in range(4):
-                    for k in range(n_columns):
-                        at[corners[s, c], j, k] += row[j] * row[k]
+                    for k in range(j, 10):
+                        at[u, i] += row[j] * row[k]
+                        i += 1
+                for k in range(6):
+                    at[u, 34] += _OFTEN[k] * row[4 + k] * row[4 + k]
+                for k in range(35, n_columns):
+                    at[u, k] += across[s, k - 35]
         for v in range(X.shape[0]):
+            others: cython.double = -1.0
+            for k in range(41):
+                mean[k] = 0.0
             for i in range(first[v], first[v + 1]):
                 for c in range(size):
                     met[corners[incident[i] // size, c]] += 1
             for i in range(first[v], first[v + 1]):
                 for c in range(size):
-                    u: cython.int = corners[incident[i] // size, c]
+                    u = corners[incident[i] // size, c]
                     if met[u] > 0:
-                        count[v] += first[u + 1] - first[u]
-                        for j in range(4):
-                            for k in range(n_columns):
-                                sums[v, j, k] += met[u] * at[u, j, k]
+                        others += cython.cast(cython.double, first[u + 1] - first[u]) / size
+                        for k in range(n_columns):
+                            mean[k] += met[u] * at[u, k]
                         met[u] = 0
-    return found, counts
-
-
-def add_misses(
-    found: cython.double[:, ::1],
-    corners: cython.const[cython.int][:, ::1],
-    values: cython.const[cython.double][:, ::1],
-    group: cython.const[cython.int][::1],
-    weight: cython.const[cython.double][::1],
-    first: cython.const[cython.int][::1],
-) -> None:
-    """Add to what is `found` (n, c) at vertices by how much its means miss the values of simplices, times the weight.
-
-    At a vertex it is the mean over the simplices there.
-    """
-    size: cython.int = corners.shape[1]
-    missed: cython.double[:, ::1] = np.zeros_like(found)
-    with cython.nogil:
-        for s in range(corners.shape[0]):
-            for k in range(found.shape[1]):
-                miss: cython.double = values[group[s], k]
+            total: cython.double = max(mean[0], 1.0)
+            for k in range(n_columns):
+                mean[k] /= total
+            i = 10
+            for j in range(3):
+                for k in range(j, 9):
+                    about: cython.double = mean[i] - mean[1 + j] * mean[1 + k]
+                    if k > 2:
+                        slope[6 * j + k - 3] = about
+                    else:
+                        work[3 * j + k] = work[3 * k + j] = about
+                    i += 1
+            variance: cython.double = mean[34]
+            square: cython.double = mean[34]
+            whole: cython.double = 0.0
+            turned: cython.double = 1.0 if n_columns == 41 else 0.0
+            for k in range(6):
+                result[v, k] = level[k] + mean[4 + k]
+                variance -= _OFTEN[k] * mean[4 + k] * mean[4 + k]
+                square += _OFTEN[k] * level[k] * level[k]
+                whole += _OFTEN[k] * result[v, k] * result[v, k]
+                turned -= _OFTEN[k] * mean[35 + k] * mean[35 + k]
+            diagonalize(work)
+            largest: cython.double = max(fabs(work[0]), fabs(work[4]), fabs(work[8]))
+            explained: cython.double = -turned * whole
+            free: cython.double = others
+            for i in range(3):
+                # Centres do not differ in this direction but for rounding.
+                if fabs(work[4 * i]) <= 1e-15 * largest:
+                    continue
+                free -= 1.0
+                away: cython.double = 0.0
+                for j in range(3):
+                    away += work[9 + 3 * i + j] * (X[v, j] - mean[1 + j])
+                for k in range(6):
+                    rise: cython.double = 0.0
+                    for j in range(3):
+                        rise += work[9 + 3 * i + j] * slope[6 * j + k]
+                    explained += _OFTEN[k] * rise * rise / fabs(work[4 * i])
+                    result[v, k] += away * rise / fabs(work[4 * i])
+            # Adjusted: of no more simplices than it has coefficients, a function explains all.
+            if variance > _ROUNDING * square and free > 0.0:
+                share[v] = min(max(1.0 - 4.0 * (1.0 - explained / variance) * others / free, 0.0), 1.0)
+        # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
+        for _ in range(3):
+            at[:, :6] = 0.0
+            for s in range(corners.shape[0]):
+                most: cython.double = 1.0
                 for c in range(size):
-                    miss -= found[corners[s, c], k] / size
-                for c in range(size):
-                    missed[corners[s, c], k] += weight[s] * miss
-        for v in range(found.shape[0]):
-            for k in range(found.shape[1]):
-                found[v, k] += missed[v, k] / max(first[v + 1] - first[v], 1)
+                    most = min(most, share[corners[s, c]])
+                for k in range(6):
+                    miss: cython.double = W[group[s], k]
+                    for c in range(size):
+                        miss -= result[corners[s, c], k] / size
+                    for c in range(size):
+                        at[corners[s, c], k] += most * miss
+            for v in range(X.shape[0]):
+                for k in range(6):
+                    result[v, k] += at[v, k] / max(first[v + 1] - first[v], 1)
+    return found, shares

@@ -1,8 +1,9 @@
 """The least of T(x) + |v - x| over the facet opposite a corner v: with T linear, and of second order by slopes."""
 
 import cython
+import numpy as np
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, gradient, mean_velocity, pair, squares_of
-from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL
+from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 
@@ -35,6 +36,17 @@ class SimplexUpdate(Facet):
         self.corners, self.velocity, self.inverses, self.rows, self.V = corners, velocity, inverse, rows, V
         self.mean, self.widest, self.slack, self.growths = mean, widest, slack, growth
         self.p, self.q = corners.shape[1] - 1, 1 if rows is None else corners.shape[1]
+
+    def edge_lengths(self):
+        """The lengths (m, pairs) of the edges in each simplex, pairs in the order of those of `mean`."""
+        found = np.empty_like(self.mean)
+        lengths: cython.double[:, ::1] = found
+        with cython.nogil:
+            for s in range(self.corners.shape[0]):
+                for i in range(self.p + 1):
+                    for j in range(i):
+                        lengths[s, pair(i, j)] = edge_length(self, s, i, j)
+        return found
 
     def face(self, s: cython.int, c: cython.int) -> cython.double:
         """Look at the facet opposite corner c of simplex s: sets `side` and `level`, returns the least distance."""
