@@ -10,11 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.kernels.mesh import incidence
-from heat_igl.kernels.sweep.simplex_metrics import (
-    fits_around,
-    lengths_in_velocity,
-    velocities_at_corners,
-)
+from heat_igl.kernels.sweep.simplex_metrics import fits_around, lengths_in_velocity, velocities_at_corners
 from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
 from heat_igl.mesh import Mesh
 from heat_igl.operators.metric_derivatives import plane_axes

@@ -32,8 +32,6 @@ from heat_igl.plan import (
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 _MOST_SAMPLES = 1000
-# Faces whose angles are in memory at once.
-_AT_A_TIME = 2**16
 
 
 def fit_for_heat(
@@ -165,7 +163,7 @@ def mean_angle_defect(triangulation: IntrinsicTriangulation, at_boundary: bool =
     chosen[vertices] = True
     faces = np.flatnonzero(chosen[F[:, 0]] | chosen[F[:, 1]] | chosen[F[:, 2]])
     total = np.zeros(n)
-    for some in np.array_split(faces, len(faces) // _AT_A_TIME + 1):
+    for some in np.array_split(faces, len(faces) // 2**16 + 1):  # angles take five times the memory of lengths
         np.add.at(total, F[some], corner_angles(triangulation.l[some]))
     total = total[vertices]
     defect = np.where(is_outer[vertices], np.maximum(total - np.pi, 0.0), np.abs(2 * np.pi - total))

@@ -3,15 +3,7 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.rotation import diagonalize
-from cython.cimports.heat_igl.kernels.sweep.facets import (
-    cross,
-    gradient,
-    invert,
-    mean_velocity,
-    multiply,
-    pair,
-    squares_of,
-)
+from cython.cimports.heat_igl.kernels.sweep.facets import gradient, invert, mean_velocity, multiply, pair, squares_of
 from cython.cimports.libc.float import DBL_MIN
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
@@ -182,17 +174,14 @@ def _transform(
         w[k] = 1.0 / sqrt(max(fabs(work[4 * k]), DBL_MIN)) if is_root else work[4 * k]
         for x in range(3 * p):
             U[3 * k + x % 3] += work[9 + 3 * k + x // 3] * base[x]
-    if p == 2:
+    for x in range(3 if p == 2 else 0):
         w[2] = 0.5 * (w[0] + w[1])
-        cross(base, base + 3, U + 6)
-    for k in range(6):
-        W[k] = 0.0
-    for k in range(3):
-        i: cython.int = 0
-        for x in range(3):
-            for y in range(x, 3):
-                W[i] += w[k] * U[3 * k + x] * U[3 * k + y]
-                i += 1
+        U[6 + x] = base[(x + 1) % 3] * base[3 + (x + 2) % 3] - base[(x + 2) % 3] * base[3 + (x + 1) % 3]
+    i: cython.int = 0
+    for x in range(3):
+        for y in range(x, 3):
+            W[i] = w[0] * U[x] * U[y] + w[1] * U[3 + x] * U[3 + y] + w[2] * U[6 + x] * U[6 + y]
+            i += 1
 
 
 def fits_around(
