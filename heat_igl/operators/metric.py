@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from operator import attrgetter
 from typing import Any
 
@@ -513,7 +513,7 @@ def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[Any, float, Any]:
 def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
     """Tensors (k, p, p), after a check that they are finite and symmetric but for rounding."""
     above = np.triu_indices(g.shape[1], 1)
-    size = np.abs(g).max(axis=(1, 2))
+    size = reduce(np.maximum, np.abs(g).reshape(len(g), -1).T)
     raise_at_first(~np.isfinite(size), name, g, "must be finite")
     apart = np.abs(g[:, *above] - g[:, *above[::-1]]).max(axis=1)
     raise_at_first(apart > _ROUNDING * size, name, g, "must be symmetric")
@@ -523,7 +523,7 @@ def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
 def least_eigenvalue(name: str, smallest: FloatArray, g: FloatArray) -> float:
     """The least of the smallest eigenvalues (k,) of tensors g (k, p, p); an error unless doubles hold all of them."""
     raise_at_first(~(smallest > 0), name, g, "must be positive definite")
-    outside = (smallest < 1 / _LARGEST) | (np.abs(g).max(axis=(1, 2)) > _LARGEST)
+    outside = (smallest < 1 / _LARGEST) | (reduce(np.maximum, np.abs(g).reshape(len(g), -1).T) > _LARGEST)
     needed = f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}"
     raise_at_first(outside, name, g, needed, "squares leave the range of doubles, take another unit")
     return float(smallest.min())

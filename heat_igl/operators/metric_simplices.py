@@ -136,8 +136,8 @@ class MetricSimplices:
             return np.asarray(self.tensors[self.group[chosen]])
         if self.velocity is None or self.rows is None:
             raise ValueError("these simplices have lengths, and no tensors")
-        W = _symmetric(self.velocity[self.rows[chosen, corner]])
-        return np.asarray(np.linalg.inv(W @ W))
+        root = symmetric(self.measured[0][self.rows[chosen, corner]])
+        return np.asarray(root @ root)
 
     @property
     def is_in_space(self) -> bool:
@@ -202,7 +202,7 @@ def inverse_root(
     return tuple(found)
 
 
-def _symmetric(above: FloatArray) -> FloatArray:
+def symmetric(above: FloatArray) -> FloatArray:
     """Symmetric matrices (..., 3, 3) by their entries (..., 6) on and above the diagonal."""
     full = np.empty((*above.shape[:-1], 3, 3))
     full[..., *_ABOVE] = full[..., *_ABOVE[::-1]] = above

@@ -12,6 +12,7 @@ from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.operators.metric_derivatives import plane_axes
+from heat_igl.operators.metric_simplices import inverse_root, symmetric
 from heat_igl.plan import MOST_TURNING, MOST_VARIATION
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet
@@ -75,8 +76,11 @@ class HopfLaxEngine(SimplexEngine):
                 [np.linalg.det(g) > _FLAT * np.trace(g, axis1=1, axis2=2) ** 2 for g in (first, two)], axis=0
             )
             first[flat] = two[flat] = np.eye(2)
-        stretch = np.maximum(np.linalg.eigvals(np.linalg.solve(first, two)).real, _ROUNDING)
-        ratio = np.sqrt(stretch.max(axis=1) / stretch.min(axis=1))
+            low, high = np.sort(np.linalg.eigvals(np.linalg.solve(first, two)).real).T
+        else:
+            root = symmetric(inverse_root(first)[0])
+            low, high = inverse_root(root @ two @ root)[2].T
+        ratio = np.sqrt(np.maximum(high, _ROUNDING) / np.maximum(low, _ROUNDING))
         return float(np.quantile(ratio.reshape(-1, size).max(axis=1), 0.9))
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:  # noqa: ARG002

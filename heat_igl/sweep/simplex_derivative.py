@@ -190,16 +190,12 @@ class _FacetUpdate:
                 Di, Dj = D[:, i], D[:, j]
                 at_i, at_j = 2 * Di * (w[:, i, j] - w[:, i, i]), 2 * Dj * (w[:, j, j] - w[:, j, i])
                 rise, more = Dj**2 - Di**2, trust[:, i] - trust[:, j]
-                up = np.real(rise) > 0
                 other_j, other_i = 2 * rise - at_i, 2 * rise - at_j
-                other_j, other_i = np.where(up, other_j, -_larger(-other_j, 0)), other_i
-                down = np.real(rise) < 0
-                other_i = np.where(down, other_i, _larger(other_i, 0))
+                other_j = np.where(np.real(rise) > 0, other_j, -_larger(-other_j, 0))
+                other_i = np.where(np.real(rise) < 0, other_i, _larger(other_i, 0))
                 i_is_better = np.real(more) > 0
-                at_j, at_i = (
-                    at_j + np.where(i_is_better, more * (other_j - at_j), 0),
-                    at_i - np.where(i_is_better, 0, more * (other_i - at_i)),
-                )
+                at_j = at_j + np.where(i_is_better, more * (other_j - at_j), 0)
+                at_i = at_i - np.where(i_is_better, 0, more * (other_i - at_i))
                 level = (Dj - Di) ** 2
                 sag, doubt = 0.5 * (at_j - at_i) - level, rise - 0.5 * (at_i + at_j)
                 doubted = np.abs(np.real(doubt)) >= np.abs(np.real(sag))
@@ -347,26 +343,14 @@ class FixedPointDerivative(SimplexDerivative):
         Source vertices.
     answer : (n,) float64
         The distance that the engine returns.
-    distance, label, facet, place, slope, is_sloped, weight
-        The result of `HopfLax` before the engine applied its bounds.
+    *settled
+        Distance and label, and what `HopfLax.settle` returns, before the engine applied its bounds.
     """
 
-    def __init__(
-        self,
-        simplices: MetricSimplices,
-        sources: SourceSet,
-        answer: FloatArray,
-        distance: FloatArray,
-        label: IntArray,
-        facet: IntArray,
-        place: FloatArray,
-        slope: FloatArray,
-        is_sloped: AnyArray,
-        weight: FloatArray,
-    ) -> None:
+    def __init__(self, simplices: MetricSimplices, sources: SourceSet, answer: FloatArray, *settled: AnyArray) -> None:
+        distance, label, facet, place, slope, is_sloped, weight = settled
         super().__init__(simplices, sources)
-        n = simplices.n
-        size = simplices.corners.shape[1]
+        n, size = simplices.n, simplices.corners.shape[1]
         others = np.array([[j for j in range(size) if j != c] for c in range(size)])
         v = np.flatnonzero(facet >= 0)
         self._simplex, corner = np.divmod(facet[v], size)

@@ -92,7 +92,7 @@ cdef class Facet:
     cdef double along_edges(self) noexcept nogil
     cdef double length(self, const double* x) noexcept nogil
     cdef double lean(self, int i) noexcept nogil
-    cdef double value(self, const double* x) noexcept nogil
+    cdef double value(self, const double* x, double L) noexcept nogil
     cdef void curve(self) noexcept nogil
-    cdef double newton(self, double limit) noexcept nogil
+    cdef double newton(self, double L, double limit) noexcept nogil
     cdef (double, double) on_triangle(self, double* x) noexcept nogil

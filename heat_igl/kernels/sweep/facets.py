@@ -99,9 +99,8 @@ class Facet:
         for i in range(self.p):
             multiply(cython.address(self.W[i + 1][0]), self.w, e)
             for k in range(3):
-                e[k] = self.E[i][k] - 0.5 * e[k]
-            self.own[i] = self.u[0] * e[0] + self.u[1] * e[1] + self.u[2] * e[2]
-            multiply(I, e, cython.address(self.a[i][0]))
+                self.a[i][k] = self.E[i][k] - 0.5 * e[k]
+            self.own[i] = self.u[0] * self.a[i][0] + self.u[1] * self.a[i][1] + self.u[2] * self.a[i][2]
             self.g[i] = self.factor * self.own[i] + self.near * self.factor_1 * self.s[i + 1]
         # Of small arguments asinh has no digits.
         return self.even * (asinh(half) / half if half > 1e-4 else 1.0 - half * half / 6.0)
@@ -120,32 +119,33 @@ class Facet:
             gain -= self.u[k] * (self.E[i][k] + e[k])
         return self.factor * gain - self.near * self.factor_1 * self.sx / self.s[0] * (self.s[i + 1] - self.s[0])
 
-    def value(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """T(x) + |v - x| for shares x of the corners, inf if there is none; sets its derivatives `g`."""
+    def value(self, x: cython.pointer[cython.const[cython.double]], L: cython.double) -> cython.double:
+        """T(x) + |v - x| for shares x of the corners, with `length` L, inf if there is none; adds to `g` those of T."""
         mean: cython.double = x[0] * self.D[0] + x[1] * self.D[1] + x[2] * self.D[2]
         square: cython.double = mean * mean
         for i in range(3):
             self.rise[i] = 0.5 * (x[0] * self.sag[i][0] + x[1] * self.sag[i][1] + x[2] * self.sag[i][2])
             square -= x[i] * self.rise[i]
-        if not square > 0.0:
+        if not (square > 0.0 and L > 0.0):
             return INFINITY
         self.T = sqrt(square)
-        L: cython.double = self.length(x)
-        if not L > 0.0:
-            return INFINITY
         for i in range(3):
             self.rise[i] = (mean * self.D[i] - self.rise[i]) / self.T
             self.g[i] += self.rise[i]
         return self.start + self.T + L
 
     def curve(self) -> cython.void:
-        """Set the second derivatives `H` of the last `value`."""
+        """Set the second derivatives `H` of the last `value`, once."""
         e: cython.double[3]
         bend: cython.double = 0.0
         if self.q > 1:
             bend = self.near * self.bent * (3.0 * self.s[0] - self.sx)
             bend /= 8.0 * self.sx * self.sx * sqrt(self.s[0] * self.sx)
         for i in range(self.p):
+            if self.q > 1:
+                multiply(cython.address(self.inverse[0]), cython.address(self.a[i][0]), e)
+                for k in range(3):
+                    self.a[i][k] = e[k]
             for j in range(i + 1):
                 found: cython.double = self.D[i] * self.D[j] - 0.5 * self.sag[i][j] - self.rise[i] * self.rise[j]
                 found /= self.T
@@ -166,21 +166,21 @@ class Facet:
                     found -= 0.25 * turn * (self.g[i] - self.rise[i]) * (self.g[j] - self.rise[j])
                 self.H[i][j] = self.H[j][i] = found
 
-    def newton(self, limit: cython.double) -> cython.double:
+    def newton(self, L: cython.double, limit: cython.double) -> cython.double:
         """The least value over the facet, by Newton's method from `share`, which is changed; inf if not below `limit`.
 
-        Values are convex, so that none is below a tangent plane.
+        It begins after `length` L there. Values are convex, so that none is below a tangent plane.
         """
         x: cython.double[3]
         y: cython.double[3]
         for i in range(3):
             x[i] = self.share[i]
-        best: cython.double = self.value(x)
+        best: cython.double = self.value(x, L)
         if best == INFINITY:
             # The linear place is on the other side of what T allows: begin in the middle.
             for i in range(self.p):
                 x[i] = self.share[i] = 1.0 / self.p
-            best = self.value(x)
+            best = self.value(x, self.length(x))
         is_last: cython.bint = False
         for _step in range(MOST_STEPS):
             low: cython.double = INFINITY
@@ -200,10 +200,13 @@ class Facet:
                 db = on_interval(self.g[1] - self.g[0], bend, -x[1], x[0])
             else:
                 db, de = self.on_triangle(x)
+            # Nor is that at the next place, and with a quadratic function it is the least.
+            if best + (self.g[1] - self.g[0]) * db + (self.g[2] - self.g[0]) * de >= limit:
+                return INFINITY
             is_last = fabs(db) + fabs(de) <= PLACED
             for _half in range(1 if is_last else MOST_HALVINGS):
                 y[0], y[1], y[2] = max(x[0] - db - de, 0.0), max(x[1] + db, 0.0), max(x[2] + de, 0.0)
-                value: cython.double = self.value(y)
+                value: cython.double = self.value(y, self.length(y))
                 if value < best:
                     break
                 db *= 0.5

@@ -18,9 +18,10 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
+from cython.cimports.heat_igl.kernels.sweep.facets import pair
 from cython.cimports.heat_igl.kernels.sweep.hopf_lax import RISEN, SETTLED
 from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, SimplexUpdate, edge_length
-from cython.cimports.libc.math import INFINITY, fabs
+from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 from heat_igl.kernels.signals import raise_caught
 
@@ -56,8 +57,16 @@ class HopfLax:
             for v in range(self.d.shape[0]):
                 if d[v] < INFINITY and left > 0:
                     self.wait(v)
-                elif d[v] < INFINITY and self.pending[v] == 0.0:
-                    self.reach(v)
+            # Without visits, only along edges that may be shorter than the difference of distances.
+            for s in range(0 if left > 0 else self.corners.shape[0]):
+                for i in range(self.corners.shape[1]):
+                    for j in range(self.corners.shape[1]):
+                        u: cython.int = self.corners[s, j]
+                        gap: cython.double = d[self.corners[s, i]] - d[u]
+                        may: cython.bint = gap > 0.0 and self.pending[u] == 0.0
+                        may = may and gap > self.update.slack[s] * sqrt(self.update.mean[s, pair(i, j)])
+                        if may and gap > edge_length(self.update, s, i, j):
+                            self.reach(u)
             while self.waiting.count > 0:
                 n_taken += 1
                 if n_taken % ASK == 0 and is_interrupted():

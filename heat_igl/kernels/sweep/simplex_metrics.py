@@ -47,6 +47,8 @@ def lengths_in_velocity(
     I: cython.double[6]
     E: cython.double[12]
     rise: cython.double[4]
+    along: cython.double[3]
+    across: cython.double[3]
     with cython.nogil:
         for i in range(velocity.shape[0]):
             invert(cython.address(velocity[i, 0]), cython.address(inverse[i, 0]))
@@ -77,24 +79,22 @@ def lengths_in_velocity(
             growth[s] = min(growth[s], 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
             for i in range(size):
                 squares_of(cython.address(inverse[rows[s, i], 0]), e, n_pairs, squares + 6 * i)
-                for k in range(n_pairs):
-                    widest[s] = max(widest[s], squares[6 * i + k])
-                for j in range(i):
-                    for k in range(6):
-                        W[k] = 0.5 * (velocity[rows[s, i], k] + velocity[rows[s, j], k])
-                    invert(W, I)
-                    squares_of(I, e, n_pairs, here)
-                    for k in range(n_pairs):
-                        if here[k] < slack[s] * mean[s, k]:
-                            slack[s] = here[k] / mean[s, k]
-            slack[s] = sqrt(slack[s])
+            # How much faster it is in the middle between two corners than in the mean, to first order.
+            faster: cython.double = 1.0
             for k in range(n_pairs):
                 one: cython.double = squares[k]
                 two: cython.double = squares[k]
-                for i in range(1, size):
+                multiply(I, e + 3 * k, along)
+                multiply(I, along, across)
+                for i in range(size):
                     one, two = min(one, squares[6 * i + k]), max(two, squares[6 * i + k])
-                two = sqrt(two) - sqrt(one)
-                variation += two * two / (n_pairs * m * mean[s, k])
+                    multiply(cython.address(velocity[rows[s, i], 0]), along, here)
+                    rise[i] = here[0] * across[0] + here[1] * across[1] + here[2] * across[2]
+                    for j in range(i):
+                        faster = max(faster, 0.5 * (rise[i] + rise[j]) / mean[s, k])
+                widest[s] = max(widest[s], two)
+                variation += (one + two - 2.0 * sqrt(one * two)) / (n_pairs * m * mean[s, k])
+            slack[s] = 1.0 / faster
     return *found, variation
 
 

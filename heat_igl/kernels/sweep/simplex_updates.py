@@ -228,7 +228,7 @@ class SimplexUpdate(Facet):
             for j in range(i):
                 sag: cython.double = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
                 self.sag[i][j] = self.sag[j][i] = self.weight[self.corners[s, c]] * sag
-        best: cython.double = self.newton(limit)
+        best: cython.double = self.newton(L, limit)
         if is_source:
             # Straight from the source, where the square of T may have no derivatives.
             for i in range(3):
