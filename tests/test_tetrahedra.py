@@ -36,6 +36,17 @@ def l_shape(n: int, jitter: float) -> Mesh:
     return without(n, lambda centre: (centre[:, :2] > 0.5).all(axis=1), jitter)
 
 
+@pytest.mark.parametrize("k", [2, 8, 50, 300])
+def test_sources_that_begin_at_values_of_their_own(k):
+    """The nearest source in space is not the one that arrives first; its neighbours may all belong to others."""
+    mesh, rng = heat_igl.image_domain(np.ones((12, 9, 7), bool), spacing=(1.0, 2.0, 0.5)).mesh, np.random.default_rng(0)
+    solver = GeodesicSolver(mesh)
+    for _ in range(5):
+        sources, offsets = rng.choice(mesh.n_vertices, k, replace=False), rng.uniform(0, 8 * k ** (-1 / 3), k)
+        truth = (offsets + np.linalg.norm(mesh.V[:, None] - mesh.V[sources], axis=2)).min(axis=1)
+        assert solver.distance(heat_igl.OffsetSources(sources, offsets)) == pytest.approx(truth, rel=1e-12)
+
+
 @pytest.mark.parametrize(("n", "jitter"), [(6, 0.25), (12, 0.25), (24, 0.0), (24, 0.25)])
 def test_ways_around_an_edge(n, jitter):
     mesh = l_shape(n, jitter)

@@ -21,6 +21,8 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Rounds of lines and ways that bend, with several sources in a small body.
 _MOST_ROUNDS = 5
+# Of the places nearest in space so many are compared by their offsets; so many vertices at a time.
+_MOST_NEAR, _ROWS = 64, 16384
 # How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
 _BESIDE, _BESIDE_OF_FEW = 1.0, 2.0
 # What the kernel of bends knows of the way to a vertex.
@@ -58,15 +60,16 @@ class LineEngine(SimplexEngine):
         body: Any = Body
         return body(self._corners, self._first, self._incident, self._V)
 
-    def _from_near(self, vertices: AnyArray) -> tuple[AnyArray, AnyArray]:
+    def _from_near(self, vertices: AnyArray, offset: FloatArray) -> tuple[AnyArray, AnyArray]:
         """All vertices from near to far in space, and the source (n,) that each looks for first, -1 for none."""
         if len(vertices) == 1:
             far = np.sqrt(sum((x - x[vertices[0]]) ** 2 for x in self._V.T))
             nearest = np.full(len(far), 0 if self._is_small else -1)
         else:
-            from scipy.spatial import cKDTree
-
-            far, nearest = cKDTree(self._V[vertices]).query(self._V)
+            # Where another arrives before a source begins, no line comes from the source.
+            first = np.unique(nearest_in_value(self._V[vertices], self._V[vertices], offset)[1])
+            far, which = nearest_in_value(self._V, self._V[vertices[first]], offset[first])
+            nearest = first[which]
         return np.argsort(far, kind="stable").astype(np.int32), nearest.astype(np.int32)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
@@ -115,7 +118,7 @@ class LineEngine(SimplexEngine):
     ) -> tuple[AnyArray, AnyArray]:
         """As `_lower`; returns edges (e, 2), and the edge (n,) around which the way to each vertex bends last."""
         begin = distance.copy()
-        order, nearest = self._from_near(vertices)
+        order, nearest = self._from_near(vertices, offset)
         edges, outward, wall = self.reflex_edges
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
@@ -135,6 +138,24 @@ class LineEngine(SimplexEngine):
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         """As of all engines, without a list of edges: voxels have seven times as many as vertices."""
         self._body.along_edges(distance, label, np.empty_like(distance))
+
+
+def nearest_in_value(V: FloatArray, places: FloatArray, offset: FloatArray) -> tuple[FloatArray, IntArray]:
+    """The least sum of an offset (k,) and the distance from its place (k, 3) in space, at each V (n, 3), and which."""
+    from scipy.spatial import cKDTree
+
+    tree, least = cKDTree(places), offset - offset.min()
+    value, which = np.empty(len(V)), np.empty(len(V), np.int64)
+    for begin in range(0, len(V), _ROWS):
+        left, k = np.arange(begin, min(begin + _ROWS, len(V))), 1
+        while len(left) and k <= _MOST_NEAR:
+            far, near = tree.query(V[left], np.arange(1, min(k, len(places)) + 1))
+            found = far + least[near]
+            value[left], best = found.min(axis=1), found.argmin(axis=1)
+            which[left] = near[np.arange(len(left)), best]
+            # All other places are farther.
+            left, k = left[(value[left] > far[:, -1]) & (k < len(places))], 2 * k
+    return value, which
 
 
 def reflex_edges(corners: AnyArray, behind: AnyArray, V: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-import igl
 import numpy as np
 
 from heat_igl.curves import exp_map, geodesic_path, shortest_path, straighten, trace_geodesic
+from heat_igl.intrinsic import tangent_frames
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints
 from heat_igl.typing import ArrayLike, FloatArray
 
@@ -82,9 +82,7 @@ class GeodesicTracer(_OnTriangles):
 
     @cached_property
     def _vertex_normals(self) -> FloatArray:
-        """Normals (n, 3), weighted by angles as those of `tangent_frames`."""
-        weighting = igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE
-        return np.asarray(igl.per_vertex_normals(self._mesh.V, self._mesh.F, weighting))
+        return tangent_frames(self._mesh).normal
 
     def _traced(
         self, start: int | SurfacePoints, normal: FloatArray, direction: ArrayLike, most: int | None
