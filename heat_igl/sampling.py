@@ -18,11 +18,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from heat_igl.errors import MeshError, SourceError, names_guessed, shown
+from heat_igl.errors import MeshError, names_guessed, shown
 from heat_igl.geodesic import GeodesicSolver, Solver
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, as_triangles, connectivity
 from heat_igl.runtime import TimeLeft
-from heat_igl.sources import named_vertices, vertex_sources
+from heat_igl.sources import distinct_vertices, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 __all__ = [
@@ -35,15 +35,6 @@ __all__ = [
     "farthest_points",
     "voronoi_cells",
 ]
-
-
-def checked_vertices(name: str, vertices: ArrayLike, n: int) -> IntArray:
-    """Indices of distinct `vertices`, in the given order; a `SourceError` that calls them `name` for any others."""
-    named = named_vertices(cast(Any, vertices), n, name)
-    values, counts = np.unique(named, return_counts=True)
-    if len(values) < len(named):
-        raise SourceError(f"{name} must be distinct, but vertex {values[counts > 1][0]} is there twice")
-    return named
 
 
 def as_solver(solver: Solver | MeshLike) -> Solver:
@@ -122,7 +113,7 @@ def voronoi_cells(solver: Solver | MeshLike, sites: ArrayLike) -> VoronoiCells:
     [0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1]
     """
     solver = as_solver(solver)
-    chosen = checked_vertices("sites", sites, solver.n_vertices)
+    chosen = distinct_vertices(sites, solver.n_vertices, "sites")
     if isinstance(solver, GeodesicSolver):
         found = solver.voronoi(chosen)
         return VoronoiCells(chosen, found.labels, found.distance)
@@ -258,7 +249,7 @@ def diameter(solver: Solver | MeshLike, *, start: int = 0, rounds: int = 10) -> 
     solver = as_solver(solver)
     if not isinstance(rounds, int | np.integer) or rounds < 1:
         raise ValueError(f"rounds must be a positive integer, not {rounds!r}")
-    here = int(checked_vertices("start", start, solver.n_vertices)[0])
+    here = int(distinct_vertices(start, solver.n_vertices, "start")[0])
     best = (-1.0, here, here)
     left = TimeLeft("queries at most are done", rounds)
     for _ in range(rounds):
@@ -301,7 +292,7 @@ def distance_matrix(solver: Solver | MeshLike, indices: ArrayLike | None = None)
     """
     solver = as_solver(solver)
     chosen = (
-        np.arange(solver.n_vertices) if indices is None else checked_vertices("indices", indices, solver.n_vertices)
+        np.arange(solver.n_vertices) if indices is None else distinct_vertices(indices, solver.n_vertices, "indices")
     )
     matrix = np.empty((len(chosen), len(chosen)))
     for i, row in enumerate(distance_rows(solver, chosen)):

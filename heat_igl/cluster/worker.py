@@ -234,7 +234,12 @@ def _begin(task: Task, store: Store) -> Outcome:
         return Outcome(name)
     with _SOLVERS.solver(mesh, fingerprint, task.choice) as solver:
         identity = {"fingerprint": fingerprint, **_described(solver)}
-        group, source_sets = _continued(name, store, known, identity) or _new(task, store, mesh, solver, identity)
+        found = _continued(name, store, known, identity)
+        if found is None:
+            sets, facts = _source_sets(task.plan, mesh, solver), {"mesh": task.item.label, "versions": _versions()}
+            facts |= {**identity, "report": plain(asdict(mesh.report()))}
+            found = store.begin(name, sets, mesh.n_vertices, task.dtype, facts), sets
+        group, source_sets = found
         spans = _spans(group)
         _send("begun", task, blocks=sum(map(len, spans)))
         if spans:
@@ -267,15 +272,6 @@ def _continued(
         return None
     store.update(name, {"status": "running", "reason": ""})
     return group, source_sets
-
-
-def _new(
-    task: Task, store: Store, mesh: Mesh | PointCloud, solver: Solver, identity: Mapping[str, Any]
-) -> tuple[MeshGroup, list[IntArray]]:
-    """A new group for a mesh, with the sources."""
-    source_sets = _source_sets(task.plan, mesh, solver)
-    attributes = {"mesh": task.item.label, **identity, "versions": _versions(), "report": plain(asdict(mesh.report()))}
-    return store.begin(task.item.name, source_sets, mesh.n_vertices, task.dtype, attributes), source_sets
 
 
 def _loaded(item: Item) -> Mesh | PointCloud:

@@ -11,7 +11,7 @@ from heat_igl.errors import SourceError, raise_at_first
 from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices
 from heat_igl.runtime import over_rows
-from heat_igl.sources import Sources, named_vertices
+from heat_igl.sources import Sources, distinct_vertices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 # A site is moved by its step divided by the first of these that lowers the energy of its cell.
@@ -96,10 +96,7 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
         raise ValueError(f"rounds must be an integer of at least 0, not {rounds!r}")
     mesh = as_mesh(mesh)
     triangles = as_simplices(mesh)
-    chosen = triangles.originals[named_vertices(sites, triangles.n_vertices, "sites")]
-    if len(np.unique(chosen)) < len(chosen):
-        values, counts = np.unique(chosen, return_counts=True)
-        raise SourceError(f"sites must be distinct, but vertex {values[counts > 1][0]} is there twice")
+    chosen = distinct_vertices(sites, triangles.n_vertices, "sites", triangles.originals)
     lost = ~triangles.referenced[chosen]
     raise_at_first(lost, "sites", chosen, "is no vertex that a face uses", "it has no cell", SourceError)
     return _Relaxation(mesh).relaxed(chosen, int(rounds))

@@ -11,7 +11,8 @@ import numpy as np
 
 from heat_igl.errors import MeshError, checked_cutoff, names_guessed, require_choice
 from heat_igl.heat.batches import BatchedSolver, LabelledDistance
-from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh, tangent_surface
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh
+from heat_igl.mesh.objects import as_simplices, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Operators
 from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod, Method, Plan, SurfaceMeasures, distance_plan, sweep_plan
@@ -205,12 +206,8 @@ class GeodesicSolver(BatchedSolver):
         region: ArrayLike | None = None,
     ) -> None:
         self._method, self._tolerance = method, tolerance
-        self._domain: Mesh | PointCloud | Operators
-        if isinstance(mesh, Operators):
-            self._domain = mesh
-        else:
-            given = as_mesh(mesh)
-            self._domain = given.triangles if isinstance(given, PolygonMesh) else given
+        given = mesh if isinstance(mesh, Operators) else as_mesh(mesh)
+        self._domain = given.triangles if isinstance(given, PolygonMesh) else given
         self._part = None if region is None else MeshPart.of(self._domain, region)
         if self._part is not None:
             self._domain = self._part.mesh
@@ -283,9 +280,8 @@ class GeodesicSolver(BatchedSolver):
             if chosen.engine == "sweep":
                 return chosen, sweep or _sweep_engine(triangles)
         # All other engines are held to bounds where they are made.
-        domain = self._domain.triangles if isinstance(self._domain, PointCloud) else self._domain
         # Noisy points are measured where they were moved to.
-        V = None if isinstance(domain, Operators) else domain.V
+        V = None if isinstance(self._domain, Operators) else as_simplices(self._domain).V
         return chosen, guarded_windows(triangles, V, _sweep_engine)
 
     def __repr__(self) -> str:
@@ -307,18 +303,12 @@ class GeodesicSolver(BatchedSolver):
     def referenced(self) -> BoolArray:
         """Mask (n,) of the vertices that a face uses."""
         domain = self._domain
-        if isinstance(domain, Operators):
-            return domain.referenced[: domain.n_given]
-        return (domain.triangles if isinstance(domain, PointCloud) else domain).referenced
+        return (domain if isinstance(domain, Operators) else as_simplices(domain)).referenced[: self.n_vertices]
 
     @property
     def _n_faces(self) -> int:
         domain = self._domain
         return len(domain.weights) if isinstance(domain, Operators) else domain.n_faces
-
-    @property
-    def _numbered(self) -> Mesh | PointCloud | Operators:
-        return self._domain
 
     def _nearer(self, vertex: int, than: FloatArray) -> FloatArray:
         """Distance (n,) from a vertex where it is smaller than `than` (n,), the distance from others; else ``inf``."""
@@ -494,11 +484,8 @@ class GeodesicSolver(BatchedSolver):
         surface = domain if part is None and isinstance(domain, Mesh) and not domain.is_tetrahedral else None
         chosen = source_set(sources, self.n_vertices, faces, surface, part=part, originals=self._originals)
         if chosen.offsets.any():
-            if isinstance(domain, Operators):
-                h = domain.mean_edge_length
-            else:
-                h = float((domain.triangles if isinstance(domain, PointCloud) else domain).edge_lengths.mean())
-            require_resolved(chosen, h)
+            h = domain.mean_edge_length if isinstance(domain, Operators) else as_simplices(domain).edge_lengths.mean()
+            require_resolved(chosen, float(h))
         return chosen
 
     def _answers(

@@ -57,6 +57,8 @@ class LabelledDistance(NamedTuple):
 class BatchedSolver(ABC):
     """A solver for k sets of sources at a time, asked for any number of them."""
 
+    _domain: Mesh | PointCloud | Operators
+
     @property
     @abstractmethod
     def n_vertices(self) -> int:
@@ -66,11 +68,6 @@ class BatchedSolver(ABC):
     @abstractmethod
     def _n_faces(self) -> int:
         """Faces of the domain, by which the memory of a block is estimated."""
-
-    @property
-    @abstractmethod
-    def _numbered(self) -> Mesh | PointCloud | Operators:
-        """What knows which vertices are copies of others."""
 
     @abstractmethod
     def _source_set(self, sources: Sources) -> SourceSet:
@@ -88,7 +85,7 @@ class BatchedSolver(ABC):
     @cached_property
     def _originals(self) -> IntArray | None:
         """The vertex (n,) whose values each takes, where seams were merged or points are equal."""
-        return self._numbered.originals if self._numbered.has_copies else None
+        return self._domain.originals if self._domain.has_copies else None
 
     def _with_copies(self, values: AnyArray) -> AnyArray:
         """Values (..., n) in which copies have those of their originals."""

@@ -94,7 +94,6 @@ class HeatMethodSolver(BatchedSolver):
     (2, 2562)
     """
 
-    _mesh: Mesh | PointCloud | None = None
     _parts: SolverParts
     _part: MeshPart | None = None
 
@@ -124,8 +123,8 @@ class HeatMethodSolver(BatchedSolver):
             chosen = replace(options, laplacian="intrinsic-delaunay")
             self._parts = prepare(domain, chosen)
         else:
-            self._mesh = None if isinstance(domain, PolygonMesh) else domain
             self._parts = prepare_mesh(domain, options)
+        self._domain = self.operators if isinstance(domain, PolygonMesh) else domain
 
     @classmethod
     def from_edge_lengths(
@@ -193,13 +192,13 @@ class HeatMethodSolver(BatchedSolver):
         ValueError
             If the solver was made from operators.
         """
-        if self._mesh is None:
+        if isinstance(self._domain, Operators):
             fans = self.operators.fans
             if fans is None:
                 raise ValueError("this solver was made from operators and has no vertices to move: make it again")
             positions = fans.polygons.triangles.with_vertices(V).V
             return self._of(prepare_mesh(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
-        moved = self._mesh.with_vertices(V)
+        moved = self._domain.with_vertices(V)
         options, known = self._parts.options, self._parts.analysis
         solver = self._of(prepare_mesh(moved, options, known), moved)
         if self._part is not None and isinstance(moved, Mesh):
@@ -209,7 +208,7 @@ class HeatMethodSolver(BatchedSolver):
     @classmethod
     def _of(cls, parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> HeatMethodSolver:
         solver = cls.__new__(cls)
-        solver._mesh, solver._parts = mesh, parts
+        solver._domain, solver._parts = parts.operators if mesh is None else mesh, parts
         return solver
 
     def __repr__(self) -> str:
@@ -256,17 +255,13 @@ class HeatMethodSolver(BatchedSolver):
     def _n_faces(self) -> int:
         return len(self._parts.operators.weights)
 
-    @property
-    def _numbered(self) -> Mesh | PointCloud | Operators:
-        return self.operators if self._mesh is None else self._mesh
-
     def _source_set(self, sources: Sources) -> SourceSet:
         surface = self.operators.source_surface
         faces = None if surface is None else surface.given_faces
         part = self._part
         if part is not None and faces is not None:
             faces = part.whole
-        mesh = self._mesh if isinstance(self._mesh, Mesh) and part is None and faces is not None else None
+        mesh = self._domain if isinstance(self._domain, Mesh) and part is None and faces is not None else None
         chosen = source_set(sources, self.n_vertices, faces, mesh, part=part, originals=self._originals)
         return require_resolved(chosen, self._parts.operators.mean_edge_length)
 

@@ -8,6 +8,7 @@ from heat_igl.sources.source_sets import Sources as Sources
 from heat_igl.sources.source_sets import SourceSegments as SourceSegments
 from heat_igl.sources.source_sets import SourceSet as SourceSet
 from heat_igl.sources.source_sets import are_positions as are_positions
+from heat_igl.sources.source_sets import distinct_vertices as distinct_vertices
 from heat_igl.sources.source_sets import named_vertices as named_vertices
 from heat_igl.sources.source_sets import nearest_first as nearest_first
 from heat_igl.sources.source_sets import require_resolved as require_resolved

@@ -244,6 +244,16 @@ def named_vertices(sources: Sources, n: int, name: str = "sources") -> IntArray:
     return np.asarray(array, dtype=np.int64)
 
 
+def distinct_vertices(vertices: Any, n: int, name: str, originals: IntArray | None = None) -> IntArray:
+    """As `named_vertices`, or the `originals` (n,) of these; a `SourceError` also if one of them is named twice."""
+    named = named_vertices(vertices, n, name)
+    named = named if originals is None else originals[named]
+    values, counts = np.unique(named, return_counts=True)
+    if len(values) < len(named):
+        raise SourceError(f"{name} must be distinct, but vertex {values[counts > 1][0]} is there twice")
+    return named
+
+
 def are_positions(places: object) -> bool:
     """Whether `places` are positions in space, floats (3,) or (k, 3): no vertices, which are whole numbers."""
     try:
