@@ -277,12 +277,14 @@ def refuse_masked(name: str, values: object, error: type[ValueError] = ValueErro
         raise error(f"{name} has {int(np.sum(mask))} masked entries: fill or remove them")
 
 
-def real_numbers(name: str, values: npt.ArrayLike, error: type[ValueError] = ValueError) -> npt.NDArray[np.float64]:
+def real_numbers(
+    name: str, values: npt.ArrayLike, error: type[ValueError] = ValueError, refused: str = "cmMSU"
+) -> npt.NDArray[np.float64]:
     """`values` as a new float64 array; an `error` that calls them `name` if they are no real numbers."""
     refuse_masked(name, values, error)
     try:
         # numpy would take dates as numbers of days, and read texts.
-        if np.asarray(values).dtype.kind not in "cmMSU":
+        if np.asarray(values).dtype.kind not in refused:
             return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise error(f"{name} must be real numbers in an array, not {shown(values)}") from None

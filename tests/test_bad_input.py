@@ -478,6 +478,9 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: heat_igl.centroidal_voronoi(m, [3, 3]), "sites must be distinct, but vertex 3 is there twice"),
     (lambda m: heat_igl.centroidal_voronoi(m, [3, 42]), r"sites\[1\] = 42 is no vertex"),
     (lambda m: heat_igl.centroidal_voronoi(m, [3], rounds=-1), "rounds must be an integer of at least 0"),
+    (lambda _: heat_igl.speed_operators(GRID, np.ones(32, bool)), "speed must be real numbers"),
+    (lambda _: heat_igl.metric_operators(GRID, np.ones((32, 3, 3), bool)), "metric must be real numbers"),
+    (lambda _: heat_igl.activation_times(GRID, np.eye(3, dtype=bool), 0), "D must be real numbers"),
     (lambda _: heat_igl.speed_operators(GRID, np.ones(31)), r"speed must have shape \(32,\), one per face, not \(31"),
     (lambda _: heat_igl.speed_operators(GRID, [1.0] * 31 + [0]), r"speed\[31\] = 0.0 must be .* \(1 of 32 are not"),
     *(

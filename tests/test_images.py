@@ -43,12 +43,10 @@ def test_a_stroke_one_pixel_wide_is_as_long_as_it_is(method):
     domain = image_domain(mask)
     solver = SolverChoice(method).on(domain.mesh)
     distance = domain.image(solver.distance(domain.index[2, 0]))
-    exact = 15 + np.hypot(5.5, 0.5) + np.sqrt(0.5) + 14 * np.sqrt(2) if method != "heat" else None
     straight = np.hypot(20.5, 0.5) + np.sqrt(0.5) + 14 * np.sqrt(2)
     assert np.isinf(distance[~mask]).all()
     assert np.isfinite(distance[mask]).all()
     assert distance[17, 35] == pytest.approx(straight, rel=0.02 if method == "heat" else 1e-9)
-    assert exact is None or exact > straight
 
 
 def test_no_direction_is_preferred():
@@ -93,8 +91,7 @@ def test_a_metric_per_pixel_is_a_linear_map():
 
 
 def test_tetrahedra_fit_together_and_fill_the_voxels():
-    rng = np.random.default_rng(0)
-    mask = rng.random((4, 5, 6)) < 0.7
+    mask = np.random.default_rng(0).random((4, 5, 6)) < 0.7
     domain = image_domain(mask, spacing=(3.0, 2.0, 0.5))
     mesh = domain.mesh
     assert mesh.n_faces == 12 * mask.sum()

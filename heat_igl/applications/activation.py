@@ -64,13 +64,12 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
     True
     """
     simplices = as_simplices(mesh)
-    D = real_numbers("D", D)
+    D = real_numbers("D", D, refused="bcmMSU")
     m, n = simplices.n_faces, simplices.n_vertices
-    if D.shape == (3, 3):
-        D = np.broadcast_to(D, (m, 3, 3))
-    if D.shape not in ((m, 3, 3), (n, 3, 3)):
+    each = D[None] if D.shape == (3, 3) else D
+    if D.shape not in ((3, 3), (m, 3, 3), (n, 3, 3)):
         raise ValueError(f"D must have shape (3, 3), {(m, 3, 3)} per face or {(n, 3, 3)} per vertex, not {D.shape}")
-    least_eigenvalue("D", inverse_root(symmetric_tensors("D", D))[2][:, 0], D)
+    least_eigenvalue("D", inverse_root(symmetric_tensors("D", each))[2][:, 0], each)
     start = real_numbers("times", times)
     first_time = start.min(initial=np.inf, where=np.isfinite(start))
     with np.errstate(over="ignore", invalid="ignore"):
@@ -83,6 +82,7 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
     k = source_set(sites, n, None if simplices.is_tetrahedral else simplices.F, name="sites").n_labels
     if start.shape not in ((), (k,)):
         raise ValueError(f"times must be one number, or {k}, one for each of the sites, not of shape {start.shape}")
-    inverse = np.linalg.inv(D)
-    solver = GeodesicSolver(metric_operators(simplices, (inverse + np.swapaxes(inverse, 1, 2)) / 2))
+    inverse = np.linalg.inv(each)
+    inverse = np.broadcast_to((inverse + np.swapaxes(inverse, 1, 2)) / 2, (m if D.ndim == 2 else len(D), 3, 3))
+    solver = GeodesicSolver(metric_operators(simplices, inverse))
     return np.asarray(solver.distance(OffsetSources(sites, after)) + first_time)

@@ -101,7 +101,7 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
     check_laplacian(laplacian)
     mesh = as_simplices(mesh)
     check_measures(mesh)
-    g = real_numbers("metric", metric)
+    g = real_numbers("metric", metric, refused="bcmMSU")
     if g.shape == (mesh.n_vertices, 3, 3) and mesh.n_vertices != mesh.n_faces:
         checked = _checked_at_corners(g, mesh)
         del g
@@ -153,7 +153,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     5.0
     """
     mesh = as_simplices(mesh)
-    m, s = mesh.n_faces, real_numbers("speed", speed)
+    m, s = mesh.n_faces, real_numbers("speed", speed, refused="bcmMSU")
     if s.shape != (m,):
         raise ValueError(
             f"speed must have shape ({m},), one per face, not {s.shape}: speed[mesh.F].mean(axis=1) of one per vertex"
