@@ -497,6 +497,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         for bad in (0, (1, -1), (1, 2, 3), "x", np.inf)
     ),
     (lambda _: heat_igl.image_domain(SOLID, (1.0, 2.0)), "spacing must be one or three positive numbers"),
+    (lambda _: heat_igl.terrain([[0.0, 0], [0]]), "heights must be an array, but rows or entries differ in length"),
     (lambda _: heat_igl.terrain([0.0, 0, 0]), r"heights must be real numbers \(rows, .* of shape \(3,"),
     (lambda _: heat_igl.terrain(np.where(np.eye(3), 0, np.nan)), "no three neighbouring cells with ground"),
     (lambda _: heat_igl.terrain([[0, 0, 0], [0, 0, np.inf], [0, 0, 0]]), r"heights\[1, 2\] is inf \(1 of 9"),

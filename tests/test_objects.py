@@ -214,8 +214,9 @@ def test_cells_of_other_kinds_are_refused():
 
 
 def test_operators_and_solvers_are_refused_by_name():
-    with pytest.raises(MeshError, match=r"Operators: GeodesicSolver and HeatMethodSolver take operators"):
-        as_mesh(heat_igl.speed_operators(SPHERE, np.ones(len(F))))
+    for mesh in (SPHERE, shapes.box(1)):  # on tetrahedra, the type is a private one
+        with pytest.raises(MeshError, match=r"\.Operators: GeodesicSolver and HeatMethodSolver take operators"):
+            as_mesh(heat_igl.speed_operators(mesh, np.ones(mesh.n_faces)))
     with pytest.raises(MeshError, match=r"HeatMethodSolver: a solver is asked itself"):
         as_mesh(heat_igl.HeatMethodSolver(SPHERE))
 

@@ -10,13 +10,6 @@ import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, SourceError, SurfacePoints, cli, shapes
 
 
-def random_region(mesh: Mesh, rng: np.random.Generator) -> np.ndarray:
-    """A mask of vertices or of faces, with holes and several parts."""
-    at = mesh.V if rng.random() < 0.5 else mesh.V[mesh.F].mean(axis=1)
-    hills = sum(np.cos(at @ rng.normal(scale=3, size=3) + rng.uniform(0, 6)) for _ in range(3))
-    return np.asarray(hills < np.quantile(hills, rng.uniform(0.3, 0.95)))
-
-
 def cut_out(mesh: Mesh, region: np.ndarray) -> tuple[Mesh, np.ndarray, np.ndarray]:
     """The faces of a region as a mesh of their own, its vertices, and its faces."""
     faces = np.flatnonzero(region[mesh.F].all(axis=1) if len(region) == mesh.n_vertices else region)
@@ -28,7 +21,10 @@ def cut_out(mesh: Mesh, region: np.ndarray) -> tuple[Mesh, np.ndarray, np.ndarra
 @pytest.mark.parametrize("seed", range(12))
 def test_distances_are_those_on_the_mesh_cut_out(seed):
     mesh, rng = bumpy(), np.random.default_rng(seed)
-    region = random_region(mesh, rng)
+    # Of vertices or of faces, with holes and several parts.
+    at = mesh.V if rng.random() < 0.5 else mesh.V[mesh.F].mean(axis=1)
+    hills = sum(np.cos(at @ rng.normal(scale=3, size=3) + rng.uniform(0, 6)) for _ in range(3))
+    region = hills < np.quantile(hills, rng.uniform(0.3, 0.95))
     part, used, faces = cut_out(mesh, region)
     outside = np.setdiff1d(np.arange(mesh.n_vertices), used)
     sources = rng.integers(len(used), size=2)

@@ -243,7 +243,7 @@ def one_sided(mesh: MeshLike, what: str) -> Mesh:
 
 
 def _named(mesh: object) -> str:
-    kind = type(mesh)
+    kind = next(each for each in type(mesh).__mro__ if not each.__name__.startswith("_"))
     return (
         f"of type {kind.__qualname__}" if kind.__module__ == "builtins" else f"a {kind.__module__}.{kind.__qualname__}"
     )

@@ -113,7 +113,8 @@ class ImageDomain:
         ----------
         image : (rows, columns, ...) or (slices, rows, columns, ...) array_like
             A number for each pixel, or an array such as a metric (3, 3) in the axes x, y, z of `mesh`: x runs along
-            the columns, the last axis of the image, and y along the rows.
+            the columns, the last axis of the image, and y along the rows. `metric_operators` takes a metric (2, 2) in
+            the axes of each triangle, not in these: give (3, 3).
 
         Returns
         -------
@@ -348,7 +349,7 @@ def terrain(heights: ArrayLike, spacing: float | Sequence[float] = 1.0, *, nodat
 def _checked_heights(heights: ArrayLike, nodata: float | None) -> tuple[FloatArray, BoolArray]:
     """Heights (rows, columns), and which cells have one."""
     masked: Any = getattr(heights, "mask", None) if isinstance(heights, np.ndarray) else None
-    given: AnyArray = as_array("heights", np.asarray(heights), MeshError)
+    given: AnyArray = as_array("heights", heights if masked is None else np.asarray(heights), MeshError)
     if given.ndim != 2 or given.dtype.kind not in "iuf":
         raise MeshError(f"heights must be real numbers (rows, columns), not {given.dtype} of shape {given.shape}")
     if nodata is not None and not is_number(nodata):
