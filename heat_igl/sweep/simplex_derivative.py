@@ -206,11 +206,8 @@ class _FacetUpdate:
                 sag = sag - size * share * np.sign(np.real(sag))
                 is_doubted = (np.real(sag) < 0) & (np.real(trust[:, [i, j]]) < 1).all(axis=1)
                 sag = np.where(is_doubted, sag * _smaller(trust[:, i], trust[:, j]), sag)
-                edge = [metric[:, m % metric.shape[1]] for m in (i, j)]
-                from_i, from_j = (
-                    2 * d * np.sqrt(g[:, i, i] + g[:, j, j] - 2 * g[:, i, j])
-                    for d, g in zip((Di, Dj), edge, strict=True)
-                )
+                squares = metric[:, :, i, i] + metric[:, :, j, j] - 2 * metric[:, :, i, j]
+                from_i, from_j = (2 * D[:, m] * np.sqrt(squares[:, m % squares.shape[1]]) for m in (i, j))
                 sag = _smaller(sag, _smaller(rise + from_i, from_j - rise) - level)
                 sag = _larger(sag, _larger(rise - from_i, -from_j - rise) - level)
                 result[:, i, j] = result[:, j, i] = np.where(doubted, 0, self._weight[:, i, j] * sag)

@@ -130,6 +130,7 @@ class HopfLax:
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
         update.d, update.label, update.low, update.offset = d, label, np.min(d), offset
         update.slope, update.is_sloped, update.weight = slope, is_sloped, weight
+        update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
         self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
         # Changes add up along a path.
         self.settled = SETTLED * n ** (-1.0 / update.p)

@@ -305,20 +305,24 @@ class SimplexUpdate(Facet):
         v: cython.int = self.corners[s, self.side[i]]
         if not self.is_sloped[v]:
             return 0.0
-        e: cython.double[3]
-        for j in range(3):
-            e[j] = self.slope[v, j] if self.q > 1 else 0.0
-            if self.q == 1 and j < self.p:
-                for k in range(3):
-                    e[j] += self.slope[v, k] * self.E[j][k]
-        square: cython.double = self.dual(i + 1 if self.q > 1 else 0, e)
-        square = log(square) if square > 0.0 else 1.0
-        return max(1.0 - square * square, 0.0)
+        row: cython.int = self.rows[s, self.side[i]] if self.q > 1 else s
+        if self.trusted_in[v] != row:
+            e: cython.double[3]
+            for j in range(3):
+                e[j] = self.slope[v, j] if self.q > 1 else 0.0
+                if self.q == 1 and j < self.p:
+                    for k in range(3):
+                        e[j] += self.slope[v, k] * self.E[j][k]
+            square: cython.double = self.dual(i + 1 if self.q > 1 else 0, e)
+            square = log(square) if square > 0.0 else 1.0
+            self.trusted[v], self.trusted_in[v] = max(1.0 - square * square, 0.0), row
+        return self.trusted[v]
 
     def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
         """The derivative of the length of v - x by the position of v, at the best place x, after `face`."""
         v: cython.int = self.corners[s, c]
         lean: cython.double[3]
+        self.trusted_in[v] = -1
         self.lay(s, c)
         self.is_sloped[v] = self.length(self.share) > 0.0
         for i in range(self.p):
