@@ -108,7 +108,7 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
         return _of_smooth_metric(mesh, *checked, laplacian)
     if mesh.is_tetrahedral:
         return _of_groups(mesh, *_checked(g, mesh))
-    return operators_in_metric(mesh, *_checked(g, mesh)[:3], laplacian, g)
+    return operators_in_metric(mesh, *_checked(g, mesh)[:3], g, laplacian)
 
 
 def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
@@ -167,10 +167,10 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
     first, group = equal_runs(s) if mesh.is_tetrahedral else (slice(None), None)
     each = s[first, None, None]
-    in_metric = np.eye(3) / each**2, 1 / float(s.max()), (each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None)
-    if mesh.is_tetrahedral:
-        return _of_groups(mesh, *in_metric, group)
-    return operators_in_metric(mesh, *in_metric, given=s)
+    root = each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None
+    make: Callable[..., Operators] = _of_groups if mesh.is_tetrahedral else operators_in_metric
+    # A metric without a name here does not outlive its use there.
+    return make(mesh, np.eye(3) / each**2, 1 / float(s.max()), root, s if group is None else group)
 
 
 def fibre_metric(
@@ -270,25 +270,25 @@ def operators_in_metric(
     g: FloatArray,
     least: float,
     root: Any = None,
-    laplacian: Laplacian = "auto",
     given: FloatArray | None = None,
+    laplacian: Laplacian = "auto",
 ) -> Operators:
     """`metric_operators` of checked triangles and metrics g (m, 3, 3).
 
     No unit vector is shorter than `least` in it. The inverse root may be given, and that by which lengths are
     differentiated: a metric, or speeds (m,).
     """
-    on_each = MetricSimplices(mesh.F, mesh.n_vertices, mesh.V, tensors=g, group=np.arange(mesh.n_faces))
-    own = np.sqrt(on_each.measured[1])[:, ::-1]
-    del on_each
+    squares = MetricSimplices(mesh.F, mesh.n_vertices, mesh.V, tensors=g, group=np.arange(mesh.n_faces)).measured[1]
+    own = np.sqrt(squares, out=squares)[:, ::-1]
     sides = _common_lengths(mesh, own)
     if sides is None:
         return _refracting(mesh, own, g, least, laplacian)
+    del own, squares
     # Triangles without area know no metric in their plane.
     has_area = bool((mesh.measures > 0).all())
-    return _unfolded(
-        mesh, sides, MetricSimplices.in_metric(mesh, g, least, root=root) if has_area else None, laplacian, given
-    )
+    simplices = MetricSimplices.in_metric(mesh, g, least, root=root) if has_area else None
+    del g
+    return _unfolded(mesh, sides, simplices, laplacian, given)
 
 
 def _unfolded(
@@ -321,7 +321,7 @@ def _of_smooth_metric(mesh: Mesh, g: Any, least: float, root: Any, laplacian: La
         return _unfolded(mesh, sides, simplices, laplacian, None)
     # For heat: what each face says alone.
     at_corners = (simplices.metric(np.arange(mesh.n_faces), corner) for corner in range(3))
-    domain = operators_in_metric(mesh, np.asarray(sum(at_corners)) / 3, least, None, laplacian)
+    domain = operators_in_metric(mesh, np.asarray(sum(at_corners)) / 3, least, laplacian=laplacian)
     return replace(domain, surface=None, simplices=simplices)
 
 

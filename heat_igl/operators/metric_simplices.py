@@ -84,18 +84,14 @@ class MetricSimplices:
         if at_vertices:
             rows = corners if p == 3 else rows
             return cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows, True)
-        axes, across = np.empty((0, 2, 3)), np.empty((0, 6))
-        if p == 2:
-            axes = plane_axes(mesh)
-            normal = np.cross(axes[:, 0], axes[:, 1])
-            across = np.take(normal, _ABOVE[0], axis=1) * np.take(normal, _ABOVE[1], axis=1)
+        axes = plane_axes(mesh) if p == 2 else np.empty((0, 2, 3))
         # The velocities are taken for samples of a smooth field. Those at the corners of a simplex are fitted if at
         # each this explains all of the variance and is positive definite, and are those of the simplex if it leaves a
         # quarter or more at one, as it leaves of a step: jumps stay where they are.
         group = np.arange(len(corners), dtype=np.int32) if group is None else group
         incident = incidence.corners_by_vertex(corners, mesh.n_vertices)
-        at_vertex, share = fits_around(corners, mesh.V - mesh.V.mean(axis=0), velocity, group, across, *incident)
-        del across, incident
+        at_vertex, share = fits_around(corners, mesh.V - mesh.V.mean(axis=0), velocity, group, axes, *incident)
+        del incident
         if not (share > _ROUNDING).any():
             return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3)
         smallest, largest = inverse_root(at_vertex)[2].T

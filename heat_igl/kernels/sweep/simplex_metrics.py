@@ -189,25 +189,20 @@ def fits_around(
     X: cython.const[cython.double][:, ::1],
     W: cython.const[cython.double][:, ::1],
     group: cython.const[cython.int][::1],
-    across: cython.const[cython.double][:, ::1],
+    axes: cython.const[cython.double][:, :, ::1],
     first: cython.const[cython.int][::1],
     incident: cython.const[cython.int][::1],
 ):
-    """Linear functions fitted to velocities of simplices around vertices: their values there, and how far they hold.
+    """Linear functions fitted to velocities around vertices: their values (n, 6) there, and how far they hold (n,).
 
     Simplices (m,) have the velocity W (k, 6) of their `group` at their centres. Those that meet a simplex of the vertex
-    count, once for each corner that they share with one.
-
-    Returns
-    -------
-    found, share : (n, 6), (n,) float64
-        The share, up to 1, is how far the function holds: by how much it explains more than 3/4 of the variance around
-        the vertex. Of triangles, what varies since the projections `across` (m, 6) on their normals do, counts as not
-        explained; of tetrahedra these are (0, 6).
+    count, once for each corner that they share with one. Functions hold, up to 1, by how much they explain more than
+    3/4 of the variance there. Of triangles, with `axes` (m, 2, 3) in their planes, else (0, 2, 3), what varies since
+    projections on their normals do, counts as not explained.
     """
     size: cython.int = corners.shape[1]
-    n_columns: cython.int = 35 if across.shape[0] == 0 else 41
-    # Products of 1, x, y, z with 1, x, y, z and velocity, each pair once; the square of velocity; and `across`.
+    n_columns: cython.int = 35 if axes.shape[0] == 0 else 41
+    # Products of 1, x, y, z with 1, x, y, z and velocity, each pair once; the square of velocity; and of the normal.
     sums, found, shares = np.zeros((len(X), n_columns)), np.zeros((len(X), 6)), np.zeros(len(X))
     at: cython.double[:, ::1] = sums
     result: cython.double[:, ::1] = found
@@ -215,6 +210,7 @@ def fits_around(
     met: cython.int[::1] = np.zeros(len(X), np.int32)
     level: cython.double[::1] = np.bincount(group) @ W / len(group)
     row: cython.double[10]
+    normal: cython.double[3]
     mean: cython.double[41]
     work: cython.double[18]
     slope: cython.double[18]
@@ -225,6 +221,9 @@ def fits_around(
                 row[1 + k] = W[group[s], k - 3] - level[k - 3] if k > 2 else 0.0
             for k in range(3 * size):
                 row[1 + k % 3] += X[corners[s, k // 3], k % 3] / size
+            for k in range(3 if n_columns == 41 else 0):
+                normal[k] = axes[s, 0, (k + 1) % 3] * axes[s, 1, (k + 2) % 3]
+                normal[k] -= axes[s, 0, (k + 2) % 3] * axes[s, 1, (k + 1) % 3]
             for c in range(size):
                 u: cython.int = corners[s, c]
                 i: cython.int = 0
@@ -234,8 +233,11 @@ def fits_around(
                         i += 1
                 for k in range(6):
                     at[u, 34] += _OFTEN[k] * row[4 + k] * row[4 + k]
-                for k in range(35, n_columns):
-                    at[u, k] += across[s, k - 35]
+                i = 35
+                for j in range(3 if n_columns == 41 else 0):
+                    for k in range(j, 3):
+                        at[u, i] += normal[j] * normal[k]
+                        i += 1
         for v in range(X.shape[0]):
             others: cython.double = -1.0
             for k in range(41):
@@ -274,12 +276,11 @@ def fits_around(
                 whole += _OFTEN[k] * result[v, k] * result[v, k]
                 turned -= _OFTEN[k] * mean[35 + k] * mean[35 + k]
             diagonalize(work)
-            largest: cython.double = max(fabs(work[0]), fabs(work[4]), fabs(work[8]))
             explained: cython.double = -turned * whole
             free: cython.double = others
             for i in range(3):
                 # Centres do not differ in this direction but for rounding.
-                if fabs(work[4 * i]) <= 1e-15 * largest:
+                if fabs(work[4 * i]) <= 1e-15 * max(fabs(work[0]), fabs(work[4]), fabs(work[8])):
                     continue
                 free -= 1.0
                 away: cython.double = 0.0
