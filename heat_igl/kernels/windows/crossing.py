@@ -6,8 +6,8 @@ from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.heat_igl.kernels.windows.front import add, more_room, relax, release, take
 from cython.cimports.heat_igl.kernels.windows.structures import (
     AROUND_APEX,
-    FLATNESS,
     LEFT_OF_APEX,
+    MARGIN,
     RIGHT_OF_APEX,
     ROUNDING,
     Apex,
@@ -42,7 +42,7 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
     apex.y = s.double_area[h // 3] / apex.length
     apex.cos_left, apex.sin_left = apex.x / apex.left_length, apex.y / apex.left_length
     apex.cos_right, apex.sin_right = apex.right_x / apex.right_length, apex.y / apex.right_length
-    apex.excess = 2.0 * ROUNDING * max(apex.left_length, apex.right_length)
+    apex.longest = max(apex.length, apex.left_length, apex.right_length)
     apex.best, apex.best_at, apex.nearest = -1, 0.0, INFINITY
     return apex
 
@@ -90,9 +90,10 @@ def _may_reach(
     The straight line passes the end at the distance d = `off` / |(x, m)|. The path over the end is longer by at least
     d^2 / 2 divided by the length of its last part.
     """
+    most: cython.double = 2.0 * MARGIN * apex.longest
     if w.is_plane:
-        return off * off <= apex.excess * fabs(_straight(w, apex.x, apex.y))
-    return off * off <= apex.excess * (w.offset + fabs(x) + m) * (x * x + m * m)
+        return off * off <= most * (fabs(_straight(w, apex.x, apex.y)) + apex.longest)
+    return off * off <= most * (w.offset + fabs(x) + m + apex.longest) * (x * x + m * m)
 
 
 @cython.cfunc
@@ -142,7 +143,7 @@ def _reach_apex(
         # so that a path of equal length is preferred: one from another root may leave in another direction, and one
         # that bends at a vertex passes it on the correct side.
         distance = bent(w, b, apex.x, apex.y) * (1.0 + ROUNDING)
-        if distance <= _straight(w, apex.x, apex.y) * (1.0 + 2.0 * ROUNDING):
+        if is_within(distance, _straight(w, apex.x, apex.y), apex.longest):
             at = min(max(backward(w, apex.x, apex.y), 0.0), apex.length)
             _arrive(s, h, w, apex, distance, at)
     if apex.best >= 0:
@@ -212,14 +213,6 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
 
 
 @cython.cfunc
-@cython.inline
-@cython.nogil
-def _longest(apex: cython.pointer(Apex)) -> cython.double:
-    """The longest side of the face, the scale of rounding on its sides."""
-    return max(apex.length, apex.left_length, apex.right_length)
-
-
-@cython.cfunc
 @cython.nogil
 def _leads(
     w: cython.pointer(Window),
@@ -235,7 +228,7 @@ def _leads(
     if not to_left:
         x = apex.length - (apex.right_length - place) * apex.cos_right
         y = (apex.right_length - place) * apex.sin_right
-    return is_within(bent(w, at, x, y), out.offset + reach(out, place), _longest(apex))
+    return is_within(bent(w, at, x, y), out.offset + reach(out, place), apex.longest)
 
 
 @cython.cfunc
@@ -269,33 +262,6 @@ def _is_behind(
         return True
     to_start: cython.bint = _leads(best, apex.best_at, apex, cython.address(out), out.start, to_left)
     return to_start and _leads(best, apex.best_at, apex, cython.address(out), out.stop, to_left)
-
-
-@cython.cfunc
-@cython.nogil
-def _is_reached_between(
-    s: cython.pointer(Search), h: cython.int, windows: cython.pointer(Window), n: cython.int, apex: cython.pointer(Apex)
-) -> cython.bint:
-    """Whether the apex got a distance if it lies in a gap, due to rounding, between two halves of a window."""
-    j: cython.int
-    u: cython.pointer(Window)
-    w: cython.pointer(Window)
-    for i in range(n):
-        u = windows + i
-        near: cython.double = 10.0 * FLATNESS * (fabs(u.x) + u.depth)
-        if u.side != LEFT_OF_APEX or u.is_plane:
-            continue
-        for j in range(n):
-            w = windows + j
-            if (
-                w.side == RIGHT_OF_APEX
-                and w.root == u.root
-                and fabs(u.x - w.x) + fabs(u.depth - w.depth) <= near
-                and w.start - u.stop <= near
-                and not is_within(s.upper[s.vertex[h]], bent(u, u.stop, apex.x, apex.y), _longest(apex))
-            ):
-                return False
-    return True
 
 
 @cython.cfunc
@@ -336,15 +302,14 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     # Only the checked build has assertions. The next one needs a copy of the untrimmed windows; s.to_left is free here.
     assert memcpy(s.to_left, windows, n * cython.sizeof(Window)) != cython.NULL
     i = n
+    n = trim(s, windows, n, h)
     # There are about 6 half-edges for each vertex, and once more lists have crossed, some must have crossed one again.
     # On scans and spheres it is 3.1 to 3.8 for each vertex; to keep windows there as well takes 2 to 11 % longer.
     if s.n_crossed > 6 * cython.cast(cython.longlong, s.n_touched):
         n = trim_by_kept(s, windows, n, h)
-    n = trim(s, windows, n, h)
     assert is_covered(s, s.to_left, i, windows, n, h)
     apex = _opposite(s, h)
     _reach_apex(s, h, windows, n, cython.address(apex))
-    assert _is_reached_between(s, h, windows, n, cython.address(apex))
     if s.first_target != cython.NULL and s.first_target[h // 3] >= 0:
         _measure(s, h, windows, n, apex.x, apex.y)
     for i in range(n):

@@ -60,8 +60,8 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
     s.failed = s.meets_ties = s.is_shared = False
     s.n_windows = s.n_lists_done = s.n_waiting = 0
     s.n_nearest = s.n_crossed = 0
-    s.lists, s.heap = cython.NULL, cython.NULL
-    s.to_left = s.to_right = s.kept = cython.NULL
+    s.lists, s.heap, s.kept = cython.NULL, cython.NULL, cython.NULL
+    s.to_left = s.to_right = cython.NULL
     more_room(s, 128)
 
 
@@ -80,8 +80,11 @@ def empty_front(s: cython.pointer(Search)) -> cython.void:
     s.n_lists = s.n_heap = 0
     s.n_waiting = s.n_crossed = 0
     s.free_list = -1
-    free(s.kept)
-    s.kept = cython.NULL
+    if s.kept != cython.NULL:
+        for h in range(s.n_half_edges):
+            free(s.kept[h].windows)
+        free(s.kept)
+        s.kept = cython.NULL
 
 
 def free_front(s: cython.pointer(Search)) -> cython.void:

@@ -42,7 +42,7 @@ cdef struct Apex:
     double x, y
     double right_x       # length minus x
     double length, left_length, right_length
-    double excess        # 2 ROUNDING times the largest length of the last part of a path to the apex
+    double longest       # the longest side of the face, the scale of rounding on its sides
     double cos_left, sin_left, cos_right, sin_right
     int best             # the window that contains the shortest straight line to the apex, -1 if there is none
     double best_at       # where the path crosses the half-edge
@@ -114,7 +114,7 @@ cdef struct Search:
     int n_heap, n_all_heap
     Window *to_left, *to_right
     int n_out
-    Window* kept         # two for each half-edge, see `trim_by_kept`, or NULL
+    List* kept           # for each half-edge, see `trim_by_kept`, or NULL
     long long n_crossed  # lists that crossed a face in this search
     bint failed
     long long n_windows, n_lists_done

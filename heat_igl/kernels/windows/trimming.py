@@ -18,8 +18,10 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     UNDECIDED,
     W_NEARER,
     W_THEN_U,
+    List,
     Search,
     Window,
+    grown,
     is_within,
     reach,
 )
@@ -101,10 +103,12 @@ def _meeting(
 @cython.inline
 @cython.nogil
 def _is_farther(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
-    """Whether the root of w is at least as far from that of u as it begins later, so u is nearer everywhere."""
+    """Whether u reaches the root of w no later than w begins there, so u is nearer everywhere."""
     a: cython.double = u.x - w.x
     b: cython.double = u.depth - w.depth
-    return u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2 and not (u.is_plane or w.is_plane)
+    if u.is_plane:
+        return u.offset + (u.x * w.x - u.depth * w.depth) <= w.offset and not w.is_plane
+    return u.offset <= w.offset and a * a + b * b <= (u.offset - w.offset) ** 2 and not w.is_plane
 
 
 @cython.cfunc
@@ -431,9 +435,10 @@ def is_covered(
                 w = windows + k
                 if w.start - 2.0 * ROUNDING * length <= at <= w.stop + 2.0 * ROUNDING * length:
                     nearest = min(nearest, w.offset + reach(w, at))
-            for k in range(2):
-                if s.kept != cython.NULL and s.kept[2 * h + k].start <= at <= s.kept[2 * h + k].stop:
-                    nearest = min(nearest, s.kept[2 * h + k].offset + reach(s.kept + 2 * h + k, at))
+            for k in range(s.kept[h].count if s.kept != cython.NULL else 0):
+                w = s.kept[h].windows + k
+                if w.start <= at <= w.stop:
+                    nearest = min(nearest, w.offset + reach(w, at))
             if not is_within(nearest, reached, length):
                 return False
     return True
@@ -447,27 +452,40 @@ def trim_by_kept(
     """Trim windows where one that crossed h before is shorter; returns how many are left.
 
     Far from the ends of a needle, lines that wind around it reach each half-edge after those of the winding before have
-    crossed, and the ends are too far away to trim them. Of the first list that comes here over a half-edge, the windows
-    next to both ends are kept. As in a list, windows are trimmed only where the kept one is shorter by more than
-    rounding. So of several paths to a point, the shortest is never trimmed, whatever happens to the kept window later.
+    crossed, and the ends are too far away to trim them. So the windows that cross are kept. Both are trimmed where the
+    other is shorter, as in a list: of several paths to a point the shortest stays.
     """
-    k: cython.int
-    u: Window
+    j: cython.int
+    k: cython.int = 0
+    u: cython.pointer(Window)
+    w: cython.pointer(Window)
     if s.kept == cython.NULL:
-        s.kept = cython.cast(cython.pointer(Window), calloc(2 * s.n_half_edges, cython.sizeof(Window)))
+        s.kept = cython.cast(cython.pointer(List), calloc(s.n_half_edges, cython.sizeof(List)))
         if s.kept == cython.NULL:
             s.failed = True
             return 0
-    kept: cython.pointer(Window) = s.kept + 2 * h
-    if kept.stop == 0.0:
-        kept[0], kept[1] = windows[0], windows[n - 1]
-        return n
-    for j in range(2):
-        k = 0
-        for i in range(n):
-            u = kept[j]
-            if _settle(s, cython.address(u), windows + i) != 2:
-                windows[k] = windows[i]
-                k += 1
-        n = k
-    return n
+    kept: cython.pointer(List) = s.kept + h
+    if kept.count + n > kept.capacity:
+        room: cython.p_int = cython.address(kept.capacity)
+        more = grown(kept.windows, room, kept.count + n, cython.sizeof(Window), cython.address(s.failed))
+        kept.windows = cython.cast(cython.pointer(Window), more)
+        if s.failed:
+            return 0
+    for i in range(n):
+        w = windows + i
+        j = 0
+        while j < kept.count:
+            u = kept.windows + j
+            outcome: cython.int = 0 if _overlap_little(u, w) else _settle(s, u, w)
+            if outcome == 2 or w.stop <= w.start:
+                break
+            if outcome == 1 or u.stop <= u.start:
+                kept.count -= 1
+                u[0] = kept.windows[kept.count]
+            else:
+                j += 1
+        else:
+            kept.windows[kept.count] = windows[k] = w[0]
+            kept.count += 1
+            k += 1
+    return k
