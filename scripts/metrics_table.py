@@ -22,7 +22,7 @@ grids: images and blocks with so many ``--pixels`` and ``--voxels`` a side, at t
 scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and largest error in
 percent, seconds of one query with its preparation, and memory; of ``--fields`` 0 to 3 alone, in their order.
 smooth: a twisted cylinder and discs, and a cube with a speed that grows linearly, with tensors per simplex and at the
-vertices, times over those of fim-python, which takes those per simplex; "turning" is what `MOST_TURNING` is asked of.
+vertices, times over those of fim-python, which takes those per simplex.
 choice: what `hopf_lax_is_nearer` compares, and mean errors in closed form or against triangles cut into 4 or 16.
 polygons: mean errors of heat on triangles of the polygons and around virtual vertices, from exact distance there.
 """
@@ -568,8 +568,7 @@ def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     default = lambda mesh, g, source: GeodesicSolver(metric_operators(mesh, g)).distance(source)  # noqa: E731
     for name, mesh, metric, source, exact in smooth(options.rows, rng):
         centres = metric(mesh.V[mesh.F].mean(axis=1))
-        turning = HopfLaxEngine(MetricSimplices.in_metric(mesh, centres, 0.0)).turning
-        row: Row = {"body": name, "n": mesh.n_vertices, "m": mesh.n_faces, "turning": turning}
+        row: Row = {"body": name, "n": mesh.n_vertices, "m": mesh.n_faces}
         for method, query, g in (
             ("fim", by_fim, centres),
             ("face", default, centres),
@@ -714,7 +713,7 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
     "grids": (on_grids, {"grid": "{grid}"} | errors_and("s", default="default", fmm="scikit-fmm", konal="pykonal")
         | {"kB per cell": "{default[kB]:.1f}, {fmm[kB]:.1f}, {konal[kB]:.1f}"}
         | {"GiB": "{default[GiB]:.2g}, {fmm[GiB]:.2g}, {konal[GiB]:.2g}"}),
-    "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}", "turning": "{turning:.2g}",
+    "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}",
         "fim-python, %": "{fim[mean]:.2g} and {fim[largest]:.2g}",
         **errors_and("time", face="per simplex", vertex="at the vertices"),
     }),

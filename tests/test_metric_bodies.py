@@ -125,7 +125,7 @@ def turned(x: FloatArray, k: float) -> tuple[FloatArray, FloatArray]:
     return np.stack([z.real, z.imag, 0 * z.real], axis=1), g
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 @pytest.mark.parametrize(("k", "has_windows"), [(1.0, True), (6.0, False)])
 def test_a_metric_at_the_vertices_of_triangles(k, has_windows):
     """Up to 1:2.6 lengths of edges are those of triangles, also for windows; up to 1:38 not on these coarse disks."""
@@ -143,7 +143,7 @@ def test_a_metric_at_the_vertices_of_triangles(k, has_windows):
     assert errors[1] < (0.0005 if has_windows else 0.003)
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 def test_thin_triangles_that_turn():
     """Up to 1:102, with a metric per face, which is carried to the vertices; if not, it is 1.1 % off in the mean."""
     mesh, image, _ = twisted_disk(24, 10.0)
@@ -152,7 +152,7 @@ def test_thin_triangles_that_turn():
     assert np.abs(found - exact).mean() < 0.003 * exact.mean()
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 @pytest.mark.parametrize("place", [[0.45, 0.3, 0], [0.7, 0.1, 0], [-0.2, 0.5, 0]])
 def test_fronts_that_run_against_the_order_of_distance(place):
     """Up to 1:102, most vertices have their distance from a farther one: 17 % too long before each was settled."""
@@ -164,7 +164,7 @@ def test_fronts_that_run_against_the_order_of_distance(place):
     assert np.abs(found - exact).mean() < 0.006 * exact.mean()
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 def test_a_finer_mesh_is_not_worse():
     """Up to 1:38; with 20 visits for each vertex the largest error stayed at 6.6 %, and the mean at .17 and .20 %."""
     errors = []
@@ -178,7 +178,7 @@ def test_a_finer_mesh_is_not_worse():
     assert errors[1][0] < 0.0006
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 @pytest.mark.parametrize("seed", [3, 4, 5])
 def test_vertices_do_not_lower_each_other_for_ever(seed):
     """Fibres 1:30 that no mesh resolves, against triangles cut into 16: .45 to .54 while circles kept their slopes."""
@@ -203,6 +203,7 @@ def test_few_triangles_with_random_speeds_are_no_smooth_field(seed):
     assert np.abs(solver(mesh, g).distance(source)[away] / finer[away] - 1).mean() < 0.03
 
 
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 def test_flat_tetrahedra_do_not_shorten_distances():
     """Against halved ones in the same linear velocity: 10 % off where arcs left flat tetrahedra."""
     rng = np.random.default_rng(0)
@@ -216,7 +217,7 @@ def test_flat_tetrahedra_do_not_shorten_distances():
     assert np.abs(found[0] / found[2] - 1).mean() < 0.04
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 def test_derivatives_in_metrics_that_no_mesh_resolves():
     """Fibres 1:3: on 5 of 8 meshes distances swung for ever, all inexact. 1:30: a Newton step is singular."""
     unsettled = 0
@@ -233,34 +234,35 @@ def test_derivatives_in_metrics_that_no_mesh_resolves():
 
 def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
     """Neither speeds that jump do, nor fibres that a finer mesh resolves."""
-    mesh, _, g = twisted_disk(24, 6.0)
-    with pytest.warns(AccuracyWarning, match=r"changes by a factor of 3\.\d or more at a tenth of the faces"):
-        solver(mesh, g)
+    mesh, _, g = twisted_disk(8, 10.0)
+    with pytest.warns(
+        AccuracyWarning, match="if edges are halved, distance near the sources changes by .* in the mean"
+    ):
+        solver(mesh, g).distance(100)
     box = shapes.box(3)
-    with pytest.warns(AccuracyWarning, match="the metric varies farther .* corners of a face by 1.*% in the mean"):
-        solver(box, np.eye(3) / (1 + 99 * box.V[:, 2:, None]) ** 2)
-    resolved = twisted_disk(48, 3.0)
-    solver(resolved[0], resolved[2])
-    GeodesicSolver(speed_operators(mesh, np.where(mesh.V[mesh.F].mean(axis=1)[:, 0] < 0, 1.0, 100.0)))
+    with pytest.warns(AccuracyWarning, match="differ between the corners of a face by 1.*% in the mean"):
+        solver(box, np.eye(3) / (1 + 99 * box.V[:, 2:, None]) ** 2).distance(0)
+    fibres = np.random.default_rng(0).standard_normal((box.n_faces, 3))
+    with pytest.warns(AccuracyWarning, match=r"ratio of two lengths changes by a factor of \d"):
+        solver(box, fibre_metric(fibres, 1.0, 10.0)).distance(0)
+    resolved = twisted_disk(24, 6.0)
+    solver(resolved[0], resolved[2]).distance(0)
+    GeodesicSolver(speed_operators(mesh, np.where(mesh.V[mesh.F].mean(axis=1)[:, 0] < 0, 1.0, 100.0))).distance(0)
 
 
-def test_planes_of_triangles_are_turned_into_each_other():
-    """Fibres that are straight on a sheet do not turn where the sheet is folded."""
-    sheet = shapes.grid(8)
-    x, y, _ = sheet.V.T
-    fold = np.maximum(x - 0.5, 0)
-    folded = sheet.with_vertices(np.stack([np.minimum(x, 0.5) + fold * np.cos(1.0), y, fold * np.sin(1.0)], axis=1))
-    on_the_right = sheet.V[sheet.F].mean(axis=1)[:, 0] > 0.5
-    along_x = np.where(on_the_right[:, None], [np.cos(1.0), 0, np.sin(1.0)], [1.0, 0, 0])
-    fibres = along_x + np.array([0, 0.5, 0])
+def test_a_tube_of_five_sides_gives_a_warning_in_two_speeds():
+    """On triangles with angles of 144 degrees, distances were down to .53 of the shortest path at the larger speed."""
+    tube = FAMILIES["nearly flat cylinder"](16)
+    two = GeodesicSolver(speed_operators(tube, np.where(np.arange(tube.n_faces) % 2, 1.3, 1.0)))
+    with pytest.warns(AccuracyWarning, match="if edges are halved, distance near the sources changes by 17 %"):
+        two.distance(0)
+    two.distance(1)  # once is enough
 
-    def turning(directions):
-        g = fibre_metric(directions, 1.0, 20.0)
-        return HopfLaxEngine(MetricSimplices.in_metric(folded, g, 1.0)).turning
 
-    assert turning(fibres) == pytest.approx(1, rel=1e-6)
-    with pytest.warns(AccuracyWarning, match="the metric turns farther"):
-        turning(np.where(sheet.V[sheet.F].mean(axis=1)[:, 1:2] * 8 % 2 < 1, fibres, along_x))
+def test_no_flip_joins_two_vertices_that_an_edge_joins():
+    torus = shapes.torus(3, 3, 0.3)
+    simplices = speed_operators(torus, np.where(torus.V[torus.F].mean(axis=1)[:, 0] > 0, 2.0, 1.0)).simplices
+    assert simplices.halved().n == torus.n_vertices + len(torus.edges)
 
 
 def random_metric(m: int, rng: np.random.Generator, most: float) -> FloatArray:
@@ -268,7 +270,7 @@ def random_metric(m: int, rng: np.random.Generator, most: float) -> FloatArray:
     return np.asarray(turn @ (np.exp(rng.uniform(-most, most, (m, 3)))[:, :, None] * np.swapaxes(turn, 1, 2)))
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 @pytest.mark.parametrize(("p", "most"), [(2, 1.0), (2, 3.0), (3, 0.1), (3, 1.0), (3, 3.0), (3, 6.0)])
 def test_no_distance_contradicts_lines_or_edges(p, most):
     """Nor does it depend on the numbers of vertices, or on the order of corners."""
@@ -326,7 +328,7 @@ def differentiable(name: str, rng: np.random.Generator) -> tuple[Mesh, FloatArra
     return mesh, fibre_metric(fibre, 1 + 0.3 * y, 2.5)
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 @pytest.mark.parametrize("name", ["fibres", "layers", "disk"])
 def test_derivatives_against_central_differences(name):
     """By positions, by tensors and by offsets, in random directions, where a second difference shows no kink."""
@@ -367,7 +369,7 @@ def test_derivatives_against_central_differences(name):
         assert pull_back.by_offsets(weight)[i] == pytest.approx(weight @ found, rel=1e-5)
 
 
-@pytest.mark.filterwarnings("ignore:the metric turns farther")
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 @pytest.mark.parametrize("name", ["fibres", "one tensor, n_faces", "one tensor, n_vertices"])
 def test_derivatives_have_the_degrees_of_lengths(name):
     """Euler: lengths are of degree 1 in positions and 1/2 in the metric; a later start delays all that it reaches."""

@@ -101,6 +101,7 @@ def test_faces_without_area_at_a_jump():
     np.testing.assert_allclose(found, [0, 1, 1.1, 1, border, 0.5], rtol=0.01)
 
 
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 def test_checkerboard_of_speeds():
     """Shortest paths in a graph with 20 points on every edge, at most 0.1 % above the fastest ways."""
     mesh = flat_perturbed(shapes.grid(12), 0.25)

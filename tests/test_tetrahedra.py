@@ -282,8 +282,6 @@ def test_halved_tetrahedra():
     np.testing.assert_allclose(fine.measures.reshape(8, -1), np.tile(mesh.measures / 8, (8, 1)), rtol=1e-7)
     assert fine.facets.n_faces.max() == 2
     assert (fine.facets.n_faces == 1).sum() == 4 * (mesh.facets.n_faces == 1).sum()
-    with pytest.raises(ValueError, match="only tetrahedra in space can be halved"):
-        MetricSimplices.in_space(shapes.grid(2)).halved()
 
 
 def test_coarse_bodies_with_many_bends():

@@ -355,9 +355,9 @@ def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, lapl
     is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
     fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
     if fits or not (mesh.measures > 0).all():
-        # A flip may join a vertex with itself, which is no triangle in space.
-        is_loop = (np.roll(triangulation.F, 1, axis=1) == triangulation.F).any()
-        used = glued if is_loop else triangulation
+        # A flip may join a vertex with itself, or two that an edge joins already: no triangles in space.
+        ends = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
+        used = triangulation if len(ends) == len(mesh.edges) else glued
         simplices = MetricSimplices.of_sides(mesh.V, used.F, used.l, least)
     else:
         simplices = MetricSimplices.in_metric(mesh, g, least)

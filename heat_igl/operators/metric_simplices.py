@@ -20,6 +20,11 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 _ROUNDING = 1e-9
 # Rows and columns of the entries of a symmetric matrix on and above the diagonal.
 _ABOVE = np.triu_indices(3)
+# Corners of the parts of a simplex: its own, then the middles of its edges. The last four are of an octahedron.
+_PARTS = {
+    3: [[0, 3, 4], [3, 1, 5], [4, 5, 2], [5, 4, 3]],
+    4: [[0, 4, 5, 7], [4, 1, 6, 8], [5, 6, 2, 9], [7, 8, 9, 3], [5, 8, 4, 7], [5, 8, 7, 9], [5, 8, 9, 6], [5, 8, 6, 4]],
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,36 +154,35 @@ class MetricSimplices:
         lengths = kernel(corners, self.velocity, self.rows, *self.measured[:-1], self.place).edge_lengths()
         return ends.reshape(-1, 2), lengths.ravel()
 
-    def halved(self) -> MetricSimplices:
-        """Tetrahedra in space, each cut into eight at the middles of the edges; the vertices keep their numbers.
-
-        Raises
-        ------
-        ValueError
-            If these are triangles, or in a metric.
-        """
-        if not self.is_in_space or self.corners.shape[1] != 4:
-            raise ValueError("only tetrahedra in space can be halved")
-        ends, middle = self._middles()
-        ab, ac, bc, ad, bd, cd = self.n + middle.reshape(-1, 6).T
-        a, b, c, d = self.corners.T
-        # Four at the corners, and the octahedron between them around its diagonal from ac to bd.
-        around = [(ab, ad), (ad, cd), (cd, bc), (bc, ab)]
-        parts = [(a, ab, ac, ad), (ab, b, bc, bd), (ac, bc, c, cd), (ad, bd, cd, d)]
-        parts += [(ac, bd, one, other) for one, other in around]
-        corners = np.concatenate([np.stack(part, axis=1) for part in parts])
-        return MetricSimplices.in_space(Mesh(np.concatenate([self.place, self.place[ends].mean(axis=1)]), corners))
+    def halved(self, chosen: Any = slice(None)) -> MetricSimplices:
+        """Chosen simplices in their metric, all edges of which are halved; the vertices keep their numbers."""
+        corners, size, velocity = self.corners[chosen], self.corners.shape[1], None
+        lengths, group, rows = (None if x is None else x[chosen] for x in (self.lengths, self.group, self.rows))
+        cut: Any = lambda x: np.concatenate([x.take(part, axis=1) for part in _PARTS[size]])  # noqa: E731
+        ends, middle = _middles(corners)
+        place = np.concatenate([self.place, self.place[ends].mean(axis=1)])
+        corners = cut(np.concatenate([corners, self.n + middle.reshape(len(corners), -1)], axis=1))
+        lengths = None if lengths is None else np.tile(lengths / 2, (len(_PARTS[size]), 1))
+        group = None if group is None else np.tile(group, len(_PARTS[size]))
+        if self.velocity is not None and rows is not None:
+            one, other = np.tril_indices(size, -1)
+            here = self.velocity[rows]
+            velocity = np.concatenate([here, (here[:, one] + here[:, other]) / 2], axis=1).reshape(-1, 6)
+            rows = cut(np.arange(len(velocity), dtype=np.int32).reshape(len(here), -1))
+        return MetricSimplices(corners, len(place), place, self.least, lengths, self.tensors, group, velocity, rows)
 
     def halfway(self) -> sp.csr_array:
         """The weights (n + e, n) of the vertices in those of `halved`."""
-        ends, _ = self._middles()
+        ends, _ = _middles(self.corners)
         e, column = len(ends), np.concatenate([np.arange(self.n), ends.ravel()])
         row = np.concatenate([np.arange(self.n), self.n + np.repeat(np.arange(e), 2)])
         return sp.csr_array((np.repeat([1, 0.5], [self.n, 2 * e]), (row, column)), shape=(self.n + e, self.n))
 
-    def _middles(self) -> tuple[IntArray, IntArray]:
-        """The ends (e, 2) of each edge, and the edge of each of six sides of the tetrahedra."""
-        return np.unique(np.sort(self.edges[0], axis=1), axis=0, return_inverse=True)
+
+def _middles(corners: AnyArray) -> tuple[IntArray, IntArray]:
+    """The ends (e, 2) of each edge, and the edge of each side of the simplices."""
+    pairs = np.stack(np.tril_indices(corners.shape[1], -1), axis=1)
+    return np.unique(np.sort(corners[:, pairs].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
 
 
 def inverse_root(

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
-from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
-from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.operators.metric_simplices import inverse_root, symmetric
-from heat_igl.plan import MOST_TURNING, MOST_VARIATION
+from heat_igl.plan import HALVED_AROUND, MOST_CHANGE, MOST_CHANGE_AT_WORST, MOST_TURNING, MOST_VARIATION
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
-from heat_igl.typing import AnyArray, FloatArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-# Simplices of which it is asked how far the metric turns.
-_SAMPLE = 250
+_SAMPLE = 250  # tetrahedra of which it is asked how far the metric turns
 _ROUNDING = 1e-12
-# Determinants of singular tensors over their squared traces are rounding.
-_FLAT = 1e-15
 
 
 class HopfLaxEngine(SimplexEngine):
@@ -38,50 +32,51 @@ class HopfLaxEngine(SimplexEngine):
 
     def __init__(self, simplices: MetricSimplices) -> None:
         super().__init__(simplices)
-        varies = 100 * float(np.sqrt(simplices.measured[-1]))
-        turns = "the metric turns farther than the mesh resolves: over an edge, the ratio of its lengths in two "
-        turns += f"directions changes by a factor of {self.turning:.2g} or more at a tenth of the faces"
-        grows = "the metric varies farther than the mesh resolves: lengths of edges differ between the corners of a "
-        grows += f"face by {varies:.0f} % in the mean"
-        if self.turning > MOST_TURNING or varies > 100 * MOST_VARIATION:
+        self._doubted = 3  # so many of the next answers are checked
+
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
+        """As of all engines; the first answers come with a warning where the mesh does not resolve the metric."""
+        distance, labels = super().labelled(sources, cutoff, threads)
+        self._doubted -= 1
+        if self._doubted >= 0 and (complaint := self._complaint(sources, distance)):
+            self._doubted = 0
             warn_caller(
-                f"{turns if self.turning > MOST_TURNING else grows}, and distance may be wrong by several percent, and "
-                "by tens at single vertices: take a finer mesh",
+                f"the metric changes farther than the mesh resolves: {complaint}, and distance may be wrong by several "
+                "percent, and by tens at single vertices: take a finer mesh",
                 AccuracyWarning,
             )
+        return distance, labels
 
-    @cached_property
-    def turning(self) -> float:
-        """By how much the ratio of lengths in two directions changes over an edge, at a tenth of the simplices.
-
-        From a sample of the simplices: between the first corner of one, and a simplex that it meets in another, with
-        planes of triangles turned into each other. It is 1 where tensors differ by a factor alone, as those of speeds.
-        """
-        corners, place = self._simplices.corners, self._simplices.place
-        size = corners.shape[1]
-        chosen = np.arange(0, len(corners), len(corners) // _SAMPLE + 1)
-        one = np.repeat(chosen, size)
-        other, corner = np.divmod(self._incident[self._first[corners[chosen]]].ravel(), size)
-        first, two = self._simplices.metric(one, 0), self._simplices.metric(other, corner)
-        if size == 3:
-            x, y = (plane_axes(Mesh(place, corners[k])) for k in (one, other))
-            here, there = (np.cross(axes[:, 0], axes[:, 1]) for axes in (x, y))
-            w, cosine = np.cross(here, there), (here * there).sum(axis=1)
-            # Rodrigues' formula for the rotation that takes one normal to the other.
-            once = np.cross(w[:, None], x)
-            turned = x + once + np.cross(w[:, None], once) / np.maximum(1 + cosine, _ROUNDING)[:, None, None]
-            first, two = (axes @ g @ np.swapaxes(axes, 1, 2) for axes, g in ((x, first), (turned, two)))
-            # Triangles without area know no metric in their plane.
-            flat = ~np.all(
-                [np.linalg.det(g) > _FLAT * np.trace(g, axis1=1, axis2=2) ** 2 for g in (first, two)], axis=0
-            )
-            first[flat] = two[flat] = np.eye(2)
-            low, high = np.sort(np.linalg.eigvals(np.linalg.solve(first, two)).real).T
-        else:
+    def _complaint(self, sources: SourceSet, distance: FloatArray) -> str | None:
+        """How it shows that the mesh does not resolve the metric; None if it does."""
+        n, size, start, beyond = len(distance), self._corners.shape[1], sources.vertex_offset.min(), distance.copy()
+        if size == 4:
+            # Between the first corners of some tetrahedra, and others that these meet in.
+            chosen = np.arange(0, len(self._corners), len(self._corners) // _SAMPLE + 1)
+            other, corner = np.divmod(self._incident[self._first[self._corners[chosen]]].ravel(), 4)
+            first, two = self._simplices.metric(np.repeat(chosen, 4), 0), self._simplices.metric(other, corner)
             root = symmetric(inverse_root(first)[0])
-            low, high = inverse_root(root @ two @ root)[2].T
-        ratio = np.sqrt(np.maximum(high, _ROUNDING) / np.maximum(low, _ROUNDING))
-        return float(np.quantile(ratio.reshape(-1, size).max(axis=1), 0.9))
+            low, high = np.maximum(inverse_root(root @ two @ root)[2].T, _ROUNDING)
+            turns = np.quantile(np.sqrt(high / low).reshape(-1, 4).max(axis=1), 0.9)
+            if turns > MOST_TURNING:
+                return f"the ratio of two lengths changes by a factor of {turns:.2g} over edges at a tenth of them"
+            if (varies := np.sqrt(self._simplices.measured[-1])) > MOST_VARIATION:
+                return f"lengths of edges differ between the corners of a face by {100 * varies:.0f} % in the mean"
+            if n > HALVED_AROUND:
+                return None
+        # Shortest paths to the nearest vertices lie in the simplices around these and the sources.
+        beyond[sources.vertices] = np.inf
+        near = np.argpartition(beyond, min(HALVED_AROUND, n) - 1)[:HALVED_AROUND]
+        around = (*near, *sources.vertices[:HALVED_AROUND])
+        corners = np.concatenate([self._incident[self._first[v] : self._first[v + 1]] for v in around])
+        halved = HopfLaxEngine(self._simplices.halved(np.unique(corners // size)))
+        finer = SimplexEngine.labelled(halved, sources)[0][near]
+        near, finer = (x[np.isfinite(finer) & (finer > start)] for x in (near, finer))
+        change = 100 * np.append(np.abs(distance[near] - finer) / (finer - start), 0.0)
+        if change.mean() <= MOST_CHANGE and change.max() <= MOST_CHANGE_AT_WORST:
+            return None
+        by = f"{change.mean():.2g} % in the mean, and by {change.max():.2g} % at vertex {near[change.argmax()]}"
+        return f"if edges are halved, distance near the sources changes by {by}"
 
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:  # noqa: ARG002
         """Lower distance to that of second order; returns the rest of what `HopfLax.settle` finds."""
