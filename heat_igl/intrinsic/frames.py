@@ -250,8 +250,8 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
     mesh, n = tangent_surface(given), as_triangles(given, "tangent frames need").n_vertices
     triangulation = replace(intrinsic_triangulation(mesh), l=lengths_to_divide_by(mesh), lengthening=0.0)
     angles = polar_angles(triangulation)
-    sides = _unit(mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F])
-    face_normals = _unit(
+    sides = unit_vectors(mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F])
+    face_normals = unit_vectors(
         np.cross(mesh.V[mesh.F[:, 1]] - mesh.V[mesh.F[:, 0]], mesh.V[mesh.F[:, 2]] - mesh.V[mesh.F[:, 0]])
     )
     normal = _vertex_normals(mesh, angles, face_normals)
@@ -260,7 +260,7 @@ def tangent_frames(mesh: MeshLike) -> TangentFrames:
     return TangentFrames(x[:n], y[:n], normal[:n], angles, triangulation, sides, face_normals)
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
+def unit_vectors(vectors: FloatArray) -> FloatArray:
     """Vectors (..., 3) divided by their lengths; 0 stays 0."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
@@ -277,7 +277,7 @@ def _vertex_normals(mesh: Mesh, angles: PolarAngles, face_normals: FloatArray) -
     of_one[mesh.F[::-1].ravel()] = np.repeat(face_normals[::-1], 3, axis=0)
     lost &= of_one.any(axis=1)
     normal[lost] = of_one[lost]
-    return _unit(normal)
+    return unit_vectors(normal)
 
 
 def _first_axes(
@@ -288,7 +288,7 @@ def _first_axes(
     # Any axis across the normal, to begin with.
     least = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
     across: FloatArray = np.cross(np.cross(normal, least), normal)
-    any_x = _unit(across)
+    any_x = unit_vectors(across)
     any_y = np.cross(normal, any_x)
     corner = np.arange(mesh.F.size)
     vertex, edge = mesh.F.ravel(), (mesh.V[np.roll(mesh.F, -1, axis=1)] - mesh.V[mesh.F]).reshape(-1, 3)
@@ -304,7 +304,7 @@ def _first_axes(
     size = np.abs(total)
     total = np.divide(total, size, out=np.ones(n, complex), where=size > 1e-12 * mesh.edge_lengths.mean())
     used = mesh.referenced[:, None]
-    return np.where(used, _unit(total.real[:, None] * any_x + total.imag[:, None] * any_y), [1.0, 0.0, 0.0])
+    return np.where(used, unit_vectors(total.real[:, None] * any_x + total.imag[:, None] * any_y), [1.0, 0.0, 0.0])
 
 
 def checked_vectors(name: str, vectors: ArrayLike, k: int | None, size: int) -> FloatArray:

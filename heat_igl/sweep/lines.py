@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl.intrinsic.frames import unit_vectors
 from heat_igl.kernels.bodies.bends import bend_around
 from heat_igl.kernels.bodies.rays import Body
 from heat_igl.kernels.bodies.sight import look_around
@@ -51,9 +52,36 @@ class LineEngine(SimplexEngine):
 
     @cached_property
     def reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
-        """Edges around which ways bend (e, 2), directions out of the body (e, 3), and cosines to the walls (e,)."""
-        edges, outward, wall = reflex_edges(self._corners, self._body.sides_behind(), self._V)
-        return edges.astype(np.int32), outward, wall
+        """Boundary edges at which the inside takes more than half a turn, and edges where more than two walls meet.
+
+        Returns the edges (e, 2) int32; unit vectors (e, 3) out of the body, halfway between the two walls, zero where
+        more than two meet; and cosines (e,) of the angles between these vectors and the walls.
+        """
+        V, corners = self._V, self._corners
+        tetrahedron, corner = np.nonzero(self._body.sides_behind() < 0)
+        walls = np.sort(corners[tetrahedron[:, None], (corner[:, None] + [1, 2, 3]) % 4].astype(np.int64), axis=1)
+        inner = V[corners[tetrahedron, corner]]
+        # The sides of all walls, each with the wall's third corner and its normal that points inside.
+        normal = np.cross(V[walls[:, 1]] - V[walls[:, 0]], V[walls[:, 2]] - V[walls[:, 0]])
+        normal *= np.sign(np.einsum("ij,ij->i", normal, inner - V[walls[:, 0]]))[:, None]
+        sides = np.concatenate([walls[:, [0, 1]], walls[:, [0, 2]], walls[:, [1, 2]]])
+        third = np.concatenate([walls[:, 2], walls[:, 1], walls[:, 0]])
+        wall = np.tile(np.arange(len(walls)), 3)
+        first, of_side, counts = unique_rows(sides, len(V))
+        edges = sides[first]
+        tangent = unit_vectors(V[edges[:, 1]] - V[edges[:, 0]])[of_side]
+        along_wall = V[third] - V[sides[:, 0]]
+        along_wall = unit_vectors(along_wall - np.einsum("ij,ij->i", along_wall, tangent)[:, None] * tangent)
+        order = np.argsort(of_side, kind="stable")
+        begins = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        one, other = order[begins], order[begins + np.minimum(counts - 1, 1)]
+        sine = np.einsum("ij,ij->i", unit_vectors(normal[wall[one]]), along_wall[other])
+        outward = unit_vectors(along_wall[one] + along_wall[other])
+        outward[counts != 2] = 0
+        # The sides of a slit coincide, at a whole turn.
+        cosine = np.einsum("ij,ij->i", along_wall[one], along_wall[other])
+        bends = (counts > 2) | ((counts == 2) & ((sine < -_FLAT) | ((sine < _FLAT) & (cosine > 0))))
+        return edges[bends].astype(np.int32), outward[bends], np.einsum("ij,ij->i", along_wall[one], outward)[bends]
 
     @cached_property
     def _body(self) -> Any:
@@ -92,7 +120,7 @@ class LineEngine(SimplexEngine):
         """Distances and source vertices (n,) by number, lengths of ways (n,), and their slopes (n, 3 n)."""
         distance, label = self._begun(sources)
         vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
-        edges, way = self._ways(vertices, offset, distance, label)
+        edges, way = self._lower(vertices, offset, distance, label)
         self._keep_bounds(sources, distance, label)
         ends = np.where(label >= 0, vertices[label], np.arange(len(label)))
         length, slopes = line_slopes(self._V, ends, edges, way, distance)
@@ -109,14 +137,13 @@ class LineEngine(SimplexEngine):
             slopes = sp.csr_array(chosen @ finer_slopes + (sp.eye_array(n) - chosen) @ slopes)
         return distance, label, length, slopes
 
-    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> None:
-        """Lower distance to straight lines, and to ways of straight lines that bend around edges of the body."""
-        self._ways(vertices, offset, distance, label)
-
-    def _ways(
+    def _lower(
         self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray
     ) -> tuple[AnyArray, AnyArray]:
-        """As `_lower`; returns edges (e, 2), and the edge (n,) around which the way to each vertex bends last."""
+        """Lower distance to straight lines, and to ways of straight lines that bend around edges of the body.
+
+        Returns these edges (e, 2), and the edge (n,) around which the way to each vertex bends last.
+        """
         begin = distance.copy()
         order, nearest = self._from_near(vertices, offset)
         edges, outward, wall = self.reflex_edges
@@ -137,7 +164,7 @@ class LineEngine(SimplexEngine):
 
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         """As of all engines, without a list of edges: voxels have seven times as many as vertices."""
-        self._body.along_edges(distance, label, np.empty_like(distance))
+        self._body.along_edges(np.arange(len(distance)), distance, label, np.empty_like(distance))
 
 
 def nearest_in_value(V: FloatArray, places: FloatArray, offset: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -156,46 +183,6 @@ def nearest_in_value(V: FloatArray, places: FloatArray, offset: FloatArray) -> t
             # All other places are farther.
             left, k = left[(value[left] > far[:, -1]) & (k < len(places))], 2 * k
     return value, which
-
-
-def reflex_edges(corners: AnyArray, behind: AnyArray, V: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Boundary edges at which the inside takes more than half a turn, and edges where more than two walls meet.
-
-    Of tetrahedra (m, 4) with positions V (n, 3), and the tetrahedra (m, 4) behind the sides opposite their corners, -1
-    on the boundary. Returns the edges (e, 2); unit vectors (e, 3) out of the body, halfway between the two walls, zero
-    where more than two meet; and cosines (e,) of the angles between these vectors and the walls.
-    """
-    n = len(V)
-    tetrahedron, corner = np.nonzero(behind < 0)
-    walls = np.sort(corners[tetrahedron[:, None], (corner[:, None] + [1, 2, 3]) % 4].astype(np.int64), axis=1)
-    inner = V[corners[tetrahedron, corner]]
-    # The sides of all walls, each with the wall's third corner and its normal that points inside.
-    normal = np.cross(V[walls[:, 1]] - V[walls[:, 0]], V[walls[:, 2]] - V[walls[:, 0]])
-    normal *= np.sign(np.einsum("ij,ij->i", normal, inner - V[walls[:, 0]]))[:, None]
-    sides = np.concatenate([walls[:, [0, 1]], walls[:, [0, 2]], walls[:, [1, 2]]])
-    third = np.concatenate([walls[:, 2], walls[:, 1], walls[:, 0]])
-    wall = np.tile(np.arange(len(walls)), 3)
-    first, of_side, counts = unique_rows(sides, n)
-    edges = sides[first]
-    tangent = _unit(V[edges[:, 1]] - V[edges[:, 0]])[of_side]
-    along_wall = V[third] - V[sides[:, 0]]
-    along_wall = _unit(along_wall - np.einsum("ij,ij->i", along_wall, tangent)[:, None] * tangent)
-    order = np.argsort(of_side, kind="stable")
-    begins = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    one, other = order[begins], order[begins + np.minimum(counts - 1, 1)]
-    sine = np.einsum("ij,ij->i", _unit(normal[wall[one]]), along_wall[other])
-    outward = _unit(along_wall[one] + along_wall[other])
-    outward[counts != 2] = 0
-    # The sides of a slit coincide, at a whole turn.
-    cosine = np.einsum("ij,ij->i", along_wall[one], along_wall[other])
-    bends = (counts > 2) | ((counts == 2) & ((sine < -_FLAT) | ((sine < _FLAT) & (cosine > 0))))
-    return edges[bends], outward[bends], np.einsum("ij,ij->i", along_wall[one], outward)[bends]
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    """Rows of length 1; rows of zeros stay."""
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(lengths > 0, lengths, 1)
 
 
 class LineDerivative(SimplexDerivative):
@@ -272,8 +259,7 @@ def line_slopes(
 def _directions(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Unit vectors (k, c - 1, 3) back along lines through points (k, c, 3), 0 where two coincide, and lengths."""
     e = x[:, :-1] - x[:, 1:]
-    long = np.linalg.norm(e, axis=2)
-    return e / np.where(long > 0, long, 1)[..., None], long
+    return unit_vectors(e), np.linalg.norm(e, axis=2)
 
 
 def _shortest(X: FloatArray) -> FloatArray:

@@ -27,6 +27,22 @@ _NONE = cython.declare(cython.int, -3)
 _Offer = cython.struct(fit=cython.int, next=cython.int, asked=cython.int, value=cython.double)
 # As large as what a processor reads at once.
 _Met = cython.struct(fits=cython.int[14], count=cython.int, next=cython.int)
+# All that is known of an edge stands together, as it is read.
+_Edge = cython.struct(
+    tangent=cython.double[3],
+    end=cython.double[3],
+    length=cython.double,
+    fits=cython.double,
+    along=cython.double,
+    height=cython.double,
+    start=cython.double,
+    at=cython.double[5],
+    outward=cython.double[3],
+    across=cython.double[3],
+    wall=cython.double,
+    has_before=cython.double,
+    before=cython.double[2],
+)
 
 
 def bend_around(
@@ -47,7 +63,8 @@ def bend_around(
     A shortest way bends at edges of the body with more than half a turn inside, and nowhere else. Along such an edge,
     distance is that from a point beside it, turned into one plane; behind the edge, the plane is turned again. So an
     edge whose ends know their distances is a source. It is a candidate for the vertices around it, and for the
-    neighbours of those to which the way around it is the shortest.
+    neighbours of those to which the way around it is the shortest, unless a neighbour leads to them on a shorter way.
+    If vertices are left without a way, an edge with one end that knows its distance is a source as well.
 
     Vertices wait in the order of their first candidates. Before the line to the first edge is followed, edges that
     share an end with it become candidates, and if it is hidden, those at the triangle that hides it.
@@ -61,24 +78,28 @@ def bend_around(
     """
     n, e = body.positions.shape[0], edges.shape[0]
     ends = np.asarray(body.positions)[np.asarray(edges)]
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1, keepdims=True)
+    tangent = (ends[:, 1] - ends[:, 0]) / lengths
+    beyond, across = np.full((e, 5), np.inf), np.cross(tangent, outward)
+    known = [tangent, ends[:, 0], lengths, np.zeros((e, 4)), beyond, outward, across, np.asarray(wall)[:, None]]
+    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 3))], axis=1)
     one = _Bends(body, sources, offset, d, begin, label)
-    one.edges, one.outward, one.wall, one.beside, one.way = edges, outward, wall, beside, way
-    one.length, one.tangent = lengths, (ends[:, 1] - ends[:, 0]) / lengths[:, None]
-    one.at, one.before, one.has_before = np.full((e, 5), np.inf), np.zeros((e, 3)), np.zeros(e, np.uint8)
-    one.start, one.along, one.height, one.fits = np.zeros(e), np.zeros(e), np.zeros(e), np.zeros(e, np.uint8)
+    one.edges, one.beside, one.way = edges, beside, way
+    if e > 0:
+        one.edge = cython.cast(cython.pointer[_Edge], cython.address(table[0, 0]))
     one.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
     one.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
     one.fit_of = np.arange(e, dtype=np.int32) << _FIT_BITS
     one.newest, one.met = np.full((2, n), _NONE, np.int32)
-    one.met_by, one.waiting = np.full(e, _NONE, np.int32), PriorityQueue(n)
+    one.met_by, one.waiting, one.bound = np.full(e, _NONE, np.int32), PriorityQueue(n), np.array(d)
     one.line.lit = cython.address(one.way[0])
-    is_shorter = np.ones(n, bool)
+    unknown = np.ones(n, bool)
+    is_lone: cython.bint = False
     n_asked: cython.Py_ssize_t = 0
-    while is_shorter.any():
+    while unknown.any():
         with cython.nogil:
             for i in range(e):
-                one.begin_around(i)
+                one.begin_around(i, is_lone)
             while one.waiting.count > 0 and not one.failed:
                 n_asked += 1
                 if n_asked % ASK == 0 and is_interrupted():
@@ -87,12 +108,15 @@ def bend_around(
         raise_caught()
         if one.failed:
             raise MemoryError("no memory for the ways around edges of the body")
-        # Behind a point or an edge at which tetrahedra touch, no line continues.
         before = np.array(d)
-        if np.isinf(before).any():
-            body.along_edges(d, label, begin)
-        is_shorter = np.asarray(d) < before
-        np.asarray(way)[is_shorter] = -2
+        unknown = np.isinf(before)
+        if is_lone and unknown.any():
+            # Behind a point or an edge at which tetrahedra touch, no line continues.
+            corners = np.asarray(body.cells)[:, :4]
+            body.along_edges(np.unique(corners[unknown[corners].any(axis=1)]), d, label, begin)
+            unknown = np.asarray(d) < before
+            np.asarray(way)[unknown] = -2
+        is_lone = True
 
 
 @cython.final
@@ -101,7 +125,8 @@ class _Bends(Ray):
     """Edges of a body around which ways bend, the ways, and the edges that are candidates for them.
 
     Distance along an edge that `fits` is ``start + |(x - along, height)|``, x along the edge; at its ends, the quarters
-    and the middle it is `at`. `before` is the point from which the way comes to the middle, if it `has_before`.
+    and the middle it is `at`. The way comes to the middle from `before`, a place along `outward` and `across`, if it
+    `has_before`. No way to a vertex is longer than its `bound` (n,), by a neighbour.
 
     Of the way that was last asked for, `bend` (3,) is the point at which it bends last, and `share` the place of this
     point along the edge.
@@ -116,17 +141,7 @@ class _Bends(Ray):
     """
 
     edges: cython.const[cython.int][:, ::1]
-    outward: cython.const[cython.double][:, ::1]
-    wall: cython.const[cython.double][::1]
-    length: cython.double[::1]
-    tangent: cython.double[:, ::1]
-    at: cython.double[:, ::1]
-    before: cython.double[:, ::1]
-    has_before: cython.uchar[::1]
-    start: cython.double[::1]
-    along: cython.double[::1]
-    height: cython.double[::1]
-    fits: cython.uchar[::1]
+    edge: cython.pointer[_Edge]
     way: cython.int[::1]
     bend: cython.double[3]
     share: cython.double
@@ -144,6 +159,7 @@ class _Bends(Ray):
     n_most: cython.int
     failed: cython.bint
     waiting: PriorityQueue
+    bound: cython.double[::1]
     beside: cython.double
     line: Line
 
@@ -158,8 +174,8 @@ class _Bends(Ray):
         x: cython.double[3]
         a: cython.int = self.edges[i, 0]
         b: cython.int = self.edges[i, 1]
-        to_a: cython.double = self.d[a]
-        to_b: cython.double = self.d[b]
+        to_a: cython.double = min(self.d[a], self.d[b] + self.edge[i].length)
+        to_b: cython.double = min(self.d[b], self.d[a] + self.edge[i].length)
         for k in range(3):
             x[k] = 0.5 * (self.body.positions[a, k] + self.body.positions[b, k])
         self.turn_towards(a, x)
@@ -167,61 +183,63 @@ class _Bends(Ray):
         # The way to one end continues along the edge unless it is hidden at the other end.
         a_reaches: cython.bint = self.value(a, cython.address(self.body.positions[b, 0])) >= to_b * (1 - GAIN)
         b_reaches: cython.bint = self.value(b, cython.address(self.body.positions[a, 0])) >= to_a * (1 - GAIN)
-        self.at[i, 0], self.at[i, 4] = to_a, to_b
+        self.edge[i].at[0], self.edge[i].at[4] = to_a, to_b
         for j in range(1, 4):
             for k in range(3):
-                x[k] = self.body.positions[a, k] + 0.25 * j * self.length[i] * self.tangent[i, k]
-            from_a: cython.double = self.value(a, x)
-            from_b: cython.double = self.value(b, x)
+                x[k] = self.body.positions[a, k] + 0.25 * j * self.edge[i].length * self.edge[i].tangent[k]
             self.share = 0.25 * j
-            a_is_seen: cython.bint = a_reaches or self.is_lit_from(a, x)
-            b_is_seen: cython.bint = b_reaches or self.is_lit_from(b, x)
-            least: cython.double = min(from_a if a_is_seen else INFINITY, from_b if b_is_seen else INFINITY)
-            self.at[i, j] = least if least < INFINITY else max(from_a, from_b)
+            off: cython.double = 0.25 * j * self.edge[i].length
+            self.edge[i].at[j] = min(to_a + off, to_b + self.edge[i].length - off)
+            if a_reaches or self.is_lit_from(a, x):
+                self.edge[i].at[j] = min(self.edge[i].at[j], self.value(a, x))
+            if b_reaches or self.is_lit_from(b, x):
+                self.edge[i].at[j] = min(self.edge[i].at[j], self.value(b, x))
             if j == 2:
-                self.has_before[i] = self.way[a] > -2
+                self.edge[i].has_before = self.way[a] > -2
                 if self.way[a] >= 0:
                     self.around(self.way[a], x, True)
+                self.edge[i].before[0] = self.edge[i].before[1] = 0.0
                 for k in range(3):
                     if self.way[a] == -1:
                         self.bend[k] = self.body.positions[self.sources[self.label[a]], k]
-                    self.before[i, k] = self.bend[k]
+                    self.edge[i].before[0] += (self.bend[k] - self.edge[i].end[k]) * self.edge[i].outward[k]
+                    self.edge[i].before[1] += (self.bend[k] - self.edge[i].end[k]) * self.edge[i].across[k]
         self.lay_flat(i, a, b)
 
     @cython.cfunc
     @cython.nogil
     def lay_flat(self, i: cython.int, a: cython.int, b: cython.int) -> cython.void:
         """Find the point beside an edge from which distance along it is measured, and whether there is one."""
-        size: cython.double = self.length[i]
-        to_a: cython.double = self.at[i, 0]
-        middle: cython.double = self.at[i, 2] - to_a
-        to_b: cython.double = self.at[i, 4] - to_a
+        edge: cython.pointer[_Edge] = cython.address(self.edge[i])
+        size: cython.double = edge.length
+        to_a: cython.double = edge.at[0]
+        middle: cython.double = edge.at[2] - to_a
+        to_b: cython.double = edge.at[4] - to_a
         turn: cython.double = to_b - 2 * middle
         way_a: cython.int = self.way[a]
-        if way_a == -1 and self.way[b] == -1 and self.label[a] == self.label[b]:
-            self.start[i] = self.offset[self.label[a]] - to_a
-        elif turn > _STRAIGHT_FRONT * size:
-            self.start[i] = (to_b * to_b - 2 * middle * middle - 0.5 * size * size) / (2 * turn)
+        is_lit: cython.bint = way_a == -1 and self.way[b] == -1 and self.label[a] == self.label[b]
+        if turn > _STRAIGHT_FRONT * size and not is_lit:
+            edge.start = (to_b * to_b - 2 * middle * middle - 0.5 * size * size) / (2 * turn)
         elif way_a >= 0:
-            self.start[i] = self.start[way_a] - to_a
+            edge.start = self.edge[way_a].start - to_a
         elif way_a == -1:
-            self.start[i] = self.offset[self.label[a]] - to_a
+            edge.start = self.offset[self.label[a]] - to_a
         else:
-            self.start[i] = -size / _STRAIGHT_FRONT
-        self.start[i] = max(self.start[i], -size / _STRAIGHT_FRONT)
-        radius: cython.double = -self.start[i]
-        other: cython.double = to_b - self.start[i]
-        self.along[i] = 0.5 * ((radius - other) * (radius + other) / size + size)
-        squared: cython.double = radius * radius - self.along[i] * self.along[i]
-        self.fits[i] = radius >= 0 and other >= 0 and squared >= 0
-        self.start[i] += to_a
-        if not self.fits[i]:
+            edge.start = -size / _STRAIGHT_FRONT
+        edge.start = max(edge.start, -size / _STRAIGHT_FRONT)
+        radius: cython.double = -edge.start
+        other: cython.double = to_b - edge.start
+        edge.along = 0.5 * ((radius - other) * (radius + other) / size + size)
+        squared: cython.double = radius * radius - edge.along * edge.along
+        edge.fits = radius >= 0 and other >= 0 and squared >= 0
+        edge.start += to_a
+        if not edge.fits:
             return
-        self.height[i] = sqrt(squared)
+        edge.height = sqrt(squared)
         for j in range(1, 4):
-            off: cython.double = 0.25 * j * size - self.along[i]
-            if fabs(self.start[i] + sqrt(off * off + squared) - self.at[i, j]) > _MISFIT * size:
-                self.fits[i] = False
+            off: cython.double = 0.25 * j * size - edge.along
+            if fabs(edge.start + sqrt(off * off + squared) - edge.at[j]) > _MISFIT * size:
+                edge.fits = False
 
     @cython.cfunc
     @cython.nogil
@@ -255,36 +273,36 @@ class _Bends(Ray):
         self, i: cython.int, x: cython.pointer[cython.const[cython.double]], is_placed: cython.bint
     ) -> cython.double:
         """Length of the way to a point that bends around an edge last; if it `is_placed`, sets `bend` and `share`."""
+        edge: cython.pointer[_Edge] = cython.address(self.edge[i])
         away: cython.double = 0.0
         along: cython.double = 0.0
         for k in range(3):
-            off: cython.double = x[k] - self.body.positions[self.edges[i, 0], k]
+            off: cython.double = x[k] - edge.end[k]
             away += off * off
-            along += off * self.tangent[i, k]
+            along += off * edge.tangent[k]
         squared: cython.double = max(away - along * along, 0.0)
         best: cython.double = INFINITY
         place: cython.double = 0.0
         both: cython.double = 1.0
-        if self.fits[i]:
+        if edge.fits:
             height: cython.double = sqrt(squared)
-            both = height + self.height[i]
-            place = self.along[i] * height + along * self.height[i]
-            if 0 < place < both * self.length[i]:
-                best = self.start[i] + sqrt((along - self.along[i]) * (along - self.along[i]) + both * both)
+            both = height + edge.height
+            place = edge.along * height + along * edge.height
+            if 0 < place < both * edge.length:
+                best = edge.start + sqrt((along - edge.along) * (along - edge.along) + both * both)
         if best == INFINITY:
             both = 1.0
             for j in range(5):
-                if self.fits[i] and 0 < j < 4:
+                if edge.fits and 0 < j < 4:
                     continue
-                off = along - 0.25 * j * self.length[i]
-                through: cython.double = self.at[i, j] + sqrt(squared + off * off)
+                off = along - 0.25 * j * edge.length
+                through: cython.double = edge.at[j] + sqrt(squared + off * off)
                 if through < best:
-                    best, place = through, 0.25 * j * self.length[i]
+                    best, place = through, 0.25 * j * edge.length
         if is_placed:
-            self.share = place / (both * self.length[i])
+            self.share = place / (both * edge.length)
             for k in range(3):
-                end: cython.double = self.body.positions[self.edges[i, 0], k]
-                self.bend[k] = end + self.share * self.length[i] * self.tangent[i, k]
+                self.bend[k] = edge.end[k] + self.share * edge.length * edge.tangent[k]
         return best
 
     @cython.cfunc
@@ -305,12 +323,13 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def begin_around(self, i: cython.int) -> cython.void:
-        """Make an edge whose ends have distances, and shorter ones than before, a candidate for those around them."""
+    def begin_around(self, i: cython.int, is_lone: cython.bint) -> cython.void:
+        """Make an edge whose ends, or one if it `is_lone`, have shorter distances a candidate for those around them."""
         to_a: cython.double = self.d[self.edges[i, 0]]
         to_b: cython.double = self.d[self.edges[i, 1]]
-        is_new: cython.bint = self.at[i, 0] > to_a * (1 + GAIN) or self.at[i, 4] > to_b * (1 + GAIN)
-        if is_new and max(to_a, to_b) < INFINITY and self.fit_of[i] & _MOST_FITS < _MOST_FITS:
+        is_new: cython.bint = self.edge[i].at[0] > to_a * (1 + GAIN) or self.edge[i].at[4] > to_b * (1 + GAIN)
+        is_known: cython.bint = (min(to_a, to_b) if is_lone else max(to_a, to_b)) < INFINITY
+        if is_new and is_known and self.fit_of[i] & _MOST_FITS < _MOST_FITS:
             self.sought, self.met_by[i] = i, _NONE
             self.fit(i)
             self.fit_of[i] += 1
@@ -320,9 +339,12 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def offer_around(self, i: cython.int, u: cython.int) -> cython.void:
-        """Make an edge a candidate for the neighbours of u."""
+        """Make an edge a candidate for the neighbours of u, none of which is farther than along an edge from u."""
         for m in range(self.body.first_neighbour[u], self.body.first_neighbour[u + 1]):
-            self.offer(i, self.body.neighbours[m])
+            v: cython.int = self.body.neighbours[m]
+            if self.way[v] != -1 and self.bound[v] > self.d[u]:
+                self.bound[v] = min(self.bound[v], self.d[u] + self.body.apart(v, u))
+            self.offer(i, v)
 
     @cython.cfunc
     @cython.nogil
@@ -404,7 +426,9 @@ class _Bends(Ray):
     @cython.nogil
     def most(self, v: cython.int) -> cython.double:
         """What a way to v is to be shorter than; a vertex that sees a source passes on edges that are no better."""
-        return self.d[v] + _SLACK * self.body.reach[v] if self.way[v] == -1 else self.d[v] * (1 - GAIN)
+        if self.way[v] == -1:
+            return self.d[v] + _SLACK * self.body.reach[v]
+        return min(self.d[v] * (1 - GAIN), self.bound[v] + _MISFIT * self.body.reach[v])
 
     @cython.cfunc
     @cython.nogil
@@ -433,12 +457,8 @@ class _Bends(Ray):
             return
         i: cython.int = self.offers[k].fit >> _FIT_BITS
         value: cython.double = self.offers[k].value
-        if value >= self.d[v] * (1 - GAIN):
-            self.offers[k].value = INFINITY
-            self.offer_around(i, v)
-            self.shortest(v)
-            return
-        if not self.offers[k].asked:
+        is_longer: cython.bint = value >= self.d[v] * (1 - GAIN)
+        if not is_longer and not self.offers[k].asked:
             self.offers[k].asked = True
             self.mark_met(v)
             self.offer_at(self.edges[i, 0], v)
@@ -448,13 +468,15 @@ class _Bends(Ray):
         self.offers[k].value = INFINITY
         self.around(i, cython.address(self.body.positions[v, 0]), True)
         self.sought = i
-        if self.is_seen_by(v, self.bend):
+        if is_longer:
+            self.offer_around(i, v)
+        elif self.is_seen_by(v, self.bend):
             self.d[v], self.way[v] = value, i
             self.begin[v] = value - self.body.away(v, self.bend)
             self.label[v] = self.label[self.edges[i, 0 if self.share < 0.5 else 1]]
             self.offer_around(i, v)
             for m in range(self.first_at_end[v], self.first_at_end[v + 1]):
-                self.begin_around(self.at_end[m])
+                self.begin_around(self.at_end[m], False)
         else:
             self.mark_met(v)
             for c in range(1, 4):
@@ -470,29 +492,23 @@ class _Bends(Ray):
         the plane of the wall behind the edge. No line to the edge needs those below: each triangle that it passes
         through has a corner on the other side of the plane, and such corners are neighbours from one to the next.
         """
-        if self.outward[i, 0] == 0 and self.outward[i, 1] == 0 and self.outward[i, 2] == 0:
+        edge: cython.pointer[_Edge] = cython.address(self.edge[i])
+        if edge.outward[0] == 0 and edge.outward[1] == 0 and edge.outward[2] == 0:
             return True
-        before_out: cython.double = 0.0
-        before_side: cython.double = 0.0
         out: cython.double = 0.0
         side: cython.double = 0.0
         for k in range(3):
-            j: cython.int = (k + 1) % 3
-            m: cython.int = (k + 2) % 3
-            across: cython.double = self.tangent[i, j] * self.outward[i, m] - self.tangent[i, m] * self.outward[i, j]
-            y: cython.double = self.before[i, k] - self.body.positions[self.edges[i, 0], k]
-            off: cython.double = self.body.positions[v, k] - self.body.positions[self.edges[i, 0], k]
-            before_out += y * self.outward[i, k]
-            before_side += y * across
-            out += off * self.outward[i, k]
-            side += off * across
+            off: cython.double = self.body.positions[v, k] - edge.end[k]
+            out += off * edge.outward[k]
+            side += off * edge.across[k]
         near: cython.double = self.beside * self.body.reach[v]
-        below: cython.double = out - self.wall[i] * sqrt(out * out + side * side)
+        below: cython.double = out - edge.wall * sqrt(out * out + side * side)
         if below > _LEVEL * self.body.reach[v]:
             return False
-        if not self.has_before[i]:
+        if not edge.has_before:
             return True
-        if before_side < 0:
-            before_side, side = -before_side, -side
-        behind: cython.double = out * before_side - side * before_out
-        return side <= near and behind >= -near * sqrt(before_out * before_out + before_side * before_side)
+        side = side if edge.before[1] >= 0 else -side
+        behind: cython.double = out * fabs(edge.before[1]) - side * edge.before[0]
+        return side <= near and behind >= -near * sqrt(
+            edge.before[0] * edge.before[0] + edge.before[1] * edge.before[1]
+        )

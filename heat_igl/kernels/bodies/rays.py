@@ -112,14 +112,14 @@ class Body:
         """The distance of two vertices in space."""
         return self.away(v, cython.address(self.positions[u, 0]))
 
-    def along_edges(self, d: cython.double[::1], label: cython.int[::1], begin: cython.double[::1]) -> None:
-        """Lower distances `d` (n,) to paths along edges, in place; `begin` is where their last edge begins."""
+    def along_edges(self, first, d: cython.double[::1], label: cython.int[::1], begin: cython.double[::1]) -> None:
+        """Lower distances `d` (n,) to paths along edges from the `first` vertices; `begin` is where the last begins."""
         n: cython.int = d.shape[0]
         # A circular buffer: no vertex waits twice, so n places suffice.
-        waiting: cython.int[::1] = np.arange(n, dtype=np.int32)
-        is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
+        count: cython.int = len(first)
+        waiting: cython.int[::1] = np.resize(first, n).astype(np.int32)
+        is_waiting: cython.uchar[::1] = (np.bincount(first, minlength=n) > 0).astype(np.uint8)
         at: cython.int = 0
-        count: cython.int = n
         with cython.nogil:
             while count > 0:
                 v: cython.int = waiting[at]
