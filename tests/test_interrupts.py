@@ -18,8 +18,8 @@ from heat_igl.sweep import HopfLaxEngine, LineEngine
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer signals on this system")
 
 
-class StoppedError(Exception):
-    """What the handler raises."""
+class StoppedError(BaseException):
+    """What the handler raises. `Thread.start` cleans up after an `Exception`, though the thread has begun."""
 
 
 @pytest.fixture
