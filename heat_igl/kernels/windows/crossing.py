@@ -303,9 +303,10 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
     assert memcpy(s.to_left, windows, n * cython.sizeof(Window)) != cython.NULL
     i = n
     n = trim(s, windows, n, h)
-    # There are about 6 half-edges for each vertex, and once more lists have crossed, some must have crossed one again.
-    # On scans and spheres it is 3.1 to 3.8 for each vertex; to keep windows there as well takes 2 to 11 % longer.
-    if s.n_crossed > 6 * cython.cast(cython.longlong, s.n_touched):
+    # There are about 6 half-edges for each vertex, so by then each was crossed twice in the mean. On scans and spheres
+    # 3.1 to 3.8 lists cross for each vertex. With 6 in place of 12, windows are kept on spheres stretched by 1000 as
+    # well, which takes twice as long; with 24, searches on shapes stretched by 1e7 take 1.1 times as long.
+    if s.n_crossed > 12 * cython.cast(cython.longlong, s.n_touched):
         n = trim_by_kept(s, windows, n, h)
     assert is_covered(s, s.to_left, i, windows, n, h)
     apex = _opposite(s, h)
