@@ -1,7 +1,7 @@
 cdef extern from *:
     """
-    // Share of a facet by which the place moves in the last step of Newton's method, which leaves about its square.
-    #define PLACED 1e-4
+    // Share of |v - x| by which the value falls, to first order, in the last step of Newton's method; its square stays.
+    #define PLACED 1e-5
     """
     double PLACED
 

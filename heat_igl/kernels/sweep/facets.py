@@ -10,7 +10,7 @@ from cython.cimports.heat_igl.kernels.sweep.facets import (
     multiply,
     on_interval,
 )
-from cython.cimports.libc.math import INFINITY, asinh, fabs, sqrt
+from cython.cimports.libc.math import INFINITY, asinh, sqrt
 
 
 @cython.cclass
@@ -200,10 +200,11 @@ class Facet:
                 db = on_interval(self.g[1] - self.g[0], bend, -x[1], x[0])
             else:
                 db, de = self.on_triangle(x)
+            slope: cython.double = (self.g[1] - self.g[0]) * db + (self.g[2] - self.g[0]) * de
             # Nor is that at the next place, and with a quadratic function it is the least.
-            if best + (self.g[1] - self.g[0]) * db + (self.g[2] - self.g[0]) * de >= limit:
+            if best + slope >= limit:
                 return INFINITY
-            is_last = fabs(db) + fabs(de) <= PLACED
+            is_last = -slope <= PLACED * self.near
             for _half in range(1 if is_last else MOST_HALVINGS):
                 y[0], y[1], y[2] = max(x[0] - db - de, 0.0), max(x[1] + db, 0.0), max(x[2] + de, 0.0)
                 value: cython.double = self.value(y, self.length(y))

@@ -23,8 +23,7 @@ cdef class SimplexUpdate(Facet):
     cdef int[::1] label
     cdef const double[::1] offset
     cdef double low, most_sag
-    # The derivative of distance by the position of each vertex, where it is known; how far it was trusted in the metric
-    # of which row, or simplex if it has one metric.
+    # The derivative of distance by position, where known, and its trust in the metric of one row or simplex.
     cdef double[:, ::1] slope
     cdef double[::1] trusted
     cdef int[::1] trusted_in
