@@ -112,8 +112,8 @@ def bend_around(
         unknown = np.isinf(before)
         if is_lone and unknown.any():
             # Behind a point or an edge at which tetrahedra touch, no line continues.
-            corners = np.asarray(body.cells)[:, :4]
-            body.along_edges(np.unique(corners[unknown[corners].any(axis=1)]), d, label, begin)
+            is_beside = np.repeat(unknown, np.diff(body.first_neighbour))
+            body.along_edges(np.unique(np.asarray(body.neighbours)[is_beside]), d, label, begin)
             unknown = np.asarray(d) < before
             np.asarray(way)[unknown] = -2
         is_lone = True
