@@ -199,6 +199,7 @@ class Ray:
         else:
             return -2
         line.t, line.out = k >> 2, k & 3
+        line.p_x, line.tilt_x = line.sign * line.p_x, line.sign * line.tilt_x
         for i in range(3):
             line.x[i] *= line.sign
             line.has[i] = _has(line, line.corner[i])
@@ -329,7 +330,7 @@ def _step(body: Body, line: cython.pointer[Line]) -> cython.int:
         return 1
     at: cython.pointer[cython.const[cython.double]] = cython.address(body.positions[0, 0]) + 3 * o
     z: cython.double = at[line.up] - line.p_z
-    x: cython.double = line.sign * (at[line.east] - line.p_x - line.tilt_x * z)
+    x: cython.double = line.sign * at[line.east] - line.p_x - line.tilt_x * z
     y: cython.double = at[line.north] - line.p_y - line.tilt_y * z
     of_a: cython.double = x * line.y[0] - y * line.x[0]
     of_b: cython.double = x * line.y[1] - y * line.x[1]
