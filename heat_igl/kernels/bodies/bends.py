@@ -174,6 +174,11 @@ class _Bends(Ray):
         x: cython.double[3]
         a: cython.int = self.edges[i, 0]
         b: cython.int = self.edges[i, 1]
+        # A way may bend at an end that is not reached yet, equally short to rounding.
+        if self.d[a] == INFINITY:
+            self.label[a] = self.label[b]
+        if self.d[b] == INFINITY:
+            self.label[b] = self.label[a]
         to_a: cython.double = min(self.d[a], self.d[b] + self.edge[i].length)
         to_b: cython.double = min(self.d[b], self.d[a] + self.edge[i].length)
         for k in range(3):
