@@ -16,7 +16,7 @@ _LEVEL = cython.declare(cython.double, 1e-6)
 _MISFIT = cython.declare(cython.double, 1e-3)
 # Change of the slope along an edge below which a front is straight there.
 _STRAIGHT_FRONT = cython.declare(cython.double, 1e-7)
-# Share of the longest edge at a vertex that sees a source by which a way around an edge that it passes on is longer.
+# Share of the longest edge at a vertex by which a way that is passed on is longer than straight, or by a neighbour.
 _SLACK = cython.declare(cython.double, 0.02)
 # Times that distance along an edge is found, and that in bits.
 _MOST_FITS = cython.declare(cython.int, 63)
@@ -433,7 +433,7 @@ class _Bends(Ray):
         """What a way to v is to be shorter than; a vertex that sees a source passes on edges that are no better."""
         if self.way[v] == -1:
             return self.d[v] + _SLACK * self.body.reach[v]
-        return min(self.d[v] * (1 - GAIN), self.bound[v] + _MISFIT * self.body.reach[v])
+        return min(self.d[v] * (1 - GAIN), self.bound[v] + _SLACK * self.body.reach[v])
 
     @cython.cfunc
     @cython.nogil
