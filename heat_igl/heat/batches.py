@@ -126,7 +126,8 @@ class BatchedSolver(ABC):
             By heat, if it underflowed on the way, so that distances beyond are too short; if the answer is off by more
             than 3.5 % in the mean or 12.5 % of the largest distance at a vertex, compared with another engine, as the
             first three from such sources are; from points and curves on polygons, if it leaves bounds that need no
-            reference by so much that it is wrong (see `AnswerCheck`).
+            reference by so much that it is wrong (see `AnswerCheck`). By the Hopf-Lax formula, if the first three
+            answers show that the mesh does not resolve the metric.
         """
         limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
         (distance,), (check,) = self._answers([chosen], limit, n_threads())
