@@ -293,23 +293,6 @@ class GeodesicSolver(BatchedSolver):
         """The engine, its tolerance and the reason."""
         return self._plan
 
-    @property
-    def n_vertices(self) -> int:
-        """Length of a distance array."""
-        domain = self._domain
-        return domain.n_given if isinstance(domain, Operators) else domain.n_vertices
-
-    @property
-    def referenced(self) -> BoolArray:
-        """Mask (n,) of the vertices that a face uses."""
-        domain = self._domain
-        return (domain if isinstance(domain, Operators) else as_simplices(domain)).referenced[: self.n_vertices]
-
-    @property
-    def _n_faces(self) -> int:
-        domain = self._domain
-        return len(domain.weights) if isinstance(domain, Operators) else domain.n_faces
-
     def _nearer(self, vertex: int, than: FloatArray) -> FloatArray:
         """Distance (n,) from a vertex where it is smaller than `than` (n,), the distance from others; else ``inf``."""
         return np.asarray(self._with_copies(self._engine.nearer(self._source_set(vertex), than, n_threads())))
@@ -449,33 +432,10 @@ class GeodesicSolver(BatchedSolver):
             raise ValueError("targets inside faces need windows: leave method away, or name vertices")
         return self._engine.distance(chosen)[places]
 
-    def with_vertices(self, V: ArrayLike) -> GeodesicSolver:
-        """A new solver after the vertices have moved; this one stays as it is.
-
-        Parameters
-        ----------
-        V : (n, 3) array_like
-            New positions of all vertices.
-
-        Returns
-        -------
-        GeodesicSolver
-            With the same faces and options.
-
-        Raises
-        ------
-        MeshError
-            If `V` cannot be used; the message names the first offender.
-        ValueError
-            If the solver was made from operators.
-        """
+    def _moved(self, V: ArrayLike) -> GeodesicSolver:
         if isinstance(self._domain, Operators):
             raise ValueError("this solver was made from operators and has no vertices to move: make it again")
-        moved = self._domain.with_vertices(V)
-        solver = GeodesicSolver(moved, method=self._method, tolerance=self._tolerance)
-        if self._part is not None and isinstance(moved, Mesh):
-            solver._part = replace(self._part, mesh=moved)
-        return solver
+        return GeodesicSolver(self._domain.with_vertices(V), method=self._method, tolerance=self._tolerance)
 
     def _source_set(self, sources: Sources) -> SourceSet:
         part, domain, faces = self._part, self._domain, None

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence, Sized
+from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from heat_igl.errors import AccuracyWarning, SourceError, checked_cutoff, errors_at, names_guessed, shown, truth
+from heat_igl.mesh import Mesh, MeshPart, PointCloud, as_simplices
+from heat_igl.operators import Operators
 from heat_igl.runtime import (
     block_size,
     float_type,
@@ -23,12 +26,10 @@ from heat_igl.runtime import (
     warn_caller,
 )
 from heat_igl.sources import Sources, SourceSet
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from heat_igl.heat.checking import AnswerCheck  # loads the sweep
-    from heat_igl.mesh import Mesh, PointCloud
-    from heat_igl.operators import Operators
 
 
 class LabelledDistance(NamedTuple):
@@ -58,16 +59,28 @@ class BatchedSolver(ABC):
     """A solver for k sets of sources at a time, asked for any number of them."""
 
     _domain: Mesh | PointCloud | Operators
+    _part: MeshPart | None = None
 
     @property
-    @abstractmethod
     def n_vertices(self) -> int:
         """Length of a distance array."""
+        domain = self._domain
+        return domain.n_given if isinstance(domain, Operators) else domain.n_vertices
 
     @property
-    @abstractmethod
+    def referenced(self) -> BoolArray:
+        """Mask (n,) of the vertices that a face uses."""
+        domain = self._domain
+        return (domain if isinstance(domain, Operators) else as_simplices(domain)).referenced[: self.n_vertices]
+
+    @property
     def _n_faces(self) -> int:
         """Faces of the domain, by which the memory of a block is estimated."""
+        return len(self._domain.weights) if isinstance(self._domain, Operators) else self._domain.n_faces
+
+    @abstractmethod
+    def _moved(self, V: ArrayLike) -> Self:
+        """The solver on the same faces at other positions; errors are those of `with_vertices`."""
 
     @abstractmethod
     def _source_set(self, sources: Sources) -> SourceSet:
@@ -94,6 +107,34 @@ class BatchedSolver(ABC):
     def _complaint(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck | None) -> str | None:  # noqa: ARG002
         """The text of a warning about an answer (n,), if one is due; in the order of the sets, on one thread."""
         return None
+
+    def with_vertices(self, V: ArrayLike) -> Self:
+        """A new solver after the vertices have moved; this one stays as it is.
+
+        Parameters
+        ----------
+        V : (n, 3) array_like
+            New positions of all vertices.
+
+        Returns
+        -------
+        GeodesicSolver or HeatMethodSolver
+            With the same faces and options, and the same results as one made anew. By heat, the time step follows
+            `t_coef`, unless `t` was given, and what depends on the faces alone is shared: they are not validated, and
+            edges, boundary and components not found again; nor is the order of elimination, unless other edges are
+            flipped.
+
+        Raises
+        ------
+        MeshError
+            If `V` cannot be used; the message names the first offender.
+        ValueError
+            If the solver was made from operators.
+        """
+        solver = self._moved(V)
+        if self._part is not None and isinstance(solver._domain, Mesh):
+            solver._part = replace(self._part, mesh=solver._domain)
+        return solver
 
     @names_guessed
     def distance(self, sources: Sources, *, cutoff: float | None = None) -> FloatArray:

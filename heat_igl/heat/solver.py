@@ -19,7 +19,7 @@ from heat_igl.operators import Laplacian, Operators, edge_length_operators
 from heat_igl.plan import Plan
 from heat_igl.runtime import LOWEST_HEAT, warn_caller
 from heat_igl.sources import Sources, SourceSet, require_resolved, source_set
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray
+from heat_igl.typing import ArrayLike, FloatArray
 
 # A known distance that is longer than the integrated distance by more than this share of it comes from a source that is
 # not the nearest: integrated distance is wrong by less, by 1 to 4 % in the mean. It decides on the far corners of faces
@@ -95,7 +95,6 @@ class HeatMethodSolver(BatchedSolver):
     """
 
     _parts: SolverParts
-    _part: MeshPart | None = None
 
     @names_guessed
     def __init__(
@@ -170,40 +169,15 @@ class HeatMethodSolver(BatchedSolver):
         domain = edge_length_operators(F, lengths, n, options.laplacian, twin)
         return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
 
-    def with_vertices(self, V: ArrayLike) -> HeatMethodSolver:
-        """A new solver after the vertices have moved; this one stays as it is.
-
-        Parameters
-        ----------
-        V : (n, 3) array_like
-            New positions of all vertices.
-
-        Returns
-        -------
-        HeatMethodSolver
-            With the same faces and options, and the same results as one made anew. The time step follows `t_coef`,
-            unless `t` was given. What the faces alone say is shared: they are not validated, and edges, boundary and
-            components not found again; nor is the order of elimination, unless other edges are flipped.
-
-        Raises
-        ------
-        MeshError
-            If `V` cannot be used; the message names the first offender.
-        ValueError
-            If the solver was made from operators.
-        """
-        if isinstance(self._domain, Operators):
-            fans = self.operators.fans
-            if fans is None:
-                raise ValueError("this solver was made from operators and has no vertices to move: make it again")
-            positions = fans.polygons.triangles.with_vertices(V).V
-            return self._of(prepare_mesh(PolygonMesh(positions, fans.polygons.polygons), self._parts.options))
-        moved = self._domain.with_vertices(V)
-        options, known = self._parts.options, self._parts.analysis
-        solver = self._of(prepare_mesh(moved, options, known), moved)
-        if self._part is not None and isinstance(moved, Mesh):
-            solver._part = replace(self._part, mesh=moved)
-        return solver
+    def _moved(self, V: ArrayLike) -> HeatMethodSolver:
+        options, fans = self._parts.options, self.operators.fans
+        if not isinstance(self._domain, Operators):
+            moved = self._domain.with_vertices(V)
+            return self._of(prepare_mesh(moved, options, self._parts.analysis), moved)
+        if fans is None:
+            raise ValueError("this solver was made from operators and has no vertices to move: make it again")
+        positions = fans.polygons.triangles.with_vertices(V).V
+        return self._of(prepare_mesh(PolygonMesh(positions, fans.polygons.polygons), options))
 
     @classmethod
     def _of(cls, parts: SolverParts, mesh: Mesh | PointCloud | None = None) -> HeatMethodSolver:
@@ -245,11 +219,6 @@ class HeatMethodSolver(BatchedSolver):
     def n_vertices(self) -> int:
         """Length of a distance array: the vertices of the mesh. The operators may have more."""
         return self._parts.operators.n_given
-
-    @property
-    def referenced(self) -> BoolArray:
-        """Mask (n,) of the vertices that a face uses."""
-        return self.operators.referenced[: self.n_vertices]
 
     @property
     def _n_faces(self) -> int:
