@@ -65,16 +65,9 @@ def with_gaps_closed(tree: PointTree, F: IntArray, near: Neighbourhoods) -> tupl
 
     Gaps come after fans: where several fans meet, no single loop of outer edges passes the point.
 
-    Returns
-    -------
-    F : (k, 3) int32
-    doubtful : (d,) int64
-        Points that may belong to another sheet: at a gap from which one of the nearest points is many edges away, or at
-        triangles that bridge a gap.
-    apart : (a,) int64
-        Points that neither the stars nor the gaps join to the largest part.
-    along_one : int
-        Points on both sides of the longest gap that is bridged.
+    Also returns doubtful points (d,), which may belong to another sheet: they are at a gap from which one of the
+    nearest points is many edges away, or at triangles that bridge a gap; points (a,) that neither the stars nor the
+    gaps join to the largest part; and the number of points on both sides of the longest gap that is bridged.
     """
     P = tree.P
     F, is_gap = with_gaps_filled(P, F, _to_full(near) * near.reach)

@@ -152,24 +152,9 @@ def one_sheet(P: FloatArray, index: IntArray, principal: FloatArray) -> tuple[In
     both. The empty balls that touch a point are small between the sheets, and neighbours on the other sheet share no
     ball with it on the same side of both (Amenta and Bern 1999 estimate normals by such balls).
 
-    Parameters
-    ----------
-    P : (n, 3) float64
-        All points.
-    index : (b, k) int32
-        Neighbours, by distance and each point first. Only neighbours that are among the b points themselves are left
-        out.
-    principal : (b, 3, 3) float64
-        The principal axes of the neighbourhoods.
-
-    Returns
-    -------
-    index : (b, k) int32
-        The neighbours that stay, by distance; -1 after the last.
-    radius : (b,) float64
-        Distance of the farthest of them.
-    axes : (b, 3, 3) float64
-        Two tangents and the normal, in rows, orthonormal.
+    Each row of `index` (b, k) int32 is one of the points P (n, 3), then its neighbours by distance, and `principal`
+    (b, 3, 3) are the principal axes of these neighbourhoods. Returns `index`, `radius` and `axes` as `Neighbourhoods`
+    has them. Only neighbours that are among the b points themselves are left out.
     """
     directions = np.ascontiguousarray(_directions(_DIRECTIONS).T, np.float32)
     number = np.full(len(P), -1, np.int32)

@@ -15,24 +15,13 @@ def agreement(
 ):
     """In how many stars the triangles are, for the stars of the points P (n, 3) from `begin` to `end`.
 
-    Parameters
-    ----------
-    first : (n + 1,) int64
-        The star of point i has rows ``first[i]`` to ``first[i + 1]`` of `triangles`.
-    triangles : (s, 3) int32
-        The triangles of all stars, the point itself first.
-    is_closed : (n,) uint8
-        Whether a star goes all the way around its point.
+    The star of point i is the rows ``first[i]`` to ``first[i + 1]`` of `triangles` (s, 3), the point itself first in
+    each; `is_closed` (n,) tells whether it goes all the way around the point.
 
-    Returns
-    -------
-    count : (b,) uint8
-        For each row of these stars the number of stars that have the triangle, 1 to 3, in the star of its lowest point
-        that has it; 0 in the others.
-    radius : (b,) float64
-        Of the circle around a triangle that is in one or two stars; 0 in the other rows.
-    is_settled : (end - begin,) uint8
-        Whether the star of a point is closed, and all its triangles are in three stars.
+    Returns, for the b rows of these stars, `count` (b,) uint8, the number of stars that have the triangle (1 to 3; 0 in
+    all rows of it but the one in the star of its lowest point that has it), and the `radius` (b,) of the circle around
+    a triangle with a count of 1 or 2 (0 in other rows). Then, for each of these points, whether it is settled: its star
+    is closed, and all triangles of the star are in three stars.
     """
     offset: cython.Py_ssize_t = first[begin]
     counts, settled = np.zeros(first[end] - offset, np.uint8), np.empty(end - begin, np.uint8)

@@ -18,24 +18,12 @@ def roomiest_normals(
     Balls are tried along `directions` and opposite to them; those on the side of the largest are averaged, with weights
     r^4 for radius r.
 
-    Parameters
-    ----------
-    P : (n, 3) float64
-        All points.
-    index : (b, k) int32
-        Neighbours of some points, by distance and each point first.
-    axes : (b, 3, 3) float64
-        Orthonormal axes of each of these points, in rows.
-    directions : (3, m) float32
-        Unit vectors in all directions of a half space, along these axes, in columns; m is a multiple of 4.
+    Each row of `index` (b, k) int32 is one of the points P (n, 3), then its neighbours by distance; `axes` (b, 3, 3)
+    are orthonormal rows for each. The columns of `directions` (3, m) are unit vectors in a half space, by their
+    components along these axes; m is a multiple of 4.
 
-    Returns
-    -------
-    normals : (b, 3) float64
-        Of length 1.
-    radii : (b, 2) float64
-        Of the largest empty balls that touch the point along the normal, and opposite to it; no larger than the
-        neighbourhood.
+    Returns unit normals (b, 3), and the radii (b, 2) of the largest empty balls that touch the point along the normal
+    and opposite to it, no larger than the neighbourhood.
     """
     normals, radii = np.empty((index.shape[0], 3)), np.empty((index.shape[0], 2))
     normal: cython.double[:, ::1] = normals
@@ -169,23 +157,12 @@ def on_one_side(
     what separates balls is the surface. On the two sides of a thin part or of a narrow gap only those between the
     sheets do, which are opposite to each other as the normals have them.
 
-    Parameters
-    ----------
-    P : (n, 3) float64
-        All points.
-    index : (c, k) int32
-        Neighbours, each point first.
-    number : (n,) int32
-        Row of each point in `normals` and `radii`, -1 if it has none: such neighbours are on one sheet with all.
-    normals, radii : (b, 3) float64, (b, 2) float64
-        As `roomiest_normals` has them; normals may have either sign.
+    Each row of `index` (c, k) int32 is one of the points P (n, 3), then its neighbours by distance. `number` (n,) int32
+    is the row of each point in `normals` (b, 3), of either sign, and `radii` (b, 2), see `roomiest_normals`; -1 for
+    a point without a row, which is taken to be on the same sheet as all others.
 
-    Returns
-    -------
-    kept : (c, k) int32
-        Those that stay, in the same order; -1 after the last.
-    radius : (c,) float64
-        Distance of the last of them.
+    Returns `index` with the neighbours that stay, in the same order, and -1 after the last; and the distance (c,) of
+    the last.
     """
     found, distances = np.full((index.shape[0], index.shape[1]), -1, np.int32), np.empty(index.shape[0])
     kept: cython.int[:, ::1] = found

@@ -12,14 +12,9 @@ def turned_groups(
 ):
     """Which (n,) of n groups to turn, for pairs with weights that are negative if just one of both groups should be.
 
-    The weights of all pairs between two groups add up. In a round each group is joined to the one to which its join is
-    strongest for the sizes of both, if that is larger, or of the same size and a lower number, until nothing is joined.
-
-    Parameters
-    ----------
-    pairs : (k, 2) int32
-    weights : (k,) float64
-    sizes : (n,) int64
+    The weights (k,) of all pairs (k, 2) int32 between two groups add up. In a round each group is joined to the one to
+    which its join is strongest for the sizes (n,) of both, if that one is larger, or of the same size and a lower
+    number, until nothing is joined.
     """
     n: cython.Py_ssize_t = sizes.shape[0]
     k: cython.Py_ssize_t = pairs.shape[0]

@@ -20,14 +20,8 @@ def delaunay_stars(
     by distance. Triangles with a circumscribed circle of a radius above `largest` (n,) are left out, and neighbours
     whose normals have a product below `least_cosine` (n,).
 
-    Returns
-    -------
-    triangles : (s, 3) int32
-        Star by star, the point itself first, and around each point counterclockwise.
-    sizes : (end - begin,) int32
-        Number of triangles of each star.
-    is_closed : (end - begin,) uint8
-        Whether a star goes all the way around its point.
+    Returns the triangles (s, 3) int32, star by star, the point itself first and counterclockwise around it; and for
+    each star the number of its triangles, and whether it goes all the way around its point.
     """
     n: cython.Py_ssize_t = end - begin
     k: cython.Py_ssize_t = neighbours.shape[1]

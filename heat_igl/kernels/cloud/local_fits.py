@@ -8,21 +8,11 @@ from cython.cimports.libc.math import sqrt
 
 
 def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][:, ::1]):
-    """Tangents and normals of points, by principal components of their neighbourhoods.
+    """The principal axes of neighbourhoods, and the ratio (b,) of the two smaller variances.
 
-    Parameters
-    ----------
-    P : (n, 3) float64
-        All points.
-    index : (b, k) int32
-        Neighbours of some points, by distance and each point first.
-
-    Returns
-    -------
-    axes : (b, 3, 3) float64
-        Directions of most, less and least variance in rows, orthonormal.
-    bend : (b,) float64
-        Ratio of the two smaller variances.
+    Each row of `index` (b, k) int32 is a neighbourhood: one of the points P (n, 3), then its neighbours by distance.
+    The rows of the axes (b, 3, 3) are orthonormal: the directions of most, less and least variance. The last is the
+    normal.
     """
     found, bends = np.empty((index.shape[0], 3, 3)), np.empty(index.shape[0])
     bend: cython.double[::1] = bends
@@ -42,19 +32,8 @@ def tangent_planes(P: cython.const[cython.double][:, ::1], index: cython.const[c
 def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][:, ::1]):
     """Points moved along the normals of fitted planes onto quadrics that are fitted to their neighbours.
 
-    Parameters
-    ----------
-    P : (n, 3) float64
-        All points.
-    index : (b, k) int32
-        Some of them, each followed by neighbours, in any order.
-
-    Returns
-    -------
-    moved : (b, 3) float64
-        The new positions.
-    deviation : (b,) float64
-        Standard deviation of the neighbours from the quadric, in radii of the neighbourhood.
+    Each row of `index` (b, k) int32 is one of the points P (n, 3), then its neighbours in any order. Returns the new
+    positions (b, 3), and the standard deviation (b,) of the neighbours from the quadric, in radii of the neighbourhood.
     """
     b: cython.Py_ssize_t = index.shape[0]
     k: cython.Py_ssize_t = index.shape[1]

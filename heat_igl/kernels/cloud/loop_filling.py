@@ -69,27 +69,13 @@ def filling_triangles(
     than the largest admissible circumradius, come last, and are kept only if they close the loop; but beside a sparser
     part, where another side of the ear is longer, that of its end there counts.
 
-    Parameters
-    ----------
-    P : (n, 3) float64
-        Points.
-    F : (m, 3) int32
-        All triangles at the points of gaps.
-    twin : (3 m,) int32
-        The half-edge glued to each half-edge ``3 f + c``, which is opposite to corner c; negative on the boundary.
-    is_gap : (n,) bool
-        The points of gaps, ends of boundary edges.
-    largest : (n,) float64
-        Largest admissible circumradius of triangles at each point.
-    most_bent, most_folded : float
-        Largest admissible cosine of the dihedral angle to a neighbour, 1 for triangles folded onto each other: for
-        ears that are clipped first, and for ears that close a loop.
+    F (m, 3) int32 are all triangles at the points of gaps, of the points P (n, 3), and `twin` (3 m,) int32 the
+    half-edges glued to their half-edges ``3 f + c``, opposite to corner c, negative on the boundary. `is_gap` (n,)
+    tells which points are ends of boundary edges; `largest` (n,) is the largest admissible circumradius of triangles at
+    each point. `most_bent` and `most_folded` are the largest admissible cosines of the dihedral angle to a neighbour (1
+    for triangles folded onto each other): of ears that are clipped first, and of ears that close a loop.
 
-    Returns
-    -------
-    triangles : (t, 3) int32
-    is_whole : (t,) bool
-        Whether the triangle is in a loop that was filled completely, and joins no fans.
+    Returns the triangles (t, 3) int32, and whether each is in a loop that was filled completely, and joins no fans.
     """
     gaps = _Gaps()
     gaps.P, gaps.F, gaps.twin, gaps.is_gap, gaps.largest = P, F, twin, is_gap, largest

@@ -42,23 +42,10 @@ def nearest_points(
     places: cython.const[cython.double][:, ::1],
     k: cython.Py_ssize_t,
 ):
-    """The k points nearest to places, by distance.
+    """The k points nearest to each of some places (b, 3), by distance, and the distance (b,) of the last.
 
-    Those of the place before are a bound of the distance: places that are sorted like the points are found soonest.
-
-    Parameters
-    ----------
-    P, boxes : (n, 3), (2 m, 6) float64
-        Points, and their `tree_of_boxes`.
-    places : (b, 3) float64
-    k : int
-        At most n.
-
-    Returns
-    -------
-    index : (b, k) int32
-    distance : (b,) float64
-        Of the last of them.
+    There are k or more points P (n, 3), with their `tree_of_boxes`. The points found for one place bound the distance
+    for the next: the search is fastest for places that are sorted like the points. Returns indices (b, k) int32.
     """
     found, distances = np.empty((places.shape[0], k), np.int32), np.empty(places.shape[0])
     index: cython.int[:, ::1] = found
