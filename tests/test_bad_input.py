@@ -29,6 +29,7 @@ from heat_igl import (
     HeatMethodSolver,
     MeshError,
     OffsetSources,
+    PointCloud,
     PolygonMesh,
     SignedHeatSolver,
     SurfaceCurve,
@@ -68,7 +69,7 @@ BALL = heat_igl.shapes.icosphere(1)
 SOLVER = HeatMethodSolver(BALL)
 
 
-def changed(array: np.ndarray, at: tuple[int, int], value: Any) -> np.ndarray:
+def changed(array: np.ndarray, at: tuple[int, int | slice], value: Any) -> np.ndarray:
     array = array.copy()
     array[at] = value
     return array
@@ -243,7 +244,7 @@ RAGGED = [[1.0, 2.0], [3.0]]
 CURVE = SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0], [0.2, 0.2, 0.6]])
 CENTRE = [[1 / 3] * 3]
 GRID = heat_igl.shapes.grid(4)
-TRIANGLE, SQUARE = [[0, 1, 2]], V4[[0, 1, 3, 2]]
+TRIANGLE, SQUARE, ROW = [[0, 1, 2]], V4[[0, 1, 3, 2]], np.outer(np.arange(30), [1.0, 2, 3])
 BY_LENGTHS = GeodesicSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]])
 SPHERE, BOX, BOOK = heat_igl.shapes.icosphere(4), heat_igl.shapes.box(1), heat_igl.shapes.book(3, 2)
 TWISTED, TWO = moebius_strip(8, 1), twice(BALL)
@@ -252,7 +253,7 @@ LOOSE = heat_igl.Mesh([*GRID.V, [5, 5, 5]], GRID.F)
 VECTORS = heat_igl.VectorHeatSolver(BALL)
 WEST, SOLID = GRID.V[:, 0] < 0.6, np.ones((2, 2, 2), bool)
 AT, INSIDE = [[1, 0, 0]], SurfacePoints([7], [[0.2, 0.3, 0.5]])
-PULL_BACK, CLOUD = GeodesicSolver(BALL).distance_vjp(INSIDE)[1], heat_igl.PointCloud(BALL.V)
+PULL_BACK, CLOUD = GeodesicSolver(BALL).distance_vjp(INSIDE)[1], PointCloud(BALL.V)
 # A sphere with faces in one point, one whose vertices lie on a line, and one beside a sphere of another size.
 RING = np.isin(np.arange(42), BALL.F[(BALL.F == 0).any(axis=1)])
 POINTED = heat_igl.Mesh(np.where(RING[:, None], BALL.V[0], BALL.V), BALL.F)
@@ -280,6 +281,32 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         r"polygons\[1\] = \[0, 1\] needs three corners or more \(1 of 2",
     ),
     (lambda _: PolygonMesh(SQUARE, [[0, 1, 2, 4]]), r"polygons\[0\] = \[0, 1, 2, 4\] holds 4, which is no vertex"),
+    # Points without faces.
+    *(
+        (lambda _, P=P: PointCloud(P), pattern)
+        for P, pattern in (
+            (np.eye(3), "P has 3 points: a surface needs four or more"),
+            (np.empty((0, 3)), "P is empty"),
+            (np.ones((9, 3)), "all 9 points in P are equal"),
+            (ROW, "all 30 points in P lie on a line"),
+            (ROW + 1e6, "all 30 points in P lie on a line"),
+            (changed(BALL.V, (4, 0), np.nan), r"P\[4, 0\] = nan must .* \(1 of 126 are not.*: P\[numpy.isfinite"),
+            (np.zeros((9, 1)), r"P must have shape \(n, 3\), or \(n, 2\) in the plane, but .* \(9, 1\)"),
+            (1e70 * BALL.V, "P spans .* rescale P"),
+            ("scan.ply", "P must hold real numbers, .*; as_mesh takes files and clouds of other libraries"),
+        )
+    ),
+    *(
+        (lambda m, normals=normals: PointCloud(m.V, normals), pattern)
+        for normals, pattern in (
+            (changed(BALL.V, (2, 0), np.nan), r"normals\[2\] = \[nan, .* \(1 of 42 are"),
+            (changed(BALL.V, (5, slice(3)), 0), r"normals\[5\] = \[0.0, 0.0, 0.0\] must be .* \(1 of 42 "),
+            (BALL.V[:8], r"normals must have shape \(42, 3\)"),
+            (BALL.V * 1j, "normals must hold real numbers"),
+        )
+    ),
+    # No point has two neighbours on its own sheet.
+    (lambda _: GeodesicSolver(PointCloud(SQUARE, [X[0], -X[0]] * 2)), "no three points of P are neighbours on a sur"),
     (lambda _: PolygonMesh(SQUARE * 1e150, [[0, 1, 2, 3]]), "outside what areas in double precision allow"),
     # Points and curves on faces.
     (lambda _: SurfacePoints([0], [[0.5, 0.5, 0.1]]), r"barycentric\[0\] .* must sum to 1: it sums to 1\.1"),

@@ -24,6 +24,7 @@ from heat_igl.cluster.collection import SourcePlan, items
 from heat_igl.cluster.store import Store, rows_per_block
 from heat_igl.cluster.worker import Task, work
 from heat_igl.errors import BatchError
+from heat_igl.geodesic import SolverChoice
 
 pytest.importorskip("distributed")
 zarr = pytest.importorskip("zarr")
@@ -34,14 +35,8 @@ FAN = Mesh(
 )
 
 
-def expected(mesh: Mesh, source_sets, dtype="float32", method=None, **options):
-    is_heat = method == "heat" or options
-    solver = (
-        heat_igl.HeatMethodSolver(mesh, **options)
-        if is_heat
-        else heat_igl.GeodesicSolver(mesh, method=method or "auto")
-    )
-    return solver.distances(source_sets).astype(dtype)
+def expected(mesh: Mesh, source_sets, dtype="float32", **options):
+    return SolverChoice.of(**options).on(mesh).distances(source_sets).astype(dtype)
 
 
 @pytest.mark.parametrize("options", [{}, {"method": "sweep"}, {"dtype": "float64", "boundary": "average"}])

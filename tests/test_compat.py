@@ -1,6 +1,5 @@
 """The drop-in modules: the calls of libigl, potpourri3d, gdist and pygeodesic, and what they return."""
 
-import importlib.util
 import inspect
 from itertools import pairwise
 from typing import Any
@@ -16,8 +15,6 @@ from heat_igl import Mesh, MeshError, SourceError, shapes
 from heat_igl.compat import gdist, pygeodesic
 from heat_igl.compat import igl as drop_in
 from heat_igl.compat import potpourri3d as pp3d
-
-needs_potpourri3d = pytest.mark.skipif(importlib.util.find_spec("potpourri3d") is None, reason="needs potpourri3d")
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +123,6 @@ def test_arguments_and_defaults_are_theirs(peer, name):
 # --- potpourri3d: results ---------------------------------------------------------------------------------------------
 
 
-@needs_potpourri3d
 def test_distances_agree_within_the_error_of_heat(peer, ball):
     for sources in ([5], [5, 100, 333]):
         exact = np.arccos(np.clip(ball.V @ ball.V[sources].T, -1, 1)).min(axis=1)
@@ -154,7 +150,6 @@ def test_faces_that_repeat_a_vertex_are_left_out(ball):
         pp3d.GeodesicTracer(ball.V, faces)
 
 
-@needs_potpourri3d
 def test_transport_agrees_in_space(peer, ball):
     """Components differ with the frames, vectors in space do not."""
     V, F = np.array(ball.V), np.array(ball.F)
@@ -170,7 +165,6 @@ def test_transport_agrees_in_space(peer, ball):
     assert np.linalg.norm(found[0] - found[1], axis=1)[near].max() < 0.05
 
 
-@needs_potpourri3d
 @pytest.mark.parametrize("strategy", ["VectorHeat", "AffineLocal", "AffineAdaptive"])
 def test_log_maps_agree_in_space(peer, ball, strategy):
     """Ours is nearer to the polyhedral map: with all strategies, and in any frame."""
@@ -213,7 +207,6 @@ def test_scalars_are_extended(ball):
         pp3d.MeshVectorHeatSolver(ball.V, ball.F).extend_scalar([1, 22], [0.0])
 
 
-@needs_potpourri3d
 def test_paths_are_no_longer_than_theirs(peer, torus):
     V, F = np.array(torus.V), np.array(torus.F)
     ours, theirs = pp3d.EdgeFlipGeodesicSolver(V, F), peer.EdgeFlipGeodesicSolver(V, F)
@@ -235,7 +228,6 @@ def test_paths_are_no_longer_than_theirs(peer, torus):
         ours.find_geodesic_path(4, 4)
 
 
-@needs_potpourri3d
 def test_traced_geodesics_end_where_theirs_do(peer, torus):
     V, F = np.array(torus.V), np.array(torus.F)
     ours, theirs = pp3d.GeodesicTracer(V, F), peer.GeodesicTracer(V, F)
@@ -251,7 +243,6 @@ def test_traced_geodesics_end_where_theirs_do(peer, torus):
     assert len(ours.trace_geodesic_from_vertex(22, 9 * direction, max_iterations=2)) == 3
 
 
-@needs_potpourri3d
 def test_isolines_have_the_length_of_theirs(peer, torus):
     V, F, u = np.array(torus.V), np.array(torus.F), np.array(torus.V[:, 2])
     total = 0.0
@@ -267,7 +258,6 @@ def test_isolines_have_the_length_of_theirs(peer, torus):
     assert total == pytest.approx(theirs)
 
 
-@needs_potpourri3d
 def test_matrices_and_areas_are_theirs(peer, torus):
     V, F = np.array(torus.V), np.array(torus.F)
     for epsilon in (0.0, 0.01):
@@ -289,7 +279,6 @@ def latitude(ball: Mesh) -> np.ndarray:
     return np.arcsin(np.clip(ball.V[:, 2], -1, 1))
 
 
-@needs_potpourri3d
 @pytest.mark.parametrize("constraint", ["ZeroSet", "None", "Multiple"])
 def test_signed_distance_has_their_sign(peer, ball, constraint):
     """The north is on the left of the equator: positive."""
@@ -300,7 +289,6 @@ def test_signed_distance_has_their_sign(peer, ball, constraint):
         assert np.abs(found - latitude(ball)).max() < 0.03
 
 
-@needs_potpourri3d
 def test_fast_marching_has_their_sign_and_less_error(peer, ball):
     """The north is on the left of the equator: negative."""
     curve = [(v, []) for v in equator(ball)]
@@ -311,7 +299,6 @@ def test_fast_marching_has_their_sign_and_less_error(peer, ball):
     assert errors[0] < min(errors[1], 0.01)
 
 
-@needs_potpourri3d
 def test_fast_marching_begins_at_their_values(peer, ball):
     """At points of faces, in the middles of edges, at vertices; also below 0."""
     edge = pp3d.edges(ball.V, ball.F)[40]
@@ -326,7 +313,6 @@ def test_fast_marching_begins_at_their_values(peer, ball):
     assert found[0].min() < 0
 
 
-@needs_potpourri3d
 def test_signed_distance_of_polygons_and_points_is_negative_on_the_left(peer, ball):
     V, F, curve = np.array(ball.V), ball.F.tolist(), [equator(ball)]
     for module in (pp3d, peer):
@@ -448,14 +434,12 @@ def test_files_are_read_back_as_written(tmp_path, torus):
 
 
 def two_parts() -> Mesh:
-    square = shapes.grid(4)
-    return twice(square, 3)
+    return twice(shapes.grid(4), 3)
 
 
 @pytest.fixture(params=[lambda: bumpy(2), two_parts, lambda: shapes.torus(14, 9)], ids=["bumpy", "two parts", "torus"])
 def mesh(request):
-    made = request.param()
-    return made
+    return request.param()
 
 
 def arrays(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -548,7 +532,7 @@ def test_pygeodesic_path(mesh):
         length, path = algorithm.geodesicDistance(source, target)
         their_length, their_path = peer.geodesicDistance(source, target)
         assert length == pytest.approx(their_length, rel=1e-12)
-        assert np.linalg.norm(np.diff(path, axis=0), axis=1).sum() == pytest.approx(length, rel=1e-12)
+        assert lengths(path) == pytest.approx(length, rel=1e-12)
         np.testing.assert_allclose(path[[0, -1]], their_path[[0, -1]], atol=1e-12)
     assert algorithm.geodesicDistance(3, 3)[1].tolist() == mesh.V[[3]].tolist()
 

@@ -353,28 +353,20 @@ def flip(refined: Moved, move: int, faces: IntArray, barycentric: FloatArray) ->
 
 def test_points_are_carried_move_by_move(coarse):
     rng = np.random.default_rng(0)
-    fine = delaunay_refinement(coarse, coarse.n + 60)
-    refined = fine.history[-1]
+    refined = delaunay_refinement(coarse, coarse.n + 60).history[-1]
     assert isinstance(refined, Moved)
+    (flips,) = coarse.history  # flips alone
+    assert len(flips.kind) == coarse.n_flips > 10
     faces = rng.integers(len(coarse.F), size=200)
     barycentric = rng.dirichlet([1, 1, 1], 200)
-    expected_faces, expected = faces.copy(), barycentric.copy()
-    for move in range(len(refined.kind)):
-        (flip if refined.kind[move, 0] else split)(refined, move, expected_faces, expected)
-    found_faces, found = refined.carry(faces, barycentric)
-    assert np.array_equal(found_faces, expected_faces)
-    assert np.abs(found - expected).max() < 1e-9
-    assert (found_faces >= len(coarse.F)).mean() > 0.1
-    # Flips alone, the same way.
-    flipped = intrinsic_delaunay(intrinsic_triangulation(stretched()))
-    (flips,) = flipped.history
-    assert len(flips.kind) == flipped.n_flips > 10
-    expected_faces, expected = faces.copy(), barycentric.copy()
-    for move in range(len(flips.kind)):
-        flip(flips, move, expected_faces, expected)
-    found_faces, found = flipped.locate(faces, barycentric)
-    assert np.array_equal(found_faces, expected_faces)
-    assert np.abs(found - expected).max() < 1e-9
+    for moves in (refined, flips):
+        expected_faces, expected = faces.copy(), barycentric.copy()
+        for move in range(len(moves.kind)):
+            (flip if moves.kind[move, 0] else split)(moves, move, expected_faces, expected)
+        found_faces, found = moves.carry(faces, barycentric)
+        assert np.array_equal(found_faces, expected_faces)
+        assert np.abs(found - expected).max() < 1e-9
+    assert (refined.carry(faces, barycentric)[0] >= len(coarse.F)).mean() > 0.1
 
 
 def test_points_keep_their_distance_from_a_vertex(coarse, fine):
@@ -384,9 +376,7 @@ def test_points_keep_their_distance_from_a_vertex(coarse, fine):
     barycentric = np.array([1.0, 0, 0]) * (1 - near) + near * rng.dirichlet([1, 1, 1], 100)
     before = np.linalg.norm(np.einsum("kc,kcx->kx", barycentric, lay_out(coarse.l[faces])), axis=1)
     vertex = coarse.F[faces, 0]
-    history = fine.history[-1:]
-    for change in history:
-        faces, barycentric = change.carry(faces, barycentric)
+    faces, barycentric = fine.history[-1].carry(faces, barycentric)
     corners = lay_out(fine.l[faces])
     place = np.einsum("kc,kcx->kx", barycentric, corners)
     at = fine.F[faces] == vertex[:, None]
@@ -501,8 +491,6 @@ def test_obtuse_triangles_at_the_boundary_take_the_cover():
 
 
 def test_edge_lengths_alone_are_refined_too():
-    import igl
-
     mesh = stretched()
     by_lengths = HeatMethodSolver.from_edge_lengths(mesh.F, igl.edge_lengths(mesh.V, mesh.F), t_coef=0.5)
     assert by_lengths.n_vertices == mesh.n_vertices < by_lengths.operators.n

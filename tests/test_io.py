@@ -246,11 +246,9 @@ def test_ply_types_orders_and_further_elements(tmp_path, order, kind, mixed):
 # --- VTU and meshio ---------------------------------------------------------------------------------------------------
 
 
-@needs_meshio
 @pytest.mark.parametrize("failure", ["exit", "print", "exception"])
 def test_every_failure_of_meshio_is_a_mesh_error(tmp_path, monkeypatch, capfd, failure):
-    import meshio
-
+    meshio = pytest.importorskip("meshio")
     write_mesh(tmp_path / "a.vtu", shapes.grid(1))
     real = meshio.vtu.read
 
@@ -271,10 +269,8 @@ def test_every_failure_of_meshio_is_a_mesh_error(tmp_path, monkeypatch, capfd, f
     assert read_mesh(tmp_path / "a.vtu").n_faces == 2
 
 
-@needs_meshio
 def test_vtu_polygons_and_quadrilaterals(tmp_path):
-    import meshio
-
+    meshio = pytest.importorskip("meshio")
     meshio.vtu.write(str(tmp_path / "a.vtu"), meshio.Mesh(V4, [("quad", [[0, 1, 3, 2]]), ("line", [[0, 1]])]))
     assert same(read_mesh(tmp_path / "a.vtu"), V4, [[0, 1, 3], [0, 3, 2]])
 
@@ -410,9 +406,6 @@ def test_real_meshes_are_read_whole_and_written_back(tmp_path, name):
         assert same(read_mesh(tmp_path / f"a{extension}"), mesh.V, mesh.F)
 
 
-needs_nibabel = pytest.mark.skipif(importlib.util.find_spec("nibabel") is None, reason="needs nibabel")
-
-
 @pytest.fixture(scope="module")
 def mesh():
     return heat_igl.shapes.torus(9, 6)
@@ -442,11 +435,9 @@ def test_packed_files_have_the_same_bytes_each_time(tmp_path, mesh):
 # --- GIFTI and FreeSurfer ---------------------------------------------------------------------------------------------
 
 
-@needs_nibabel
 def test_a_cortex_comes_back_in_single_precision_to_nibabel_too(tmp_path, mesh):
-    import nibabel
-    from nibabel import freesurfer
-
+    nibabel = pytest.importorskip("nibabel")
+    read_geometry = nibabel.freesurfer.read_geometry
     distance = np.where(mesh.V[:, 0] > 1, np.inf, mesh.V[:, 0])
     heat_igl.write_mesh(tmp_path / "a.gii.gz", mesh, distance=distance)
     image = nibabel.GiftiImage.from_bytes(gzip.decompress((tmp_path / "a.gii.gz").read_bytes()))
@@ -455,18 +446,14 @@ def test_a_cortex_comes_back_in_single_precision_to_nibabel_too(tmp_path, mesh):
     for name in ("lh.pial.surf.gii", "lh.white", "rh.inflated"):
         heat_igl.write_mesh(tmp_path / name, mesh)
         back = heat_igl.read_mesh(tmp_path / name)
-        theirs = (
-            image.agg_data(("pointset", "triangle")) if ".gii" in name else freesurfer.read_geometry(tmp_path / name)
-        )
+        theirs = image.agg_data(("pointset", "triangle")) if ".gii" in name else read_geometry(tmp_path / name)
         for V, F in (theirs, (back.V, back.F)):
             assert np.array_equal(V, mesh.V.astype(np.float32))
             assert np.array_equal(F, mesh.F)
 
 
-@needs_nibabel
 def test_gifti_without_a_surface_lists_its_arrays(tmp_path, mesh):
-    import nibabel
-
+    nibabel = pytest.importorskip("nibabel")
     shape = nibabel.gifti.GiftiDataArray(np.zeros(3, np.float32), "NIFTI_INTENT_SHAPE")
     nibabel.GiftiImage(darrays=[shape]).to_filename(tmp_path / "a.shape.gii")
     with pytest.raises(MeshError, match=r"holds no surface, .* its arrays are shape"):
@@ -476,10 +463,8 @@ def test_gifti_without_a_surface_lists_its_arrays(tmp_path, mesh):
     assert not (tmp_path / "b.gii").exists()
 
 
-@needs_nibabel
 def test_scalars_on_two_surfaces_are_written_to_cifti(tmp_path, mesh):
-    import nibabel
-
+    nibabel = pytest.importorskip("nibabel")
     path, x = tmp_path / "a.dscalar.nii", np.where(mesh.V[:, 2] > 0, mesh.V[:, 0], np.nan)
     maps = {"cortex_left x": x, "cortex_left y": mesh.V[:, 1], "cortex_right x": x[::-1], "cortex_right y": x[::-1]}
     heat_igl.write_attributes(path, maps)
@@ -505,11 +490,9 @@ def test_scalars_on_two_surfaces_are_written_to_cifti(tmp_path, mesh):
     assert not (tmp_path / "b.dscalar.nii").exists()
 
 
-@needs_nibabel
 def test_maps_without_a_surface_are_read_and_matrices_take_them(tmp_path, mesh, capsys, monkeypatch):
-    import nibabel
-    from nibabel import cifti2
-
+    nibabel = pytest.importorskip("nibabel")
+    cifti2 = nibabel.cifti2
     monkeypatch.chdir(tmp_path)
     n = mesh.n_vertices
     inside, parcel = mesh.V[:, 2] > mesh.V[:, 2].min(), (mesh.V[:, 0] > mesh.V[:, 0].mean()).astype(float)
