@@ -18,9 +18,9 @@ in the mean and at worst: the defaults of `HeatMethodSolver` are chosen by this 
 from __future__ import annotations
 
 import argparse
-import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -28,10 +28,10 @@ from heat_igl import Mesh, read_mesh, reference
 from heat_igl.errors import AccuracyWarning, MeshError, MissingExtraError, ReferenceSolverError
 from heat_igl.heat.steps import HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.operators import operators
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 
-from harness import Query, Row, Table, collected, errors, geometric_mean, ours, parsed, publish
+from harness import Query, Row, Table, collected, drawn, errors, geometric_mean, ours, parsed, publish
 
 SUFFIXES = {".off", ".obj", ".ply", ".stl", ".mesh", ".msh"}
 FAILURES = (MeshError, MissingExtraError, ReferenceSolverError, ImportError, RuntimeError, ValueError)
@@ -41,19 +41,14 @@ LEAST = 0.01
 WRONG, RIGHT = 5, 2
 
 
-def native(function: Callable[[Mesh, int], FloatArray]) -> Callable[[Mesh], Query]:
-    """A reference, in a process that may crash."""
-    return lambda mesh: lambda source: function(mesh, int(source))
-
-
 METHODS: dict[str, Callable[[Mesh], Query]] = {
     "heat": ours("heat"),
     "sweep": ours("sweep"),
     "windows": ours("windows"),
-    "meshlab": native(reference.meshlab),
-    "meshlab_heat": native(reference.meshlab_heat),
-    "igl": native(reference.igl_heat),
-    "potpourri3d": native(reference.potpourri3d_heat),
+    "meshlab": lambda mesh: partial(reference.meshlab, mesh),
+    "meshlab_heat": lambda mesh: partial(reference.meshlab_heat, mesh),
+    "igl": lambda mesh: partial(reference.igl_heat, mesh),
+    "potpourri3d": lambda mesh: partial(reference.potpourri3d_heat, mesh),
 }
 
 
@@ -104,14 +99,13 @@ VARIANTS: dict[str, Callable[[Mesh], Query]] = {
 }
 
 
-def seeded_sources(mesh: Mesh, count: int = 3, seed: int = 7) -> IntArray:
+def seeded_sources(mesh: Mesh, count: int, seed: int) -> list[int]:
     """So many vertices, or all of fewer; of several components the first two get one each."""
-    usable = np.unique(mesh.F)
-    sources = np.random.default_rng(seed).choice(usable, min(count, len(usable)), replace=False)
+    sources, usable = drawn(mesh, count, seed), np.unique(mesh.F)
     _, first = np.unique(mesh.components[usable], return_index=True)
     if len(first) > 1 < len(sources):
-        sources[:2] = usable[first[:2]]
-    return np.asarray(sources, np.int64)
+        sources[:2] = usable[first[:2]].tolist()
+    return sources
 
 
 def meshes(options: argparse.Namespace) -> Iterator[tuple[str, str, Callable[[], Mesh]]]:
@@ -129,10 +123,10 @@ def meshes(options: argparse.Namespace) -> Iterator[tuple[str, str, Callable[[],
             yield "random members", f"{family} {seed}", lambda make=make, seed=seed: make(seed)
 
 
-def measured(query: Query, sources: IntArray, truths: Sequence[FloatArray]) -> Row:
+def measured(query: Query, sources: Sequence[int], truths: Sequence[FloatArray]) -> Row:
     """Mean and largest error, the largest excess below exact, and the number of warned answers."""
     found, n_warned, n_silent, n_in_vain = [], 0, 0, 0
-    for source, truth in zip(sources.tolist(), truths, strict=True):
+    for source, truth in zip(sources, truths, strict=True):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             distance = np.asarray(query(source), float)
@@ -154,7 +148,7 @@ def over_meshes(
         try:
             mesh = make()
             sources = seeded_sources(mesh, options.sources, options.seed)
-            truths = [reference.exact(mesh, int(source)) for source in sources]
+            truths = [reference.exact(mesh, source) for source in sources]
         except (*FAILURES, OSError) as error:
             reasons.append(f"- {name}: {error}")
             continue
@@ -214,4 +208,4 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -21,7 +21,6 @@ within 2 % and warn, other than of several parts. Needs ``bench``; see docs/clou
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -39,7 +38,7 @@ from heat_igl import GeodesicSolver, Mesh, PointCloud, VectorHeatSolver, log_map
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo import FAMILIES
 
-from harness import Query, Row, Table, collected, drawn, mean_error, named, on_sphere, parsed, publish, seconds
+from harness import Query, Row, Table, collected, drawn, errors, mean_error, named, on_sphere, parsed, publish, seconds
 
 Points = tuple[FloatArray, Query]
 Scan = Callable[[FloatArray, np.random.Generator], tuple[FloatArray, IntArray]]
@@ -172,13 +171,12 @@ def scans(options: argparse.Namespace) -> Iterator[Row]:
             row[shape] = {"warned": _surface(points)[1], "missing": 0}
             exact = {i: truth(int(kept[i]))[kept] for i in sources.tolist()}
             for method in ("default", "potpourri3d", "graph"):
-                query, errors = (_graph if method == "graph" else METHODS[method])(points), []
+                query, off = (_graph if method == "graph" else METHODS[method])(points), []
                 for i in exact:
                     found = query(i)[: len(kept)]
-                    there = (exact[i] > 0) & np.isfinite(found)
-                    errors.append(np.mean(np.abs(found - exact[i])[there] / exact[i][there]))
+                    off.append(errors(found, np.where(np.isfinite(found), exact[i], np.inf))["mean"])
                     row[shape]["missing"] = max(row[shape]["missing"], int((~np.isfinite(found)).sum()))
-                row[shape][method] = 100 * float(np.mean(errors))
+                row[shape][method] = float(np.mean(off))
         yield row
 
 
@@ -295,13 +293,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         | {"potpourri3d, %": "{potpourri3d:.2g}", "solver": "{solver:.2f}"}
         | {"solver and first query": "{both:.2f}", "later query": "{later:.2f}"},
         "scans": {"scan": "{scan}", "number": "{number}"} | {shape: scan.format(shape) for shape in options.shapes},
-        "warnings": {
-            "family": "{family}",
-            "wrong": "{wrong}",
-            "silent": "{silent}",
-            "right": "{right}",
-            "said": "{said}",
-        },
+        "warnings": {key: key for key in ("family", "wrong", "silent", "right", "said")},
         "log-maps": {"vertices of": "{vertices of}"}
         | {f"{m}, degrees, %": f"{{{m}[0]:.2g}}, {{{m}[1]:.2g}}" for m in ("heat", "paths", "potpourri3d")},
     }
@@ -312,4 +304,4 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -10,12 +10,9 @@ are means over the same rows, in percent. Needs the extra ``bench``. docs/region
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +22,7 @@ from scipy.spatial import ConvexHull
 
 import heat_igl
 from heat_igl import Mesh
+from heat_igl.runtime import PeakMemory
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 from harness import METHODS, Query, Row, Table, collected, errors, ours, parsed, publish
@@ -51,12 +49,11 @@ def in_a_process(call: Callable[[], object]) -> tuple[float, float, Any]:
     here, there = context.Pipe(duplex=False)
 
     def child() -> None:
-        held = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-        start = time.process_time()
-        found = call()
-        used = time.process_time() - start
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-        there.send((used, max(peak - held, 0) / 1e6, found))
+        with PeakMemory() as peak:
+            start = time.process_time()
+            found = call()
+            used = time.process_time() - start
+        there.send((used, (peak.bytes or 0) / 1e6, found))
 
     process = context.Process(target=child)
     process.start()
@@ -137,4 +134,4 @@ def main(argv: Sequence[str] | None = None) -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

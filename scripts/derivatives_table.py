@@ -11,7 +11,6 @@ that a `pull_back` takes at most.
 
 from __future__ import annotations
 
-import sys
 import tracemalloc
 from collections.abc import Callable, Sequence
 
@@ -129,4 +128,4 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

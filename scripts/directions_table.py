@@ -18,7 +18,6 @@ are the median over the calls, and that of the sums.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
@@ -71,8 +70,8 @@ def errors(found: FloatArray, truth: AnyArray, away: BoolArray) -> dict[str, flo
     off = 100 * np.abs(found @ [1, 1j] - truth) / np.abs(truth).mean()
     there = (truth != 0) & (np.abs(found).sum(axis=1) > 0)
     angle = np.degrees(np.abs(np.angle((found @ [1, 1j])[there] / truth[there])))
-    angles = {"median angle": float(np.median(angle)), "mean angle": float(angle.mean())}
-    return {"error": float(off.mean()), "away": float(off[away].mean())} | angles
+    vectors = {"vector error %": float(off.mean()), "away from the cut locus %": float(off[away].mean())}
+    return vectors | {"median angle": float(np.median(angle)), "mean angle": float(angle.mean())}
 
 
 def log_maps(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
@@ -81,7 +80,7 @@ def log_maps(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
 
     solver, peer = heat_igl.GeodesicSolver(mesh), potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
     x, y, _ = peer.get_tangent_frames()
-    found: dict[str, list[list[float]]] = {}
+    found: dict[str, list[dict[str, float]]] = {}
     gaps = []
     for source in sources:
         truth, straight = exact_log(mesh, source)
@@ -92,13 +91,12 @@ def log_maps(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
             world = peer.compute_log_map(source, strategy) @ np.stack([x[source], y[source]])
             ways[strategy] = tangent_frames(mesh).from_world(world, np.full(len(world), source))
         for way, log in ways.items():
-            found.setdefault(way, []).append(list(errors(log, truth, away).values()))
+            found.setdefault(way, []).append(errors(log, truth, away))
         ends = exp_map(mesh, source, ways["log_map"]).positions(mesh)
         gaps.append(np.linalg.norm(ends - mesh.V, axis=1)[straight].max() / np.abs(truth).max())
     for way, each in found.items():
-        heads = ("vector error %", "away from the cut locus %", "median angle", "mean angle")
-        row = {"mesh": name, "log map": way} | dict(zip(heads, np.mean(each, axis=0).tolist(), strict=True))
-        yield row | {"exp(log)": max(gaps) if way == "log_map" else ""}
+        means = {head: float(np.mean([one[head] for one in each])) for head in each[0]}
+        yield {"mesh": name, "log map": way} | means | {"exp(log)": max(gaps) if way == "log_map" else ""}
 
 
 def vector_heat(name: str, mesh: Mesh, sources: Sequence[int]) -> Row:
@@ -113,11 +111,8 @@ def vector_heat(name: str, mesh: Mesh, sources: Sequence[int]) -> Row:
     given = np.stack([np.einsum("kx,kx->k", world, axis[sources]) for axis in (x, y)], axis=1)
     there = theirs.transport_tangent_vectors(sources, given)
     there = ours.frames.from_world(there[:, :1] * x + there[:, 1:] * y)
-    here, truth, expected = (
-        ours.transport(sources, vectors),
-        near.transport(sources, vectors),
-        near.extend(sources, values),
-    )
+    here, truth = (solver.transport(sources, vectors) for solver in (ours, near))
+    expected = near.extend(sources, values)
 
     def turned(found: FloatArray, other: FloatArray) -> FloatArray:
         return np.degrees(np.abs(np.angle((found @ [1, 1j]) * (other @ [1, -1j]))))
@@ -261,4 +256,4 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

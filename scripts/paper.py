@@ -10,7 +10,6 @@ is drawn at random. Times depend on the machine; the rest does not, up to roundi
 
 from __future__ import annotations
 
-import sys
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -67,17 +66,8 @@ def distance(
 ) -> np.ndarray:
     """Section 3 from vertex 0, shifted so that the smallest value is 0, with one thing or another done differently.
 
-    Parameters
-    ----------
-    square : Square
-    dtype : type
-        Of every array and both solves.
-    t : float, optional
-        1.3 eps^2 by default.
-    safe_norm : bool
-        Divide each gradient by its largest entry before it is squared.
-    threshold : float
-        Shorter gradients count as zero, and X with them.
+    `dtype` is that of every array and both solves, and `t` is 1.3 eps^2 by default. With `safe_norm`, each gradient is
+    divided by its largest entry before it is squared. Where the gradient is shorter than `threshold`, X is zero.
     """
     L, M, G = (A.astype(dtype) for A in (square.L, square.M, square.G))
     t = 1.3 / square.i**2 if t is None else t
@@ -377,4 +367,4 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
