@@ -1,4 +1,4 @@
-"""pygeodesic's class (pygeodesic 0.1), with its names and arguments, computed by this package.
+"""Drop-in replacement for pygeodesic 0.1: the same names and arguments, computed by this package.
 
 ``import heat_igl.compat.pygeodesic as geodesic`` replaces ``import pygeodesic.geodesic as geodesic``. Both libraries
 compute exact distances and shortest paths on the polyhedral surface.
@@ -29,12 +29,12 @@ class PyGeodesicAlgorithmExact:
     points : (n, 3) array_like
         Positions.
     faces : (m, 3) array_like of int
-        Triangles. Vertices that no face uses are allowed.
+        Triangles. There may be vertices that no face uses.
 
     Raises
     ------
     MeshError
-        If the arrays are no triangle mesh; pygeodesic prints a line, and every query then returns None.
+        If the arrays are not a triangle mesh. pygeodesic prints a message instead, and all its queries return None.
 
     Examples
     --------
@@ -50,18 +50,19 @@ class PyGeodesicAlgorithmExact:
         self._surface = ExactSurface(from_mesh(self._mesh, 0))
 
     def geodesicDistance(self, sourceIndex: int, targetIndex: int) -> tuple[float, FloatArray]:
-        """Distance between two vertices, and the shortest path from the target to the source.
+        """The distance between two vertices, and the shortest path from the target to the source.
 
         Returns
         -------
         path_length : float
         path_points : (k, 3) float64
-            Where the path crosses edges and passes vertices, with both ends; one point if both are the same vertex.
+            The ends of the path, and the points between them where it crosses edges or passes through vertices. One
+            point if source and target are the same vertex.
 
         Raises
         ------
         SourceError
-            If an index is no vertex, where pygeodesic prints a line and returns None twice; or if there is no path.
+            If an index is not a vertex, or if there is no path. pygeodesic prints a message and returns (None, None).
         """
         source, target = (
             int(named_vertices(index, self._mesh.n_vertices, name)[0])
@@ -76,28 +77,28 @@ class PyGeodesicAlgorithmExact:
     def geodesicDistances(
         self, source_indices: Sources | None = None, target_indices: Sources | None = None, max_distance: float = np.inf
     ) -> tuple[FloatArray, AnyArray]:
-        """Distance of target vertices from the nearest source vertex, and which source that is.
+        """The distances of target vertices from the nearest source vertex, and which source is the nearest.
 
         Parameters
         ----------
         source_indices : (k,) array_like of int, optional
-            Vertex 0 if not given.
+            By default, vertex 0.
         target_indices : (t,) array_like of int, optional
-            All vertices if not given.
+            By default, all vertices.
         max_distance : float
-            What is farther is ``inf``. In pygeodesic, targets may be farther.
+            Larger distances are returned as ``inf``. pygeodesic may return larger distances at targets.
 
         Returns
         -------
         distances : (t,) float64
             ``inf`` at targets that no source reaches.
         best_sources : (t,) int32
-            Position in `source_indices`; as in pygeodesic, 0 where the distance is ``inf``.
+            Index into `source_indices`; as in pygeodesic, 0 where the distance is ``inf``.
 
         Raises
         ------
         SourceError
-            If an index is no vertex, where pygeodesic prints a line and returns None twice.
+            If an index is not a vertex. pygeodesic prints a message and returns (None, None).
         ValueError
             If `max_distance` is not a positive number.
         """
@@ -113,12 +114,14 @@ class PyGeodesicAlgorithmExact:
 
 
 def read_mesh_from_file(filename: str | PathLike[str]) -> tuple[FloatArray, IntArray]:
-    """Positions (n, 3) and triangles (m, 3) of a text file: a line of n and m, then a line for each of them.
+    """Read a text file: a line with n and m, then n lines of positions and m lines of triangles.
+
+    Returns the positions (n, 3) and the triangles (m, 3).
 
     Raises
     ------
     MeshError
-        If the file does not hold them, where pygeodesic prints a line and returns None.
+        If the file has another form. pygeodesic prints a message and returns None.
     """
     with open(filename, encoding="utf-8") as file:
         lines = [line.split() for line in file if line.strip()]

@@ -1,4 +1,4 @@
-"""Centroidal Voronoi diagrams: sites moved to the means of their cells."""
+"""Centroidal Voronoi diagrams: sites are moved to the centroids of their cells."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from heat_igl.runtime import over_rows
 from heat_igl.sources import Sources, distinct_vertices
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-# A site is moved by its step divided by the first of these that lowers the energy of its cell.
+# The step of a site is divided by each of these in turn; the first that lowers the energy of its cell is taken.
 _SHORTER = np.array([1, 2, 4, 8])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CentroidalSites:
-    """Sites that are about the means of their Voronoi cells.
+    """Sites near the centroids of their Voronoi cells.
 
     Attributes
     ----------
     sites : (k,) int64
         Vertices.
     labels : (n,) int64
-        Position in `sites` of the nearest site, the earlier of two equally near ones; -1 at vertices that no site
+        Index into `sites` of the nearest site, the lower one of two equally near sites; -1 at vertices that no site
         reaches.
     energies : (r + 1,) float64
-        The sum of area times squared distance from the nearest site before and after each of r rounds, falling.
+        The energy at the start and after each of r rounds, decreasing: the sum over the vertices of area times squared
+        distance from the nearest site.
 
     Examples
     --------
@@ -51,16 +52,16 @@ class CentroidalSites:
 
 
 def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> CentroidalSites:
-    """Spread sites evenly: move each towards the mean of its Voronoi cell until no move lowers the energy.
+    """Spread sites evenly: move each towards the centroid of its Voronoi cell until no move lowers the energy.
 
     Parameters
     ----------
     mesh : mesh
         Triangles, manifold and oriented alike.
     sites : sequence of int, or (n,) mask of bool
-        The vertices to begin with, for instance `farthest_points`.
+        The first sites, for instance those of `farthest_points`.
     rounds : int
-        At most so many.
+        The largest number of rounds.
 
     Returns
     -------
@@ -78,11 +79,12 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
 
     Notes
     -----
-    Lloyd's algorithm (1982) on the vertices, each with a third of the area of its faces, for the energy
-    sum of a_v d(v, nearest site)^2. The mean of a cell is the end of the mean of its log map at the site, at the
-    nearest corner. The site moves there if this is in the cell and lowers its energy, or else by a half, a quarter or
-    an eighth of the step. So the energy falls in every round, until no site moves. Distances and directions are exact,
-    see `GeodesicSolver.directions`, which a round calls once for each site, and again for shorter steps.
+    Lloyd's algorithm (1982) for the energy sum over v of a_v d(v, nearest site)^2, where the area a_v of a vertex is a
+    third of the area of its faces. The step of a site is the mean of its log map over the cell. The exponential map of
+    the step is a point in a face, and the site moves to the nearest corner of this face if the corner is in the cell
+    and lowers the energy of the cell. Otherwise a half, a quarter and an eighth of the step are tried. The energy
+    decreases in every round until no site moves. Distances and directions are exact: a round calls
+    `GeodesicSolver.directions` once for each site, and again for each corner that is tried.
 
     Examples
     --------
@@ -103,7 +105,7 @@ def centroidal_voronoi(mesh: MeshLike, sites: Sources, *, rounds: int = 50) -> C
 
 
 class _Relaxation:
-    """The solvers of a mesh, and the areas of its vertices."""
+    """Lloyd's algorithm on one mesh."""
 
     def __init__(self, given: MeshLike) -> None:
         self._mesh = mesh = as_simplices(given)
@@ -125,7 +127,7 @@ class _Relaxation:
         return CentroidalSites(sites, labels, np.array(energies))
 
     def _rows(self, sites: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Distances (k, n) from each site, and the angles (k, n) at which the paths leave there."""
+        """Distances (k, n) from each site, and the angles (k, n) at which the shortest paths leave the site."""
         rows, angles = np.empty((2, len(sites), self._mesh.n_vertices))
 
         def work(part: slice) -> None:
@@ -143,10 +145,7 @@ class _Relaxation:
         return labels, float(self._areas[reached] @ nearest[reached] ** 2)
 
     def _move(self, sites: IntArray, rows: FloatArray, angles: FloatArray, steps: FloatArray, labels: IntArray) -> bool:
-        """Move each site by its step or a shorter one if this lowers the energy of its cell; whether any site moves.
-
-        The distances and angles of sites that move are replaced, too.
-        """
+        """Move the sites in place, with their `rows` and `angles`, where this lowers the energy; whether one moved."""
         tried = (steps[:, None] / _SHORTER[:, None]).reshape(-1, 2)
         ends = self._tracer.exp(np.repeat(sites, len(_SHORTER)), tried)
         corners = self._mesh.F[ends.faces, ends.barycentric.argmax(axis=1)].reshape(-1, len(_SHORTER))
@@ -154,7 +153,7 @@ class _Relaxation:
         def moves(i: int) -> bool:
             cell = labels == i
             for corner in dict.fromkeys(corners[i].tolist()):
-                # Inside the cell, so that no two sites meet.
+                # A site stays inside its cell, so that no two sites meet.
                 if corner != sites[i] and cell[corner]:
                     found = self._solver.directions(corner)
                     if self._of_cell(found.distance, cell) < self._of_cell(rows[i], cell):

@@ -1,4 +1,4 @@
-"""Orientation of the triangles of a cloud, like the normals, and the cover with two sides of those that have none."""
+"""Consistent orientation of the triangles of a point cloud, and the orientation double cover of a surface."""
 
 from __future__ import annotations
 
@@ -12,31 +12,33 @@ from heat_igl.mesh.connectivity import pinched_vertices
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-# Cosine of the angle at an edge, -1 where the two triangles are flat, below which nothing tells a wrong join. With
-# -0.99 errors on 25 surfaces are the same in the mean; with -0.5 wrong joins at a narrow part count as flat.
+# An edge is flat if the cosine of its dihedral angle, -1 for coplanar triangles, is below this; wrong joins between
+# sheets show at other edges. With -0.99 mean errors on 25 surfaces are equal; with -0.5 wrong joins at a narrow part
+# count as flat.
 _FLAT = -0.9
-# Power of half of 1 - cosine that weighs edges on folds, which join sheets wrongly more often than flat ones. No power
-# is best: on the vertices of cheburashka, cow, camelhead, teapot, truck and a gearbox, 100, 100, 100, 87, 72 and 64 %
-# of the triangles are oriented as on the mesh with 2, and 88, 100, 100, 88, 76 and 67 % with 4; 6 is within 1 % of both
-# in the mean, and 1 and 3 are down to 58 % on the teapot.
+# An edge has the weight ((1 - cosine of the dihedral angle) / 2) ** _POWER: folds join sheets wrongly more often than
+# flat edges do. No power is best: on the vertices of cheburashka, cow, camelhead, teapot, truck and a gearbox, 100,
+# 100, 100, 87, 72 and 64 % of the triangles are oriented as on the mesh with 2, and 88, 100, 100, 88, 76 and 67 % with
+# 4; 6 is within 1 % of both in the mean, and 1 and 3 are down to 58 % on the teapot.
 _POWER = 2
 
 
 def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[IntArray, IntArray]:
-    """The triangles F (m, 3) int32, neighbours oriented alike and each part like most of the normals (n, 3).
+    """Orient the triangles F (m, 3) int32 consistently, and each component like the majority of the normals (n, 3).
 
-    Also returns the points (k,) at edges where neighbours still contradict each other and are not flat.
+    Returns the oriented triangles, and the points (k,) of edges that are not flat and whose two triangles are still
+    oriented inconsistently.
 
-    Where triangles join sheets wrongly, no orientation may suit all neighbours. Then groups are joined, two at a time,
-    in the relative orientation that more of the edges between them want, weighted by flatness, the strongest joins for
-    their sizes first: a narrow bridge between sheets is among the last, and turns no part of a sheet around. Of each
-    pair that still contradicts, one triangle is left out, unless most are flat, as on a surface with one side.
+    Where triangles join two sheets wrongly, there may be no consistent orientation. Then groups of triangles are
+    merged, two at a time, in the relative orientation for which the edges between them have the larger weight. The
+    merge with the largest weight for its size comes first, so that a narrow bridge between two sheets comes late and
+    turns no part of a sheet. One triangle of each pair that remains inconsistent is removed, unless most of these
+    pairs are flat, as they are on a surface with one side.
     """
     is_turned, part, pairs, folds = _turned(P, F)
+    # Of each inconsistent pair, the triangle that is in more of these pairs.
     count, (a, b) = np.bincount(pairs.ravel(), minlength=len(F)), pairs.T
-    # Of each pair, the triangle that is in more of them.
     left_out = np.where(count[a] > count[b], a, b)
-    # On a surface with one side, neighbours contradict each other where it is flat.
     if len(left_out) and np.median(folds) > _FLAT:
         F, is_turned, part = np.delete(F, left_out, 0), np.delete(is_turned, left_out), np.delete(part, left_out)
         pairs, folds = pairs[:0], folds[:0]
@@ -50,7 +52,7 @@ def oriented(P: FloatArray, F: IntArray, normals: FloatArray | None) -> tuple[In
 
 
 def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, FloatArray]:
-    """Which of the triangles F (m, 3) to turn, their parts (m,), and pairs (k, 2) that contradict, with folds."""
+    """Which triangles (m,) to turn, their components (m,), the pairs (k, 2) still inconsistent, and their `_folds`."""
     first, second, runs_alike = glued_sides(F, len(P))
     pairs = np.stack([first // 3, second // 3], axis=1)
     part, is_turned = _parts(pairs, runs_alike, len(F))
@@ -58,8 +60,9 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
     if (part[0] == part[1]).any():
         folds = _folds(P, F, pairs, runs_alike)
         weight = ((1 - folds) / 2) ** _POWER
-        # Triangles without a fold join first, but for those around a surface with one side. A wrong join between sheets
-        # bends where it begins; along its flat edges alone it would join them once and for all.
+        # Triangles without a bent edge are merged first, except around a surface with one side. A wrong join between
+        # sheets has a bent edge where it begins; if its flat edges counted here, one sheet would be oriented by the
+        # other.
         a, b = pairs.T
         is_bent, bent = np.zeros(len(F), bool), folds >= _FLAT
         is_bent[a[bent]] = is_bent[b[bent]] = True
@@ -76,10 +79,11 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
 
 
 def _parts(pairs: IntArray, runs_alike: BoolArray, m: int) -> tuple[IntArray, BoolArray]:
-    """Parts (2, m) of both sides of m triangles, glued where pairs (k, 2) of these are, and which triangles to turn.
+    """Components (2, m) of the double cover of m triangles, fronts in row 0 and backs in row 1, and which to turn.
 
-    Row 0 has the sides that triangles show, row 1 the others. A part of the surface that can be oriented has two parts
-    of its sides, and the triangles that are on another than the first triangle of the part are turned.
+    `pairs` (k, 2) are the neighbours, and `runs_alike` (k,) are those with the same direction along their common edge,
+    which makes them inconsistent. An orientable component of the surface has two components in the cover; a triangle is
+    turned if its front is in another one than that of the first triangle.
     """
     a, b = pairs.T
     same, other = b + m * runs_alike, b + m * ~runs_alike
@@ -89,20 +93,20 @@ def _parts(pairs: IntArray, runs_alike: BoolArray, m: int) -> tuple[IntArray, Bo
 
 
 def _folds(P: FloatArray, F: IntArray, pairs: IntArray, runs_alike: BoolArray) -> FloatArray:
-    """Cosine (k,) of the angle between neighbours around their edge: -1 where they are flat, 1 where they fold back."""
+    """Cosine (k,) of the dihedral angle between neighbours: -1 if they are coplanar, 1 if one lies on the other."""
     normal = igl.per_face_normals(P, F, np.zeros(3))
     ends = (normal.take(end, axis=0) for end in pairs.T)
     return np.asarray(np.einsum("kx,kx->k", *ends) * np.where(runs_alike, 1, -1))
 
 
 def is_oriented_manifold(surface: Mesh) -> bool:
-    """Whether neighbours of a surface with at most two faces at an edge run alike, and no point has several fans."""
+    """Whether a surface with at most two faces per edge is oriented consistently, with one fan of faces per vertex."""
     F, n = surface.F, surface.n_vertices
     return not (glued_sides(F, n)[2].any() or len(pinched_vertices(F, n)))
 
 
 def _points_between(F: IntArray, pairs: IntArray) -> IntArray:
-    """The points (k,) that both triangles of a pair have."""
+    """The common points (k,) of the two triangles of each pair."""
     common = (F[pairs[:, 0], :, None] == F[pairs[:, 1], None]).any(axis=2)
     return np.unique(F[pairs[:, 0]][common])
 
@@ -116,23 +120,17 @@ def folded_points(surface: Mesh) -> IntArray:
 
 
 def two_sided_cover(surface: Mesh) -> Mesh:
-    """Both sides of a surface, glued where its neighbours are: the orientation cover.
+    """The orientation double cover of a surface with m triangles, n vertices and at most two triangles per edge.
 
-    The surface has m triangles on n vertices, at most two at an edge. Neighbours need not be oriented alike, and a
-    vertex may have several fans of triangles.
-
-    Returns
-    -------
-    Mesh
-        2 m triangles: face f of the surface, and as m + f the same from the other side. Vertex v is on the largest fan
-        around v, and v + n on the other side of it; smaller fans have vertices of their own, from 2 n on, so that
-        each vertex has one fan. Where the surface can be oriented, the sides are two parts; where it cannot, a path
-        may lead from one to the other.
+    Neighbours may be oriented inconsistently, and a vertex may have several fans of triangles. The cover has 2 m
+    triangles: f is the front of triangle f, and m + f its back. Vertex v is in the largest fan around v, and n + v in
+    the back of this fan. Smaller fans get vertices of their own, from 2 n on, so that each vertex has one fan. The
+    cover of an orientable component has two components; the cover of a component with one side is connected.
     """
     F, n = surface.F, surface.n_vertices
     first, second, runs_alike = glued_sides(F, n)
-    # Corner h of one side is h, and of the other side h + 3 m. Where both triangles run along their edge, a path goes
-    # from one side to the other.
+    # Corner h is h in front, and h + 3 m on the back. If two neighbours are inconsistent, the front of one is glued to
+    # the back of the other.
     pairs = []
     for end in (1, 2):
         a, b = corner(first, end), corner(second, np.where(runs_alike, end, 3 - end))
@@ -143,7 +141,7 @@ def two_sided_cover(surface: Mesh) -> Mesh:
     fan = components(np.concatenate(pairs), 2 * F.size)
     first_corner, size = np.unique(fan, return_index=True, return_counts=True)[1:]
     of_fan, on_other_side = F.ravel()[first_corner % F.size], np.roll(fan, F.size)[first_corner]
-    # The largest fan of each vertex, of equal ones that of the first face; then the other side of it.
+    # The largest fan of each vertex (of equally large ones, that of the first face) and its back keep the vertex.
     order = np.lexsort((first_corner, -size, of_fan))
     largest = order[np.diff(of_fan[order], prepend=-1) != 0]
     number = np.full(len(size), -1)
@@ -158,7 +156,7 @@ def two_sided_cover(surface: Mesh) -> Mesh:
 
 
 def on_one_side(faces: IntArray, barycentric: FloatArray, m: int) -> tuple[IntArray, FloatArray]:
-    """Points in the 2 m faces of a cover as points (k,), (k, ..., 3) of the m faces that it covers."""
+    """Points (k,), (k, ..., 3) in the 2 m faces of the cover -> the same points in the m faces of the surface."""
     is_other, found = faces >= m, barycentric.copy()
     found[is_other] = found[is_other][..., [0, 2, 1]]
     return np.where(is_other, faces - m, faces), found
