@@ -89,23 +89,17 @@ def as_dictionary(rows: Sequence[Row]) -> dict[str, Any]:
     return {name: values if len(values) > 1 or name == "wrote" else values[0] for name, values in found.items()}
 
 
-def print_json(content: Mapping[str, Any], json_file: Path) -> None:
-    """Write JSON to a file, or print it where the file is called ``-``."""
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-    if json_file == _STANDARD_OUTPUT:
-        print(text, end="")
-        return
-    with complete_file(json_file) as temporary:
-        temporary.write_bytes(text.encode("utf8"))
-
-
 def print_report(content: Mapping[str, Any], text: str | Text, json_file: Path | None) -> None:
-    """Print a text, and write the content as JSON to a file, or print it in place of the text."""
+    """Print a text, and write the content as JSON to a file; if the file is ``-``, print the JSON alone."""
     if json_file is not None:
-        print_json(content, json_file)
-    if json_file != _STANDARD_OUTPUT:
-        # No wrapping, so that pipes receive one line per row.
-        Console(highlight=False, soft_wrap=True, markup=False, emoji=False).print(text, end="")
+        as_json = json.dumps(content, indent=1, allow_nan=False) + "\n"
+        if json_file == _STANDARD_OUTPUT:
+            print(as_json, end="")
+            return
+        with complete_file(json_file) as temporary:
+            temporary.write_bytes(as_json.encode("utf8"))
+    # No wrapping, so that pipes receive one line per row.
+    Console(highlight=False, soft_wrap=True, markup=False, emoji=False).print(text, end="")
 
 
 def wrote(*paths: Path | None) -> list[Row]:

@@ -27,13 +27,12 @@ from heat_igl.io.chunks import (
     read_rows,
     zarr_module,
 )
+from heat_igl.runtime.threads import BLOCK
 from heat_igl.typing import AnyArray, IntArray
 
-# Rows of a block: a multiple of the solver's blocks of right-hand sides, so that a row's bits depend on no other block.
-_ROWS = 8
-_MOST_ROWS = 64
-_ENTRIES = 2**22
-# Longest row of one chunk.
+# Most rows of a block, whose work is lost if the worker dies, and most values, 16 MiB in single precision.
+_MOST_ROWS, _ENTRIES = 64, 2**22
+# Longest row of one chunk: a block of `BLOCK` longer rows has several chunks, each within 32 MiB.
 _COLUMNS = 2**20
 # Formats 1 to 3 have no checksums of metadata.
 _FORMAT = 4
@@ -45,8 +44,11 @@ _PARTIAL = ".partial"
 
 
 def rows_per_block(n: int) -> int:
-    """Rows that are solved, written and resumed together on a mesh of `n` vertices: 64, fewer on large meshes."""
-    return int(min(_MOST_ROWS, max(_ROWS, _ROWS * (_ENTRIES // (_ROWS * n)))))
+    """Rows that are solved, written and resumed together on a mesh of `n` vertices: 64, fewer on large meshes.
+
+    A multiple of the solver's blocks of right-hand sides, so that the bits of a row do not depend on this number.
+    """
+    return int(min(_MOST_ROWS, max(BLOCK, BLOCK * (_ENTRIES // (BLOCK * n)))))
 
 
 class Store:

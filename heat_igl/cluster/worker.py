@@ -182,8 +182,14 @@ def work(tasks: Sequence[Task]) -> list[Outcome]:
     store = _opened(tasks[0].store)
     outcomes = []
     for task in tasks:
-        outcomes.append(_guarded(task, store))
-        if task.blocks or outcomes[-1].remaining:
+        try:
+            outcome = _resume(task, store) if task.blocks else _begin(task, store)
+        except BatchError:  # the store is lost
+            raise
+        except Exception as error:  # of this mesh alone
+            outcome = Outcome(task.item.name, reason=_reason(error))
+        outcomes.append(outcome)
+        if task.blocks or outcome.remaining:
             break
         _SOLVERS.drop_idle()
     return outcomes
@@ -201,16 +207,6 @@ def _opened(path: Path) -> Store:
         raise BatchError(
             f"a worker cannot open store {path}: {_reason(error)}. Name a folder that the client and all workers share"
         ) from None
-
-
-def _guarded(task: Task, store: Store) -> Outcome:
-    """The outcome of a task. An error of its mesh becomes the reason; only a lost store ends the batch."""
-    try:
-        return _resume(task, store) if task.blocks else _begin(task, store)
-    except BatchError:
-        raise
-    except Exception as error:
-        return Outcome(task.item.name, reason=_reason(error))
 
 
 def _reason(error: Exception) -> str:

@@ -157,10 +157,6 @@ class AnswerCheck(NamedTuple):
         return None
 
 
-#: What sources are, as far as heat treats them differently: on vertices, in faces, on curves; several, or with offsets.
-Kind = tuple[bool, bool, bool, bool, bool]
-
-
 class Comparisons:
     """Compares answers with those of an engine that shares nothing with heat, where heat may be wrong.
 
@@ -172,7 +168,7 @@ class Comparisons:
     def __init__(self, domain: Operators) -> None:
         self._domain = domain
         # By kind and component: how many answers were near; -1 after one that was not.
-        self._near: dict[Kind, IntArray] = {}
+        self._near: dict[tuple[bool, ...], IntArray] = {}
         self._engine: Engine | None = None
         # Vertices that gave near answers, and the distances (n,) from them by the other engine.
         self._known: dict[int, FloatArray] = {}
@@ -186,7 +182,10 @@ class Comparisons:
         """Compare an answer (n,) if it `is_doubtful`, or others of its kind may be wrong; else None."""
         if self._domain.fans is not None and not sources.on_vertices_alone:
             return None  # the other engine's triangles are those of the fans
-        near = self._near.setdefault(_kind(sources), np.zeros(self._domain.n_components, np.int64))
+        # Heat treats sources on vertices, in faces, on curves, several of them, and those with offsets differently.
+        has_places = (len(each) > 0 for each in (sources.vertices, sources.points.faces, sources.segments.faces))
+        kind = (*has_places, sources.n_labels > 1, bool(sources.offsets.any()))
+        near = self._near.setdefault(kind, np.zeros(self._domain.n_components, np.int64))
         components = self._components(sources)
         is_vertex = len(sources.vertices) == 1 and sources.on_vertices_alone and sources.vertex_offset[0] == 0
         is_trusted = not is_doubtful and near[components].min() >= _ENOUGH
@@ -237,16 +236,6 @@ class Comparisons:
         if surface is not None and surface.given_faces is not None:
             vertices += [surface.given_faces[places.faces, 0] for places in (sources.points, sources.segments)]
         return np.unique(self._domain.components[np.concatenate(vertices)])
-
-
-def _kind(sources: SourceSet) -> Kind:
-    return (
-        len(sources.vertices) > 0,
-        len(sources.points.faces) > 0,
-        len(sources.segments.faces) > 0,
-        sources.n_labels > 1,
-        bool(sources.offsets.any()),
-    )
 
 
 class Checker:

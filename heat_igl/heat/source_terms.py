@@ -13,6 +13,7 @@ from heat_igl.heat.steps import HeatFlow
 from heat_igl.operators import Operators
 from heat_igl.plan import NEAR_RADIUS
 from heat_igl.runtime import SOURCE_HEAT
+from heat_igl.runtime.threads import BLOCK
 from heat_igl.sources import SourceSegments, SourceSet, nearest_first, samples
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows import ExactSurface
@@ -29,8 +30,6 @@ _SPACING = 0.25
 # that comes with it: 5 times after 1.1 mean edge lengths at the default t = h^2 / 2, and 2 or so since heat also falls
 # as it spreads. Up to there the distance from either source is the same to within the error of the method.
 _OVERTAKEN = 5.0
-# Right-hand sides of labels solved together, as in a block of distances: more read the factors no more quickly.
-_BLOCK = 8
 
 
 class Seeds(NamedTuple):
@@ -328,7 +327,7 @@ def warmest_sources(term: SourceTerm, heat_flow: HeatFlow, n: int) -> IntArray:
     labels = np.full(n, -1)
     most = np.full(n, -np.inf)
     present = np.unique(term.label)
-    for block in np.split(present, range(_BLOCK, len(present), _BLOCK)):
+    for block in np.split(present, range(BLOCK, len(present), BLOCK)):
         shares: list[FloatArray] = [term.share * (term.label == label) for label in block]
         parts = heat_flow.solve(right_hand_side(n, [term] * len(block), shares))
         parts[parts == 0] = -np.inf  # no heat; far away in obtuse cells all of it may be below 0

@@ -133,9 +133,10 @@ class TangentFrames:
         ValueError
             If `vectors` has another shape, or is not finite.
         """
-        corner = self._corners(faces, corners)
-        found = checked_vectors("vectors", vectors, len(corner), 3)
-        face, c = np.divmod(corner, 3)
+        face, c = checked_indices("faces", faces, len(self.face_normals)), checked_indices("corners", corners, 3)
+        if len(face) != len(c):
+            raise MeshError(f"corners must be as many as faces, {len(face)}, not {len(c)}")
+        found, corner = checked_vectors("vectors", vectors, len(face), 3), 3 * face + c
         along = self.sides[face, c]
         across = np.cross(self.face_normals[face], along)
         x, y = (np.einsum("kx,kx->k", found, axis) for axis in (along, across))
@@ -195,13 +196,6 @@ class TangentFrames:
     def _vertices(self, vertices: ArrayLike | None) -> IntArray:
         n = len(self.x)
         return np.arange(n) if vertices is None else checked_indices("vertices", vertices, n)
-
-    def _corners(self, faces: ArrayLike, corners: ArrayLike) -> IntArray:
-        face = checked_indices("faces", faces, len(self.face_normals))
-        corner = checked_indices("corners", corners, 3)
-        if len(face) != len(corner):
-            raise MeshError(f"corners must be as many as faces, {len(face)}, not {len(corner)}")
-        return 3 * face + corner
 
 
 def tangent_frames(mesh: MeshLike) -> TangentFrames:

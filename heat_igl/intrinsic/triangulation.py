@@ -95,10 +95,6 @@ class Covered(NamedTuple):
         """Faces (k,) and barycentric coordinates (k, 3) of points on the front."""
         return faces, barycentric
 
-    def carry_to_back(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Faces (k,) and barycentric coordinates (k, 3) of the same points on the back."""
-        return faces + self.n_faces, barycentric[:, BACK_CORNERS]
-
 
 class Moved(NamedTuple):
     """Edges flipped, and faces split at new vertices, one after another.
@@ -247,11 +243,10 @@ class IntrinsicTriangulation:
     def locate(self, faces: IntArray, barycentric: FloatArray, on_back: bool = False) -> tuple[IntArray, FloatArray]:
         """Points of the mesh, given by faces (k,) of the mesh and barycentric coordinates (k, 3), in these triangles.
 
-        Returns the triangle of each, and the coordinates in it; of a cover, those `on_back` if so asked.
+        Returns the triangle of each, and the coordinates in it; in a cover they are on the front, or `on_back`.
         """
         for change in self.history:
+            faces, barycentric = change.carry(faces, barycentric)
             if on_back and isinstance(change, Covered):
-                faces, barycentric = change.carry_to_back(faces, barycentric)
-            else:
-                faces, barycentric = change.carry(faces, barycentric)
+                faces, barycentric = faces + change.n_faces, barycentric[:, BACK_CORNERS]
         return faces, barycentric

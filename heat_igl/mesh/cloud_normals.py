@@ -28,20 +28,16 @@ _ROUNDING = 1e-10
 
 
 def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[FloatArray | None, BoolArray]:
-    """The normals (n, 3) of the points of `tree`, those turned over that contradict their neighbours.
+    """The normals (n, 3) of the points of `tree`, turned to the same side, and where (n,) they tell sheets apart.
 
-    Also returns at which points (n,) they tell sheets apart: not where neighbours of opposite normals are in front of
-    the point as well as behind it, as where the normals of a surface with one side change over.
+    They do not tell sheets apart at a point with neighbours of opposite normals both in front and behind, as there are
+    where the normals of a surface with one side change over. If no choice of sides is consistent, the normals are None,
+    with an AccuracyWarning.
 
-    Neighbours of opposite normals lie on two sheets, or one of the normals points to the wrong side. Of two sheets one
-    is in front of the other, so nearly all such neighbours are in front of each other, or nearly all behind. Points
-    that are joined by neighbours of like normals are a group: a sheet, a patch whose normals were turned over, or a
-    single point. Groups are turned as a whole, where they contradict others, and most points keep their normals.
-
-    Warns
-    -----
-    AccuracyWarning
-        If neighbours contradict each other in any case: then None is returned for them.
+    Two neighbours with opposite normals lie on two sheets, or one of the normals points to the wrong side. Of two
+    sheets, one is in front of the other: then nearly all such neighbours are in front of each other, or nearly all
+    behind. Points connected through neighbours with like normals form a group: a sheet, a patch with turned normals, or
+    a single point. Groups that contradict others are turned as a whole, so that most points keep their normals.
     """
     n = len(tree.P)
     if normals is None or n <= _K:

@@ -228,21 +228,11 @@ class Mesh:
 
     @classmethod
     def of_polygons(cls, V: ArrayLike, corners: IntArray, degree: IntArray, shown: Callable[[int], str]) -> Mesh:
-        """The triangles of polygons, cut as by `triangulated`.
+        """A mesh of the triangles into which `triangulated` cuts polygons with the positions V (n, 3).
 
-        Parameters
-        ----------
-        V : (n, 3) array_like
-            Positions.
-        corners, degree : (sum of degree,) and (m,) int64
-            Vertices of the polygons, one polygon after the other, and the number of corners of each.
-        shown : callable
-            The name of the i-th polygon, for the warning.
-
-        Warns
-        -----
-        AccuracyWarning
-            If sides of a polygon cross each other; `crossed_polygons` are all of them.
+        `corners` (sum of degree,) int64 are the vertices of all polygons, one polygon after the other, and `degree`
+        (m,) int64 is the number of corners of each. Warns if sides of a polygon cross each other, with the name that
+        `shown` has for the first of these polygons; all are in `crossed_polygons`.
         """
         positions = np.asarray(V, np.float64)
         with np.errstate(over="ignore", invalid="ignore"):  # `Mesh` refuses such positions by name

@@ -28,7 +28,7 @@ _divided = threading.local()
 _BLOCKS_PER_THREAD = 4
 
 # Largest number of right-hand sides in a block. They share one pass over the factors; larger blocks gain nothing.
-_MOST = 8
+BLOCK = 8
 # Peak memory of the three steps, in bytes per face and right-hand side.
 _BYTES_PER_FACE = 40
 # Limit in bytes for all threads together, unless a single right-hand side needs more.
@@ -125,7 +125,7 @@ def block_size(n_faces: int, n_sets: int | None, n_threads: int) -> tuple[int, i
     """
     fit = int(WORKING_MEMORY // (_BYTES_PER_FACE * n_faces))
     threads = max(1, min(n_threads, fit, n_threads if n_sets is None else n_sets))
-    return max(1, min(_MOST, fit // threads)), threads
+    return max(1, min(BLOCK, fit // threads)), threads
 
 
 def _until_failure(items: Iterable[Item], failures: list[Exception]) -> Iterator[Item]:
