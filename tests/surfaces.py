@@ -51,6 +51,12 @@ def angle_between(a: np.ndarray, b: np.ndarray | float = 0.0) -> np.ndarray:
     return np.abs(np.angle(np.exp(1j * (a - b))))
 
 
+def square(n: int = 20) -> tuple[Mesh, np.ndarray]:
+    """The unit square and the distance from its left side."""
+    mesh = shapes.grid(n)
+    return mesh, mesh.V[:, 0]
+
+
 def cube() -> Mesh:
     V = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
     return Mesh(V, scipy.spatial.ConvexHull(V).simplices)

@@ -14,10 +14,6 @@ from heat_igl import Mesh, MeshError, SurfaceCurve, SurfacePoints, edge_curve, g
 from heat_igl.curves import GeodesicPathSolver
 
 
-def length(mesh: Mesh, curve: SurfaceCurve) -> float:
-    return float(curve.lengths(mesh).sum())
-
-
 def begins(mesh: Mesh, curve: SurfaceCurve) -> np.ndarray:
     return np.einsum("kc,kcx->kx", curve.start, mesh.V[mesh.F[curve.faces]])
 
@@ -163,7 +159,7 @@ def test_curves_in_the_plane_become_straight_lines():
         curve = straighten(mesh, edge_walk(mesh, stops))
         P = curve.positions(mesh)
         np.testing.assert_allclose(P[[0, -1]], mesh.V[[stops[0], stops[-1]]], atol=1e-14)
-        assert length(mesh, curve) == pytest.approx(np.linalg.norm(P[-1] - P[0]), rel=1e-12)
+        assert curve.length == pytest.approx(np.linalg.norm(P[-1] - P[0]), rel=1e-12)
 
 
 @pytest.mark.parametrize("n_stops", [2, 4])
@@ -177,8 +173,8 @@ def test_straightened_curves_are_locally_shortest_and_not_longer(n_stops, cow):
                 walk = edge_walk(mesh, rng.choice(used, n_stops + closed, replace=False).tolist(), closed)
                 curve = straighten(mesh, walk)
                 assert curve.is_closed == closed
-                assert length(mesh, curve) <= length(mesh, walk) * (1 + 1e-12)
-                if length(mesh, curve):
+                assert curve.length <= walk.length * (1 + 1e-12)
+                if curve.length:
                     assert_locally_shortest(mesh, curve)
                 if not closed:
                     ends = walk.positions(mesh)[[0, -1]]
@@ -190,7 +186,7 @@ def test_straight_curves_stay():
     solver = GeodesicPathSolver(mesh)
     for curve in (solver.path([3, 200]), solver.path([0, 8, 16], closed=True)):
         again = solver.straighten(curve)
-        assert length(mesh, again) == pytest.approx(length(mesh, curve), rel=1e-12)
+        assert again.length == pytest.approx(curve.length, rel=1e-12)
 
 
 def test_curves_in_faces_keep_their_ends(cow):
@@ -201,10 +197,10 @@ def test_curves_in_faces_keep_their_ends(cow):
     part = SurfaceCurve(isoline.faces[half], isoline.start[half], isoline.end[half])
     curve = straighten(cow, part)
     np.testing.assert_allclose(curve.positions(cow)[[0, -1]], part.positions(cow)[[0, -1]], atol=1e-12)
-    assert length(cow, curve) < length(cow, part)
+    assert curve.length < part.on(cow).length
     assert_locally_shortest(cow, curve)
     loop = straighten(cow, isoline)
-    assert length(cow, loop) < length(cow, isoline)
+    assert loop.length < isoline.length
     assert_locally_shortest(cow, loop)
     points = SurfacePoints(rng.integers(0, cow.n_faces, 2), rng.dirichlet([1, 1, 1], 2))
     np.testing.assert_allclose(geodesic_path(cow, points).positions(cow)[[0, -1]], points.positions(cow), atol=1e-12)
@@ -234,18 +230,18 @@ def test_loops_of_known_length():
     waypoints = [0, 4 * around + third, 9 * around + 2 * third]
     loop = geodesic_path(mesh, waypoints, closed=True)
     assert loop.is_closed
-    assert length(mesh, loop) == pytest.approx(expected, rel=1e-12)
+    assert loop.length == pytest.approx(expected, rel=1e-12)
     pinned = geodesic_path(mesh, [*waypoints, waypoints[0]])
     rise = 3.0 / 10
     parts = np.hypot(expected / 3, rise * np.array([4, 5, 9]))
-    assert length(mesh, pinned) == pytest.approx(parts.sum(), rel=1e-12)
+    assert pinned.length == pytest.approx(parts.sum(), rel=1e-12)
     # The outer equator of a torus slides to the inner one.
     along = 32
     torus = shapes.torus(16, along)
     outer = np.flatnonzero(np.abs(np.hypot(torus.V[:, 0], torus.V[:, 1]) - 1.4) < 1e-9)
     outer = outer[np.argsort(np.arctan2(torus.V[outer, 1], torus.V[outer, 0]))]
     slid = straighten(torus, edge_curve(torus, outer, closed=True))
-    assert length(torus, slid) == pytest.approx(2 * along * 0.6 * np.sin(np.pi / along), rel=1e-12)
+    assert slid.length == pytest.approx(2 * along * 0.6 * np.sin(np.pi / along), rel=1e-12)
 
 
 def test_loops_slide_down_narrow_cones():
@@ -258,13 +254,13 @@ def test_loops_slide_down_narrow_cones():
         around = around[np.argsort(np.arctan2(mesh.V[around, 1], mesh.V[around, 0]))]
         rings.append(edge_curve(mesh, around, closed=True))
     rim, loop = rings
-    assert length(mesh, straighten(mesh, loop)) == pytest.approx(length(mesh, rim), rel=1e-9)
+    assert straighten(mesh, loop).length == pytest.approx(rim.length, rel=1e-9)
 
 
 def test_paths_are_as_short_as_distances_say(sphere):
     pairs = np.random.default_rng(3).integers(0, sphere.n_vertices, (40, 2))
     solver = GeodesicPathSolver(sphere)
-    lengths = np.array([length(sphere, solver.path(pair)) for pair in pairs])
+    lengths = np.array([solver.path(pair).length for pair in pairs])
     exact = heat_igl.pair_distances(sphere, pairs)
     assert (lengths >= exact * (1 - 1e-12)).all()
     np.testing.assert_allclose(lengths, exact, rtol=1e-2)
@@ -278,7 +274,7 @@ def test_waypoints_of_both_kinds_are_passed(sphere):
     np.testing.assert_allclose(P[[0, -1]], sphere.V[[0, 50]], atol=1e-14)
     assert np.linalg.norm(P - point.positions(sphere), axis=1).min() < 1e-12
     parts = [geodesic_path(sphere, [0, point]), geodesic_path(sphere, [point, 50])]
-    assert length(sphere, curve) == pytest.approx(sum(length(sphere, part) for part in parts), rel=1e-14)
+    assert curve.length == pytest.approx(sum(part.length for part in parts), rel=1e-14)
 
 
 def test_paths_that_overlap_do_not_disturb_one_another():
@@ -289,10 +285,10 @@ def test_paths_that_overlap_do_not_disturb_one_another():
     for pair, curve in zip(ends, together, strict=True):
         alone = geodesic_path(mesh, pair)
         np.testing.assert_array_equal(alone.positions(mesh), curve.positions(mesh))
-    assert length(mesh, together[0]) == pytest.approx(length(mesh, together[1]), rel=1e-12)
+    assert together[0].length == pytest.approx(together[1].length, rel=1e-12)
     # A curve over itself: there, back, and there again.
     walk = edge_walk(mesh, [0, 100, 0, 100])
-    assert length(mesh, straighten(mesh, walk)) <= length(mesh, edge_walk(mesh, [0, 100])) * (1 + 1e-12)
+    assert straighten(mesh, walk).length <= edge_walk(mesh, [0, 100]).length * (1 + 1e-12)
 
 
 def test_loops_that_contract_become_points(sphere):
@@ -304,7 +300,7 @@ def test_loops_that_contract_become_points(sphere):
         ring.remove(order[-1])
     point = straighten(sphere, edge_curve(sphere, order, closed=True))
     assert point.is_closed
-    assert length(sphere, point) == 0
+    assert point.length == 0
     with pytest.raises(heat_igl.SourceError, match="contracts to a point"):
         geodesic_path(sphere, order[:3], closed=True)
 
@@ -313,10 +309,10 @@ def test_a_vertex_alone_joins_two_faces():
     V = [[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]]
     mesh = Mesh(V, [[0, 2, 1], [0, 3, 4]])
     curve = geodesic_path(mesh, [1, 3])
-    assert length(mesh, curve) == pytest.approx(2 * np.sqrt(2))
+    assert curve.length == pytest.approx(2 * np.sqrt(2))
     loop = straighten(mesh, edge_curve(mesh, [0, 1, 2, 0, 3, 4], closed=True))
     assert loop.is_closed
-    assert length(mesh, loop) == 0
+    assert loop.length == 0
 
 
 def test_edges_of_three_faces_are_crossed():
@@ -326,7 +322,7 @@ def test_edges_of_three_faces_are_crossed():
     curve = straighten(mesh, walk)
     assert_connected(mesh, curve, within=1e-9)
     exact = heat_igl.pair_distances(mesh, [far])[0]
-    assert length(mesh, curve) == pytest.approx(exact, rel=1e-9)
+    assert curve.length == pytest.approx(exact, rel=1e-9)
 
 
 def test_meshes_without_paths_are_told_apart():
@@ -371,7 +367,7 @@ def test_turns_around_a_narrow_cylinder_are_kept(turns):
     column = np.arange(len(down)) * np.sign(turns) % around
     walk = edge_walk(mesh, (column + down * around).tolist())
     perimeter = 2 * around * np.sin(np.pi / around)
-    assert length(mesh, straighten(mesh, walk)) == pytest.approx(np.hypot(turns * perimeter, tall), rel=1e-12)
+    assert straighten(mesh, walk).length == pytest.approx(np.hypot(turns * perimeter, tall), rel=1e-12)
 
 
 @pytest.mark.parametrize("holes", [1, 2, 3])
@@ -381,7 +377,7 @@ def test_straightened_paths_stay_in_their_class(holes):
     for _ in range(25):
         walk = edge_walk(mesh, rng.choice(mesh.n_vertices, 4, replace=False).tolist())
         path = straighten(mesh, walk)
-        assert length(mesh, path) <= length(mesh, walk) * (1 + 1e-12)
+        assert path.length <= walk.length * (1 + 1e-12)
         assert_locally_shortest(mesh, path)
         around = np.concatenate([walk.positions(mesh), path.positions(mesh)[-2::-1]])
         for hole in range(holes):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import zoo
-from surfaces import arcs, nearest_vertex, twice
+from surfaces import arcs, nearest_vertex, square, twice
 
 import heat_igl
 from heat_igl import shapes
@@ -20,12 +20,6 @@ from heat_igl.drawing.plots import Page, page
 from heat_igl.drawing.scene import LINE_INK, STRIPE_INK, UNREACHABLE, colours
 
 read_image = pytest.importorskip("matplotlib.image").imread
-
-
-def square(n: int = 20) -> tuple[heat_igl.Mesh, np.ndarray]:
-    """The unit square and the distance from its left side."""
-    mesh = shapes.grid(n)
-    return mesh, mesh.V[:, 0]
 
 
 def sphere() -> tuple[heat_igl.Mesh, int, int, np.ndarray]:

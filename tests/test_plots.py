@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from surfaces import arcs, twice
+from surfaces import arcs, square, twice
 
 import heat_igl
 from heat_igl import shapes
@@ -27,12 +27,6 @@ def surface_image(drawn: Picture) -> np.ndarray:
 
 def legend_texts(drawn: Picture) -> list[str]:
     return [text.get_text() for text in drawn.figure.legends[0].get_texts()]
-
-
-def flat_grid(n: int = 20) -> tuple[heat_igl.Mesh, np.ndarray]:
-    """The unit square and the distance from its left side."""
-    mesh = shapes.grid(n)
-    return mesh, mesh.V[:, 0]
 
 
 def test_each_pixel_shows_the_nearest_triangle_and_interpolates_exactly():
@@ -68,7 +62,7 @@ def test_rotations_keep_shapes_and_handedness(azimuth, elevation):
 
 def test_isolines_lie_at_the_levels_and_have_the_width_asked_for():
     """Distance x, on a square seen face on: dark columns at multiples of the spacing and nowhere else."""
-    mesh, x = flat_grid()
+    mesh, x = square()
     image, plain = (surface_image(plot(mesh, x, spacing=spacing)) for spacing in (0.3, 100.0))
     middle = image.shape[0] // 2
     columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
@@ -82,7 +76,7 @@ def test_isolines_lie_at_the_levels_and_have_the_width_asked_for():
 
 
 def test_colours_follow_the_colour_bar():
-    mesh, x = flat_grid()
+    mesh, x = square()
     drawn = plot(mesh, x, spacing=10.0 / 3)  # no line on the way
     image = surface_image(drawn)
     row = image[image.shape[0] // 2]
@@ -97,7 +91,7 @@ def test_colours_follow_the_colour_bar():
 
 
 def test_stripes_are_light_in_every_second_interval():
-    mesh, x = flat_grid()
+    mesh, x = square()
     image, plain = (surface_image(plot(mesh, x, spacing=0.25, style=style)) for style in ("stripes", "plain"))
     middle = image.shape[0] // 2
     columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
@@ -145,7 +139,7 @@ def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not():
 
 
 def test_errors_of_both_signs_are_white_in_the_middle():
-    mesh, x = flat_grid()
+    mesh, x = square()
     drawn = plot_field(mesh, x - 0.25, label="error, %")
     assert drawn.figure.axes[1].get_ylim() == (-0.75, 0.75)
     assert drawn.figure.axes[1].get_ylabel() == "error, %"
@@ -161,7 +155,7 @@ def test_errors_of_both_signs_are_white_in_the_middle():
 
 
 def test_isolines_of_a_field_are_also_at_zero_and_below():
-    mesh, x = flat_grid()
+    mesh, x = square()
     image, plain = (
         surface_image(plot_field(mesh, x - 0.5, label="height", spacing=spacing, colormap="viridis"))
         for spacing in (0.2, None)
@@ -175,7 +169,7 @@ def test_isolines_of_a_field_are_also_at_zero_and_below():
 
 
 def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told():
-    mesh, x = flat_grid()
+    mesh, x = square()
     assert plot_field(mesh, x, label="heat").figure.axes[1].get_ylim() == (0, 1)
     drawn = plot_field(mesh, x, label="heat", limits=(0, 0.5))
     image = surface_image(drawn)
@@ -192,7 +186,7 @@ def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told():
 
 
 def test_unreachable_is_grey_and_the_legend_says_so():
-    mesh, x = flat_grid()
+    mesh, x = square()
     both = twice(mesh, np.array([1.5, 0, 0]))
     drawn = plot(both, np.concatenate([x, np.full_like(x, np.inf)]), sources=[0], style="plain")
     image = surface_image(drawn)
@@ -242,7 +236,7 @@ def test_the_default_view_shows_the_source():
 
 @pytest.mark.parametrize("axes", [[0, 1, 2], [2, 0, 1], [1, 2, 0]])
 def test_a_flat_mesh_is_seen_face_on(axes):
-    mesh, x = flat_grid()
+    mesh, x = square()
     image = surface_image(plot(heat_igl.Mesh(mesh.V[:, axes], mesh.F), x))
     rows, columns = np.nonzero(image[..., 3] > 0.5)
     assert np.ptp(rows) == pytest.approx(np.ptp(columns), abs=4)
@@ -260,7 +254,7 @@ def test_scale_and_place_do_not_change_the_picture(scale, offset):
 
 
 def test_nothing_overlaps_and_nothing_is_cut_off():
-    mesh, x = flat_grid()
+    mesh, x = square()
     for values in (x * 1e-9, x * 12345.0):
         drawn = plot(mesh, values, sources=[0, 441 - 1])
         figure = drawn.figure
@@ -281,7 +275,7 @@ def test_nothing_overlaps_and_nothing_is_cut_off():
 
 
 def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_path):
-    mesh, x = flat_grid(4)
+    mesh, x = square(4)
     drawn = plot(mesh, x)
     for suffix, start in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
         path, again = tmp_path / f"a{suffix}", tmp_path / f"b{suffix}"
@@ -293,7 +287,7 @@ def test_save_writes_the_format_that_the_suffix_names_and_the_same_bytes(tmp_pat
 
 
 def test_what_cannot_be_drawn_is_rejected_by_name():
-    mesh, x = flat_grid(4)
+    mesh, x = square(4)
     plot(mesh, x)
     with pytest.raises(ValueError, match=r"distance must have shape \(25,\)"):
         plot(mesh, x[1:])
@@ -337,7 +331,7 @@ def test_between_two_labels_is_no_third():
 
 def test_borders_of_cells_are_where_distances_are_equal():
     """In the plane the border of two cells is the bisector of the sites, which crosses the triangles here."""
-    mesh, _ = flat_grid(12)
+    mesh, _ = square(12)
     away = np.linalg.norm(mesh.V[:, None] - mesh.V[[30, 120]], axis=2)
     middle, across = mesh.V[[30, 120]].mean(axis=0), mesh.V[120] - mesh.V[30]
     wrong = []
