@@ -103,7 +103,7 @@ def parcel_distances(
 
 
 def _parcels(labels: ArrayLike, n: int, part: MeshPart | None) -> tuple[IntArray, IntArray, IntArray]:
-    """The labels of p parcels, the vertices (k,) of the part that are in one, and which (k,) that is."""
+    """The labels (p,) of the parcels, the vertices (k,) of the part in parcels, and the index of each one's parcel."""
     given = as_array("labels", labels)
     if given.dtype.kind not in "iu" or given.shape != (n,):
         raise ValueError(f"labels must be integers of shape ({n},), not {given.dtype} of shape {given.shape}")

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 _DENSE, _SPARSE = (".npy", ".csv", ".mat"), (".npz", ".mat")
 # Queries that are timed for the estimate: the time of one varies by up to two thirds of the mean on a mesh of parts.
 _QUERIES = 64
+# Rows of a matrix that are made symmetric at a time: temporary arrays hold no more.
 _ROWS = 512
 
 # Meshes of a data set on which queries are timed for the estimate.

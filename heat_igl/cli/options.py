@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # For distances alone: an array of numpy, and text with a line per vertex.
 ARRAY_SUFFIXES = (".npy", ".csv")
 _STANDARD_OUTPUT = Path("-")
-# What writes files of a format, and the extra that brings it.
+# The library that writes a format, and the extra that installs it.
 _LIBRARIES = {".dxf": "ezdxf io", ".vtu": "meshio io", ".gii": "nibabel io"}
 
 # Name and text of a line, and what JSON holds in place of the text, if anything.
@@ -129,9 +129,9 @@ def check_writable(path: Path) -> None:
 
 
 def check_file(option: str, path: Path, what: str, suffixes: Sequence[str], library: str = "") -> None:
-    """Check that the value of an option is a file of a format for `what`, whose library is there, and can be written.
+    """Check that the file named by an option can be written: its format holds `what`, and its library is installed.
 
-    `library` is its name and that of the extra that brings it. A ValueError, MissingExtraError or OSError if not.
+    `library` names the library and the extra that installs it. A ValueError, MissingExtraError or OSError if not.
     """
     if path.suffix.lower() not in suffixes:
         raise ValueError(f"{option} {path}: {what} go to {', '.join(suffixes[:-1])} or {suffixes[-1]} files")

@@ -22,7 +22,7 @@ _EXPECTED = (OSError, ValueError, BatchError, FactorizationError, ReferenceSolve
 # Set by the shell that asks for completions.
 _COMPLETION = "_HEAT_IGL_COMPLETE"
 
-# The module of each command: only that of the command asked for is imported, which saves a third of its time.
+# The module of each command. Only the module of the requested command is imported, which saves a third of the time.
 _MODULES = {
     "info": "views",
     "validate": "views",

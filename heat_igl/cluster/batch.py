@@ -245,7 +245,7 @@ class _Run:
         return [*left, others] if others else left
 
     def _record(self, task: Task, outcome: Outcome) -> list[Task]:
-        """Record the outcome of a task, and that of its mesh with the last one; returns the tasks that it leaves."""
+        """Record the outcome of a task, and of its mesh if this was the last task; returns the tasks still to do."""
         name = task.item.name
         remaining = [replace(task, blocks=blocks) for blocks in outcome.remaining]
         self._tasks_left[name] = self._tasks_left.get(name, 1) - 1 + len(remaining)

@@ -2,7 +2,7 @@
 
 zarr writes all metadata, chunks and checksums. This module defines what a group holds, which blocks are finished, and
 in which order things are written, so that a crash at any moment leaves nothing wrong. The attributes of a group hold
-checksums of what lies beside them, and one of themselves, so that damage to any file is found.
+checksums of all its files and of themselves, so that damage to any file is found.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class MeshPiece:
         F, n = self.mesh.F, self.mesh.n_vertices
         if len(np.unique(F[:, [1, 2, 0]] * n + F[:, [2, 0, 1]])) < F.size:
             raise MeshError("loops need an oriented manifold: two faces run along an edge in the same direction")
-        # Where the piece touches itself, each of its fans gets a vertex of its own.
+        # Where the piece touches itself in a vertex, each fan around the vertex gets a copy of it.
         fan, vertex = connectivity.fans(F, n)
         loops = [vertex[loop] for loop in igl.boundary_loop_all(fan.reshape(-1, 3))]
         return sorted((np.roll(loop, -loop.argmin()) for loop in loops), key=np.ndarray.tolist)
@@ -111,8 +111,8 @@ class CutMesh:
     def sides(self) -> IntArray:
         """The faces (k, 2) on the left and on the right of each of `edges`; -1 if there is none.
 
-        If more than two faces meet, or neighbours are oriented differently: one of the faces that run along the edge in
-        the direction of the curve, and one of those that run in the other.
+        If more than two faces meet at an edge, or neighbours are oriented differently, it is one of the faces with the
+        direction of the curve, and one of those with the opposite direction.
         """
         F, n = self.mesh.F, self.mesh.n_vertices
         key = (F[:, [1, 2, 0]] * n + F[:, [2, 0, 1]]).ravel()

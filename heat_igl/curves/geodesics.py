@@ -1,6 +1,6 @@
-"""Geodesics by class: curves straightened, paths and loops through waypoints, and Bezier curves of geodesics.
+"""Geodesics in a homotopy class: straightened curves, paths and loops through waypoints, and geodesic Bezier curves.
 
-Curves become the faces that they run through, which is what the kernel of paths shortens.
+A curve is converted to the sequence of faces that it runs through. The kernel of paths shortens such sequences.
 """
 
 from __future__ import annotations

@@ -239,10 +239,10 @@ def _colour_numbers(labels: IntArray, edges: IntArray, n_colours: int) -> IntArr
 
 
 def _borders(seen: Scene, labels: IntArray, distance: FloatArray) -> FloatArray:
-    """`Scene.borders` for cells: the distance of the corners of a triangle from the site of each of them.
+    """`Scene.borders` for cells: for each triangle, the distances of its three corners from the sites of all three.
 
-    At a corner of another cell that is the mean over the neighbours in the cell, from whose distances it is continued
-    with the gradient that these have in the cell. It depends on the vertex alone, so borders continue across edges.
+    The distance of a corner from the site of another cell is extrapolated from its neighbours in that cell, by their
+    distances and gradients there, and averaged. It depends on the vertex alone, so that borders continue across edges.
     """
     F, corners = seen.F, seen.V[seen.F]
     _, label = np.unique(labels, return_inverse=True)

@@ -1,8 +1,8 @@
 """Derivatives of exact distance by the positions of the vertices, by edge lengths, by the sources and by a metric.
 
-All of them go by the lengths of the sides of the faces. From the answer to these lengths lead paths on the faces
-(`heat_igl.kernels.windows.paths`), and on to the positions the edges. docs/derivatives_theory.md derives each
-step.
+All of them use the chain rule through the lengths of the sides of the faces. Paths on the faces give the derivatives
+of distance by these lengths (`heat_igl.kernels.windows.paths`), and edges give those of the lengths by the positions.
+docs/derivatives_theory.md derives each step.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ class DistanceDerivative:
     def by_lengths(self, g: ArrayLike) -> FloatArray:
         """The gradient (m, 3) or (k, m, 3) by the lengths of the sides opposite each corner, for `g` as for a call.
 
-        An edge of two faces changes both of its sides: its derivative is the sum of theirs. Rows are the faces of the
-        mesh; of faces that are there twice, one has the derivative of both.
+        An edge is a side of each of its faces: its derivative is the sum of theirs. Rows are the faces of the mesh. Of
+        two faces with the same vertices, one has the derivative of both, and the other 0.
         """
         result = [self._on_given_faces(self._by_sides(row)[0]) for row in gradient_rows(g, self.distance)]
         return np.stack(result) if np.ndim(g) == 2 else result[0]

@@ -357,7 +357,7 @@ class GeodesicSolver(BatchedSolver):
 
     @cached_property
     def _directed(self) -> tuple[GuardedEngine, TangentFrames]:
-        """The engine and the frames of directions: those of a cloud are on its copies too, and on both of its sides."""
+        """The engine and the tangent frames of `directions`; frames of a cloud include copies, and both sides."""
         from heat_igl.intrinsic import tangent_frames
 
         domain, engine = self._domain, self._windows("directions follow")

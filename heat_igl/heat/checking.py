@@ -46,8 +46,8 @@ _MOST_KNOWN = 9
 # A comparison of vertices with known distances alone says nothing of others.
 _ROUNDING = 1e-9
 _BY_SWEEP = Plan("sweep", None, "heat is compared with a sweep")
-# Differences along an edge are reduced to its length where they are larger by this share of it. On scans few are, and
-# it takes 3 to 20 % of a query; without a share it takes 9 to 28 %.
+# Where distances along an edge differ by more than its length and this share of it, the difference is reduced to the
+# length. On scans few edges are, which takes 3 to 20 % of a query; with a share of 0 it takes 9 to 28 %.
 _STEEP = 0.04
 
 
@@ -158,11 +158,12 @@ class AnswerCheck(NamedTuple):
 
 
 class Comparisons:
-    """Compares answers with those of an engine that shares nothing with heat, where heat may be wrong.
+    """Compares answers of the heat method with those of another engine, which is independent of heat.
 
-    These are the first three answers from every kind of sources in each component. If all are near, later ones are
-    trusted; if one is not, each later one is compared. So is one from a vertex that gives other distances of vertices
-    that were compared than these gave of it. The domain has triangles, or simplices.
+    The first three answers are compared for every kind of sources and each component. If all three are near, later
+    ones are trusted; if one is not, all later ones are compared. An answer from a vertex is compared in any case if it
+    is asymmetric: its distances to vertices compared earlier differ from their distances to it. The domain has
+    triangles, or simplices.
     """
 
     def __init__(self, domain: Operators) -> None:

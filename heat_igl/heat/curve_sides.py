@@ -12,7 +12,8 @@ from heat_igl.mesh.connectivity import next_in_run
 from heat_igl.sources import OrientedSet
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
-# Places nearer to each other than this share of the mean edge length are the same.
+# Places nearer to each other than this share of the mean edge length are the same. Of whole and broken level curves on
+# twelve meshes, no bit of a signed distance changes from 1e-8 to 1e-4; nor with those below from 1e-9 to 1e-4.
 _SAME_PLACE = 1e-6
 # If a vertex sees the nearest place of a segment almost along the segment, rounding decides the side.
 _LEAST_SINE = 1e-6
@@ -102,7 +103,7 @@ def closing_of_gaps(
 
 
 def _crossed(mesh: Mesh, sources: OrientedSet) -> FloatArray:
-    """Where segments end on each edge, as the share of its first vertex; -1 if none ends between its own ends."""
+    """The weight of the first vertex of each edge at a segment end inside the edge; -1 if no segment ends there."""
     share = np.full(len(mesh.edges), -1.0)
     for barycentric in (sources.start, sources.end):
         on_edge = (barycentric == 0).sum(axis=1) == 1
@@ -188,9 +189,10 @@ def left_of_closed(
 def left_beside(
     mesh: Mesh, triangulation: IntrinsicTriangulation, sources: OrientedSet
 ) -> tuple[BoolArray, BoolArray, BoolArray]:
-    """Which vertices (n,) are left of the nearest segment in their faces, of which that is known, and which are on it.
+    """Masks (n,): vertices on the left of the nearest segment in their faces, vertices where this is known, and on it.
 
-    It is known if a vertex does not see the segment almost along it. `triangulation` is the faces of the mesh.
+    The side is known unless the vertex lies almost on the line of the segment. `triangulation` has the faces of the
+    mesh.
     """
     seen = _seen(triangulation, sources)
     face, place = np.divmod(seen.place, 6)

@@ -380,5 +380,5 @@ def prepare(
 
 
 def _of_largest(step: float | FloatArray, domain: Operators) -> float:
-    """Of one number for each component, that of the component with most vertices."""
+    """The time step of the component with the most vertices, if there is one for each component."""
     return float(step[np.bincount(domain.components).argmax()]) if isinstance(step, np.ndarray) else step

@@ -44,7 +44,7 @@ _CLOSED_BY_HEAT = 0.5
 # off. It is 4 % at most on 48 broken levels (docs/signed_theory.md).
 _CONTRADICTED = 0.05
 
-# Normals that sum to less than this share of the length of the curves have cancelled.
+# Normals that sum to less than this share of the length of the curves have cancelled, up to rounding.
 _CANCELLED = 1e-9
 
 Level = Literal["zero", "constant", "none"]

@@ -125,9 +125,9 @@ def _fit(x: FloatArray) -> FloatArray:
 
 
 def analysis(L: sp.csc_matrix, backend: Backend = "auto", known: Analysis | None = None) -> Analysis:
-    """Order and analyse the pattern that the matrices of the heat flow and of the Poisson problem have in common.
+    """The symbolic analysis of the sparsity pattern that the heat flow and the Poisson problem share.
 
-    Of the Laplacian `L` only the pattern matters. An analysis that is `known` is returned as it is if it fits.
+    Only the pattern of the Laplacian `L` matters. If the analysis `known` fits it, `known` is returned.
     """
     pattern = shifted(L, 1.0, np.zeros(L.shape[0]))
     return known if known is not None and known.fits(pattern) else analyse(pattern, backend)

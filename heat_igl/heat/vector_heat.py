@@ -227,7 +227,8 @@ class VectorHeatSolver:
 
         Notes
         -----
-        The ratio u / phi of two heat flows, that of the values and that of ones (equation 5 of the paper).
+        The result is the ratio u / phi of two heat flows: u starts from the values and phi from ones (equation 5 of the
+        paper).
         """
         vertices = self._vertices(sources)
         given = np.atleast_1d(real_numbers("values", values))
@@ -511,7 +512,7 @@ class TwoSidedTransport:
         return self._on_cover.transport(self.on_both(vertices), both)[: self._n]
 
     def log_map(self, vertex: int) -> FloatArray:
-        """Vectors (n, 2) from `vertex`: to that of the two copies of each other vertex which is nearer."""
+        """Vectors (n, 2) from `vertex` to each vertex, of whose two copies in the cover the nearer one counts."""
         found = self._on_cover.log_map(vertex)
         sides = found[: self._n], found[self._n : 2 * self._n]
         length = np.stack([np.hypot(*side.T) for side in sides])

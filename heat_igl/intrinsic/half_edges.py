@@ -109,7 +109,7 @@ class HalfEdges(NamedTuple):
         return found
 
     def replacing(self, given: IntrinsicTriangulation, **changes: Any) -> IntrinsicTriangulation:
-        """These triangles in place of those of a triangulation, with other changes of its fields."""
+        """A copy of the triangulation `given` with these triangles, and with `changes` of other fields."""
         return replace(
             given,
             F=self.vertex.reshape(-1, 3).astype(np.int64),

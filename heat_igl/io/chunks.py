@@ -54,7 +54,7 @@ def file_checksum(file: Path) -> str:
 
 
 def chunk_files(folder: Path, array: Any, rows: slice = slice(None)) -> Iterator[tuple[int, Path]]:
-    """The chunks of an array in `folder` that hold some rows of it: their numbers in row-major order, and the files."""
+    """The chunks of an array in `folder` that hold the given rows: each with its number in row-major order and file."""
     counts = [-(-n // width) for n, width in zip(array.shape, array.chunks, strict=True)]
     start, stop, _ = rows.indices(array.shape[0])
     height = array.chunks[0]

@@ -238,10 +238,10 @@ def check(
 
 
 def warn_if_cut(path: Path, data: bytes, last: int, n: int) -> None:
-    """Warn if the last line of a text file has no end, and may be the beginning of a longer line with another face.
+    """Warn if the last line of a text file is not terminated, and a longer line could be another valid face.
 
-    `last` is the last index in the file: with one more digit it may still be that of one of n vertices. It is 0 if the
-    file has no counts, so that more may be lost than a digit.
+    `last` is the last index in the file. If a digit is missing, the whole index is at least 10 `last`, which must be
+    one of n vertices. Pass 0 if the file has no counts, so that whole lines may be missing.
     """
     if 10 * last <= n and not data.endswith((b"\n", b"\r")):
         line = data.rsplit(b"\n", 1)[-1].strip()[:60].decode("utf-8", "backslashreplace")

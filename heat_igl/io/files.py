@@ -29,7 +29,7 @@ POINT_SUFFIXES = (".xyz", ".npy")
 # Formats of other libraries, whose objects `as_mesh` takes.
 _READ_ELSEWHERE = {".vtp": "pass pyvista.read(path), or write .vtu", ".pcd": "pass open3d.io.read_point_cloud(path)"}
 _ATTRIBUTE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
-# Largest value of a colour, and the smallest difference from length 1 of what is no normal.
+# Largest value of a colour, and the largest difference from length 1 of a normal: two digits are enough.
 _BRIGHTEST = 255
 _NOT_OF_LENGTH_1 = 0.01
 _Points = tuple[FloatArray, FloatArray | None]

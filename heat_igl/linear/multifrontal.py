@@ -63,9 +63,9 @@ _solves = import_module(builds("linear.substitution")[0])
 class Dissection(NamedTuple):
     """Vertices in order of elimination, in blocks that are eliminated together.
 
-    ``order[i]`` is eliminated as the i-th, and block b holds ``order[start[b]:start[b + 1]]``. Children come before
-    their parents, subtrees in one piece. `parent` is the separator that cut a block off from the rest, -1 at roots:
-    neighbours of a block are in it, below it or in its ancestors.
+    ``order[i]`` is eliminated as the i-th, and block b holds ``order[start[b]:start[b + 1]]``. Blocks are numbered in
+    postorder of the elimination tree. `parent` is the separator that cut a block off from the rest, -1 at roots: all
+    neighbours of a block are in the block, its descendants or its ancestors.
     """
 
     order: IntArray
@@ -227,7 +227,7 @@ class MultifrontalAnalysis:
         with Pool(n_threads()) as workers:
             tree = dissect(*self.pattern, workers)
         self.fronts = fronts(*self.pattern, tree)
-        # As numpy takes indices: it converts others at each use, which takes three times as long as what they are for.
+        # Of the type that numpy indexes with: converting others at each use takes three times as long as the indexing.
         self.order: IntArray | None = self.fronts.order.astype(np.intp)
         self.place = self.fronts.place.astype(np.intp)
         self.nonzeros = int(self.fronts.end_entry[-1])

@@ -21,7 +21,8 @@ _K = 10
 # Largest share of contradicting neighbours of oriented normals. On the vertices of scans and models it is below 0.01,
 # where parts cross up to 0.07; with normals at random 0.5.
 _MOST_CONTRADICTING = 0.015
-# Two groups of points lie on different sheets if this share of their neighbours is on one side of each other.
+# Two groups of points lie on different sheets if this share of their neighbours is on one side of each other. With a
+# tenth of the normals turned over, on 14 meshes, 1.5, 1.1, 0.9 and 0.8 % end wrong with 0.6, 0.7, 0.8 and 0.9.
 _NEARLY_ALL = 0.8
 # Heights that are taken for 0, in shares of the distance.
 _ROUNDING = 1e-10
@@ -59,7 +60,8 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[Float
     is_turned = turned_groups(joins.astype(np.int32), -count[contradicts].astype(float), one)[group]
     part = components(joins, len(one))[group]
     is_turned ^= (np.bincount(part, is_turned) > np.bincount(part) / 2)[part]
-    # Those of a single point are on one side of it, too. In groups of which one was turned they are opposite no more.
+    # The opposite neighbours of a single point must lie on one side of it, too. Pairs of which one was turned are no
+    # longer opposite.
     stays = ~contradicts[which] | (is_turned[a] == is_turned[b])
     count, total = (np.bincount(a[stays], weight, n) for weight in (None, side[stays]))
     total = np.abs(total)

@@ -31,7 +31,8 @@ _LARGEST_RADIUS = 0.6
 # The same for gaps, in shares of the distance of the farthest neighbour: larger, since the sides of a gap are known to
 # belong to the surface. With 0.7 and 1.2 errors are 1 % larger in the mean, with 2 they are 4 %.
 _LARGEST_GAP = 0.9
-# Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge.
+# Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge. With
+# -0.6, -0.4 and -0.1, errors on twelve clouds with normals are 14 and 5 % larger, and 4 % smaller.
 _OTHER_SHEET = -0.25
 # Cosine of the angle to the next triangle above which the two fold back and may join sheets wrongly: 60 degrees.
 FOLDED_BACK = 0.5
@@ -143,10 +144,11 @@ def _triangles_of_stars(
 
 
 def _with_small_parts(tree: PointTree, F: IntArray, part: IntArray, size: IntArray) -> IntArray:
-    """The triangles, of which those are split that are nearest to points of small parts.
+    """The triangles, split at the points of small parts: each point is inserted into the nearest triangle.
 
-    A part (n,) of a size (p,) below that of a neighbourhood, as single points that noise has put above others, is no
-    surface of its own where a gap to another part is no wider than those that are filled there.
+    `part` (n,) is the part of each point and `size` (p,) the number of points of each part. A part is small if it has
+    no more points than a neighbourhood, as single points that noise lifts above the surface. It belongs to another
+    part if the gap between them is no wider than the gaps that are filled there.
     """
     P, (index, reach) = tree.P, tree.neighbours
     part, reach = part.copy(), reach.copy()

@@ -1,4 +1,4 @@
-"""Meshes of other libraries as those of this one, recognized by attributes so that nothing is imported, and back."""
+"""Conversion of meshes from and to other libraries. Their types are recognized by attributes, without imports."""
 
 from __future__ import annotations
 

@@ -122,13 +122,13 @@ class PointCloud:
 
     @cached_property
     def originals(self) -> IntArray:
-        """The first point (n,) that is equal to each: its own number where it is no copy of an earlier one."""
+        """For each point (n,), the index of the first point with the same coordinates."""
         distinct, original = self._distinct
         return distinct[original]
 
     @cached_property
     def _distinct(self) -> tuple[IntArray, IntArray]:
-        """The points (k,) that are no copy of an earlier one, and which of them each of the n points equals."""
+        """The first index of each of the k distinct points, and for each point (n,) which of them it equals."""
         P, original = self.P, np.arange(len(self.P))
         # Copies have the same sum, whatever the factors.
         total = P[:, 0] + np.sqrt(2) * P[:, 1] + np.sqrt(3) * P[:, 2]
@@ -152,7 +152,7 @@ class PointCloud:
     def triangles(self) -> Mesh:
         """The surface on which distance is measured: a mesh whose vertices are the points, with a boundary or without.
 
-        Its triangles hold no point that is a copy of an earlier one; a copy takes the values of the first, see
+        Of points with the same coordinates, the first alone is a corner of triangles; the others get its values, see
         `Mesh.originals`.
 
         They are Delaunay in the tangent planes of their corners; an edge has at most two of them. The vertices

@@ -198,10 +198,10 @@ class PolygonFans:
         return cls(polygons, Mesh(np.concatenate([polygons.V, points[has_fan]]), F[order]), first)
 
     def carry(self, faces: IntArray, barycentric: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Points in triangles (k,) of ``polygons.triangles``, coordinates (k, 3), carried to those of `mesh`.
+        """Points in faces (k,) of ``polygons.triangles``, with barycentric coordinates (k, 3), carried to `mesh`.
 
-        A point of a planar polygon stays where it is, and so does one on a side; another moves to the triangle of the
-        fan above or below it.
+        Points of planar polygons and points on sides keep their places. Other points move to the triangle of the fan
+        above or below them.
         """
         polygon, moved, is_fanned = self._kept(faces)
         at = np.flatnonzero(is_fanned)

@@ -113,7 +113,7 @@ class MeshReport:
 
 @dataclass(frozen=True)
 class CloudReport(MeshReport):
-    """What the points of a `PointCloud` tell of the surface, as `PointCloud.report` returns it.
+    """Report on the surface through the points of a `PointCloud`, returned by `PointCloud.report`.
 
     The counts, defects and sizes are those of `PointCloud.triangles`; `unreferenced_vertices` are the points left out,
     outliers that belong to no triangle.

@@ -302,7 +302,7 @@ def closest_points(mesh: MeshLike, positions: ArrayLike) -> ClosestPoints:
 
 
 def points_beside(mesh: Mesh, positions: ArrayLike, name: str = "positions") -> SurfacePoints:
-    """The closest points of a triangle mesh to positions (k, 3) or (3,) that lie beside it, such as clicked ones.
+    """The closest points of a triangle mesh to positions (k, 3) or (3,) near it, for instance of mouse clicks.
 
     Errors are those of `closest_points`, and a SourceError if one of the positions, called `name`, is farther from the
     surface than the mean length of an edge.

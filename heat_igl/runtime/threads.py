@@ -22,7 +22,7 @@ First = TypeVar("First")
 Second = TypeVar("Second")
 Result = TypeVar("Result")
 
-# Per thread: the number of threads, this one included, among which the processors are divided.
+# In a thread of a `Pool`, the number of threads that share the processors with it, itself included.
 _divided = threading.local()
 # Blocks of rows for each thread, so that the last one ends soon after the others.
 _BLOCKS_PER_THREAD = 4
@@ -51,9 +51,9 @@ def n_threads() -> int:
 
 
 class Pool(ThreadPoolExecutor):
-    """A pool of k threads, among which the processors of the calling thread are divided (see `n_threads`).
+    """A pool of k threads, which share the processors of the calling thread (see `n_threads`).
 
-    A ``with`` block waits for them at its end; it abandons them after an exception, such as that of Ctrl-C.
+    At its end, a ``with`` block waits for the threads. After an exception, for instance of Ctrl-C, it does not wait.
     """
 
     def __init__(self, k: int) -> None:

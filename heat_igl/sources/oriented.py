@@ -102,10 +102,10 @@ class OrientedSet:
 
 
 def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
-    """All that a user may pass as oriented sources, as one checked object; a `SourceError` names the first wrong one.
+    """The oriented sources of a user as one checked object; a `SourceError` names the first that is wrong.
 
-    That is a `SurfaceCurve` with a length, `OrientedPoints`, a mask of bool of the faces (m,) or the vertices (n,) of a
-    region, or a list of these kinds, or of such lists.
+    A source is a `SurfaceCurve` with a length, `OrientedPoints`, a bool mask of the faces (m,) or vertices (n,) of a
+    region, or a list of these, which may be nested.
     """
     parts = named_entries(curves, "curves")
     if not parts:
@@ -128,7 +128,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
 
 
 def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
-    """The segments of a curve or of the boundary of a region, without those of no length."""
+    """The segments of positive length of a curve, or of the boundary of a region."""
     if isinstance(part, SurfaceCurve):
         require_faces(part.faces, mesh.n_faces, f"{name}: ")
         start, end = on_simplex(part.start), on_simplex(part.end)

@@ -97,7 +97,7 @@ class SourceSet:
 
 
 def nearest_first(vertex: IntArray, value: FloatArray, label: IntArray) -> IntArray:
-    """Where the smallest of the values at each vertex is, of equal ones that of the first label; vertices ascending."""
+    """Indices of the smallest value at each vertex, vertices ascending; of equal values, that of the lowest label."""
     if len(vertex) < 2:
         return np.arange(len(vertex))
     order = np.lexsort((label, value, vertex))
@@ -273,7 +273,7 @@ def _checked_offsets(offsets: ArrayLike) -> FloatArray:
 
 
 def _holds_places(sources: object) -> TypeGuard[Sequence[Any]]:
-    """Whether a list, or one inside of it such as those of `isolines`, holds points or curves."""
+    """Whether a list, or a list nested in it, holds points or curves."""
     if not isinstance(sources, Sequence) or isinstance(sources, (str, bytes, range)):
         return False
     return any(isinstance(part, _PLACES) or _holds_places(part) for part in sources)

@@ -1,4 +1,4 @@
-"""The result of a validation: rows of numbers, as a dictionary, as Markdown, or as a figure."""
+"""The result of a validation, with its rows of numbers as a dictionary, as Markdown, or as a figure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from heat_igl.validation.metrics import BoundViolations, ErrorSummary, relative_
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# The columns of a table: a field of the row, or of one of its records, and the factor to the unit of the column.
+# Columns of a table: the attribute of `ValidationRow`, and the factor that converts it to the unit of the column.
 _COLUMNS = {
     "mean %": ("errors.mean", 1e2),
     "median %": ("errors.median", 1e2),
