@@ -7,6 +7,7 @@
     python scripts/metrics_table.py faces [--edge 20]          # a metric per face
     python scripts/metrics_table.py grids [--pixels 192] [--voxels 24]  # beside fast marching; several sides, or 0
     python scripts/metrics_table.py smooth [--rows 48]         # tensors that change smoothly in bodies
+    python scripts/metrics_table.py several [--rows 24]        # several sources beside single ones
     python scripts/metrics_table.py choice [cow.obj ...]       # windows beside the Hopf-Lax formula
     python scripts/metrics_table.py polygons cow.obj --sources 8   # on the duals of these meshes, or their polygons
 
@@ -23,6 +24,8 @@ scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they a
 percent, seconds of one query with its preparation, and memory; of ``--fields`` 0 to 3 alone, in their order.
 smooth: a twisted cylinder and discs, and a cube with a speed that grows linearly, with tensors per simplex and at the
 vertices, times over those of fim-python, which takes those per simplex.
+several: in the metrics of smooth, at the vertices, the mean and largest difference from the least of the distances from
+single sources, and time over that from one, from 3 and 30 vertices and the 30 vertices nearest to one.
 choice: what `hopf_lax_is_nearer` compares, and mean errors in closed form or against triangles cut into 4 or 16.
 polygons: mean errors of heat on triangles of the polygons and around virtual vertices, from exact distance there.
 """
@@ -577,6 +580,30 @@ def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         yield row | {m: row[m] | {"s": row[m]["s"] / row["fim"]["s"]} for m in ("fim", "face", "vertex")}
 
 
+def from_several(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
+    done = set()
+    for name, mesh, metric, source, _ in smooth(options.rows, rng):
+        body = name.split(", from")[0]
+        if (body, mesh.n_vertices) in done:
+            continue
+        done.add((body, mesh.n_vertices))
+        solver = GeodesicSolver(metric_operators(mesh, metric(mesh.V)))
+        near = np.linalg.norm(mesh.V - mesh.V[source], axis=1).argsort()
+        solver.distances([[source]] * 3)  # the first answers are compared with others
+        row: Row = {"body": body, "n": mesh.n_vertices}
+        for key, chosen in (
+            ("few", rng.choice(mesh.n_vertices, 3, replace=False)),
+            ("many", rng.choice(mesh.n_vertices, 30, replace=False)),
+            ("region", near[:30]),
+        ):
+            start = time.process_time()
+            least = np.min([solver.distance(vertex) for vertex in chosen], axis=0)
+            one = (time.process_time() - start) / len(chosen)
+            row[key] = timed(least, solver.distance, chosen)
+            row[key]["s"] /= one
+        yield row
+
+
 def choices(options: argparse.Namespace, rng: Random) -> Iterator[Field]:
     yield from (field for field in smooth(options.rows, rng) if not field[1].is_tetrahedral)
     for cells in (options.rows // 4, options.rows // 2, options.rows):
@@ -716,6 +743,8 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
         "fim-python, %": "{fim[mean]:.2g} and {fim[largest]:.2g}",
         **errors_and("time", face="per simplex", vertex="at the vertices"),
     }),
+    "several": (from_several, {"domain": "{body}", "vertices": "{n}"}
+        | errors_and("time", few="3 sources", many="30 sources", region="30 beside each other")),
     "choice": (on_choice, {
         "metric": "{field}", "vertices": "{n}", "variation": "{variation:.2g}", "curvature": "{curvature:.2g}",
         "windows, %": "{windows:.2g}", "Hopf-Lax, %": "{hopf:.2g}", "chosen": "{chosen}",

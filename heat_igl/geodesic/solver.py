@@ -10,7 +10,7 @@ import igl
 import numpy as np
 
 from heat_igl.errors import MeshError, checked_cutoff, names_guessed, require_choice
-from heat_igl.heat.batches import BatchedSolver, LabelledDistance
+from heat_igl.heat.batches import BatchedSolver, LabelledDistance, warn_of
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh
 from heat_igl.mesh.objects import as_simplices, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
@@ -315,6 +315,7 @@ class GeodesicSolver(BatchedSolver):
         limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
         found = self._asked(chosen).labelled(chosen, limit, n_threads())
         distance, labels = map(self._with_copies, found)
+        warn_of(self._complaint(distance, chosen, None))
         distance[distance > limit] = np.inf
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -430,12 +431,17 @@ class GeodesicSolver(BatchedSolver):
             return self._engine.to_targets(chosen, places)
         if isinstance(places, SurfacePoints):
             raise ValueError("targets inside faces need windows: leave method away, or name vertices")
-        return self._engine.distance(chosen)[places]
+        distance = self._engine.distance(chosen)
+        warn_of(self._complaint(distance, chosen, None))
+        return distance[places]
 
     def _moved(self, V: ArrayLike) -> GeodesicSolver:
         if isinstance(self._domain, Operators):
             raise ValueError("this solver was made from operators and has no vertices to move: make it again")
         return GeodesicSolver(self._domain.with_vertices(V), method=self._method, tolerance=self._tolerance)
+
+    def _complaint(self, distance: FloatArray, sources: SourceSet, check: object) -> str | None:  # noqa: ARG002
+        return self._asked(sources).complaint(sources, distance)
 
     def _source_set(self, sources: Sources) -> SourceSet:
         part, domain, faces = self._part, self._domain, None

@@ -172,9 +172,7 @@ class BatchedSolver(ABC):
         """
         limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
         (distance,), (check,) = self._answers([chosen], limit, n_threads())
-        complaint = self._complaint(distance, chosen, check)
-        if complaint is not None:
-            warn_caller(complaint, AccuracyWarning)
+        warn_of(self._complaint(distance, chosen, check))
         if limit < np.inf:
             distance[distance > limit] = np.inf
         return np.asarray(distance)
@@ -307,9 +305,15 @@ class BatchedSolver(ABC):
                 complaint = None if has_complained else self._complaint(*answer)
                 if complaint is not None:
                     has_complained = True
-                    warn_caller(f"source_sets[{solved_before + i}]: {complaint}", AccuracyWarning)
+                    warn_of(f"source_sets[{solved_before + i}]: {complaint}")
             solved_before += len(rows)
             yield rows
+
+
+def warn_of(complaint: str | None) -> None:
+    """Warn the caller of an answer, if there is a complaint."""
+    if complaint is not None:
+        warn_caller(complaint, AccuracyWarning)
 
 
 def _is_list(source_sets: object) -> bool:

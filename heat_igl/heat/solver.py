@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, checked_cutoff, names_guessed
-from heat_igl.heat.batches import BatchedSolver, LabelledDistance
+from heat_igl.heat.batches import BatchedSolver, LabelledDistance, warn_of
 from heat_igl.heat.checking import AnswerCheck
 from heat_igl.heat.parts import Diagnostics, HeatSolution, Magnitude, SolverOptions, SolverParts, prepare, prepare_mesh
 from heat_igl.heat.source_terms import Seeds, SourceTerm, drop_overtaken, right_hand_side, warmest_sources
@@ -304,7 +304,7 @@ class HeatMethodSolver(BatchedSolver):
         terms = self._source_terms([chosen])
         distance = self._distances_from_heat(terms, self._heat(terms))[0]
         labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
-        _warn(self._complaint(distance, chosen, self._checked(distance, chosen)))
+        warn_of(self._complaint(distance, chosen, self._checked(distance, chosen)))
         distance = self._with_copies(distance)
         distance[distance > limit] = np.inf
         labels = self._with_copies(labels)
@@ -319,7 +319,7 @@ class HeatMethodSolver(BatchedSolver):
         X, magnitude = _damped_field(self._parts, terms, u)
         distance = self._distances_from_heat(terms, u)[0]
         check = self._compared(distance, chosen, self._checked(distance, chosen))
-        _warn(check.complaint(self.operators.is_surface))
+        warn_of(check.complaint(self.operators.is_surface))
         with np.errstate(under="ignore"):
             heat = (u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass)[: self.n_vertices]
         return HeatSolution(
@@ -330,11 +330,6 @@ class HeatMethodSolver(BatchedSolver):
             t=self.t,
             diagnostics=replace(self.diagnostics, check=check),
         )
-
-
-def _warn(complaint: str | None) -> None:
-    if complaint is not None:
-        warn_caller(complaint, AccuracyWarning)
 
 
 def _damped_field(parts: SolverParts, terms: list[SourceTerm], u: FloatArray) -> tuple[FloatArray, FloatArray]:

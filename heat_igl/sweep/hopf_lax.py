@@ -6,16 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.operators import MetricSimplices
 from heat_igl.operators.metric_simplices import inverse_root, symmetric
 from heat_igl.plan import HALVED_AROUND, MOST_CHANGE, MOST_CHANGE_AT_WORST, MOST_TURNING, MOST_VARIATION
-from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray
 
 _SAMPLE = 250  # tetrahedra of which it is asked how far the metric turns
 _ROUNDING = 1e-12
@@ -34,20 +32,18 @@ class HopfLaxEngine(SimplexEngine):
         super().__init__(simplices)
         self._doubted = 3  # so many of the next answers are checked
 
-    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
-        """As of all engines; the first answers come with a warning where the mesh does not resolve the metric."""
-        distance, labels = super().labelled(sources, cutoff, threads)
+    def complaint(self, sources: SourceSet, distance: FloatArray) -> str | None:
+        """How it shows in one of the first answers that the mesh does not resolve the metric, once."""
         self._doubted -= 1
-        if self._doubted >= 0 and (complaint := self._complaint(sources, distance)):
-            self._doubted = 0
-            warn_caller(
-                f"the metric changes farther than the mesh resolves: {complaint}, and distance may be wrong by several "
-                "percent, and by tens at single vertices: take a finer mesh",
-                AccuracyWarning,
-            )
-        return distance, labels
+        if self._doubted < 0 or not (found := self._unresolved(sources, distance)):
+            return None
+        self._doubted = 0
+        return (
+            f"the metric changes farther than the mesh resolves: {found}, and distance may be wrong by several "
+            "percent, and by tens at single vertices: take a finer mesh"
+        )
 
-    def _complaint(self, sources: SourceSet, distance: FloatArray) -> str | None:
+    def _unresolved(self, sources: SourceSet, distance: FloatArray) -> str | None:
         """How it shows that the mesh does not resolve the metric; None if it does."""
         n, size, start, beyond = len(distance), self._corners.shape[1], sources.vertex_offset.min(), distance.copy()
         if size == 4:
@@ -70,7 +66,7 @@ class HopfLaxEngine(SimplexEngine):
         around = (*near, *sources.vertices[:HALVED_AROUND])
         corners = np.concatenate([self._incident[self._first[v] : self._first[v + 1]] for v in around])
         halved = HopfLaxEngine(self._simplices.halved(np.unique(corners // size)))
-        finer = SimplexEngine.labelled(halved, sources)[0][near]
+        finer = halved.distance(sources)[near]
         near, finer = (x[np.isfinite(finer) & (finer > start)] for x in (near, finer))
         change = 100 * np.append(np.abs(distance[near] - finer) / (finer - start), 0.0)
         if change.mean() <= MOST_CHANGE and change.max() <= MOST_CHANGE_AT_WORST:
@@ -78,9 +74,22 @@ class HopfLaxEngine(SimplexEngine):
         by = f"{change.mean():.2g} % in the mean, and by {change.max():.2g} % at vertex {near[change.argmax()]}"
         return f"if edges are halved, distance near the sources changes by {by}"
 
-    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:  # noqa: ARG002
-        """Lower distance to that of second order; returns the rest of what `HopfLax.settle` finds."""
-        return self._scheme.settle(distance, label, offset)
+    def _lower(
+        self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray, fronts: Any = None
+    ) -> None:
+        """Lower distance to the least of those of second order from each source alone, and add these to `fronts`."""
+        scheme, limit = self._scheme, np.full(len(distance), np.inf)
+        if len(vertices) > 1:
+            limit = distance.copy()
+            self._along_edges(limit, label.copy())
+        # The order of sources, on which rounding depends, is not that of the numbers of vertices.
+        for k in np.lexsort((*self._simplices.place[vertices].T, offset)):
+            found, far = scheme.spread(vertices[k], offset[k], limit)
+            nearer = far < distance[found]
+            distance[found[nearer]], label[found[nearer]] = far[nearer], k
+            limit[found] = np.minimum(limit[found], far)
+            if fronts is not None:
+                fronts.append((np.full(len(found), k), found, far, *scheme.record(found)))
 
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         self._scheme.shorten(distance, label)
@@ -94,7 +103,8 @@ class HopfLaxEngine(SimplexEngine):
     def derivative(self, sources: SourceSet) -> FixedPointDerivative:
         """The distance from source vertices with its derivative."""
         distance, label = self._begun(sources)
-        found = self._lower(sources.vertices, sources.vertex_offset, distance, label)
-        answer = distance.copy()
-        self._keep_bounds(sources, answer, label.copy())
-        return FixedPointDerivative(self._simplices, sources, answer, distance, label, *found)
+        fronts: list[tuple[AnyArray, ...]] = []
+        self._lower(sources.vertices.astype(np.int32), sources.vertex_offset, distance, label, fronts)
+        self._keep_bounds(sources, distance, label)
+        record = (np.concatenate(part) for part in zip(*fronts, strict=True))
+        return FixedPointDerivative(self._simplices, sources, distance, *record)

@@ -47,7 +47,7 @@ class _Inputs(NamedTuple):
     tensors : (k, q, 3, 3) float64
         One metric for the simplex (q = 1), or the metrics at the vertex and at the corners (q = p + 1).
     start : (k,) float64
-        The smallest offset among the sources of the corners.
+        The offset of the source.
     """
 
     distance: AnyArray
@@ -65,7 +65,7 @@ class _FacetUpdate:
     is_sloped : (k, p) bool
         Whether the slope at a corner is known.
     weight : (k, p, p) float64
-        How far the second-order term between two corners is used: not if they have different sources.
+        How far the second-order term between two corners is used.
     share : (k, p) float64
         Barycentric coordinates of the minimizer on the facet; coordinates that are 0 stay 0.
     """
@@ -340,27 +340,41 @@ class FixedPointDerivative(SimplexDerivative):
         Source vertices.
     answer : (n,) float64
         The distance that the engine returns.
-    *settled
-        Distance and label, and what `HopfLax.settle` returns, before the engine applied its bounds.
+    source, vertex : (k,) int64, (k,) int32
+        Each vertex that the distance from a source was followed to. Such a pair is called a node below.
+    distance, *record
+        Of each node, and what `HopfLax.record` returns for it.
     """
 
-    def __init__(self, simplices: MetricSimplices, sources: SourceSet, answer: FloatArray, *settled: AnyArray) -> None:
-        distance, label, facet, place, slope, is_sloped, weight = settled
+    def __init__(
+        self,
+        simplices: MetricSimplices,
+        sources: SourceSet,
+        answer: FloatArray,
+        source: IntArray,
+        vertex: AnyArray,
+        distance: FloatArray,
+        *record: AnyArray,
+    ) -> None:
         super().__init__(simplices, sources)
-        n, size = simplices.n, simplices.corners.shape[1]
+        facet, place, slope, is_sloped, weight = record
+        n, size, key = simplices.n, simplices.corners.shape[1], source * simplices.n + vertex
         others = np.array([[j for j in range(size) if j != c] for c in range(size)])
-        v = np.flatnonzero(facet >= 0)
-        self._simplex, corner = np.divmod(facet[v], size)
+        # The node of each vertex that is the nearest.
+        order = np.lexsort((distance, vertex))
+        self._reached, first = np.unique(vertex[order], return_index=True)
+        self._nearest, self._source, self._facet = order[first], source, facet
+        at = np.flatnonzero(facet >= 0)
+        self._simplex, corner = np.divmod(facet[at], size)
         self._corner = np.concatenate([corner[:, None], others[corner]], axis=1)
         # The vertex, and the corners of its facet.
         self._vertices = simplices.corners[self._simplex[:, None], self._corner]
-        labels = label[self._vertices[:, 1:]]
-        self._first = np.take_along_axis(labels, sources.vertex_offset[labels].argmin(axis=1)[:, None], axis=1)[:, 0]
-        second_order = (labels[:, :, None] == labels[:, None]) * weight[v, None, None]
-        is_known = is_sloped[self._vertices[:, 1:]].astype(bool)
-        self._update = _FacetUpdate(is_known, second_order, place[v])
-        self._rank = np.empty(n, np.int64)
-        self._rank[np.argsort(distance, kind="stable")] = np.arange(n)
+        by_key = np.argsort(key)
+        self._nodes = by_key[np.searchsorted(key, source[at, None] * n + self._vertices, sorter=by_key)]
+        is_known = is_sloped[self._nodes[:, 1:]].astype(bool)
+        self._update = _FacetUpdate(is_known, weight[at, None, None], place[at])
+        self._rank = np.empty(len(key), np.int64)
+        self._rank[np.argsort(distance, kind="stable")] = np.arange(len(key))
         self._state = np.concatenate([distance[:, None], slope], axis=1)
         found = self._state
         for _ in range(_MOST_STEPS):
@@ -368,18 +382,24 @@ class FixedPointDerivative(SimplexDerivative):
             self._state = self._state + change
             if (np.abs(change[:, 0]) <= _SETTLED * distance).all():
                 break
-        with np.errstate(invalid="ignore"):
-            off = np.abs(self._state - found)[:, 0] > _UNSETTLED * distance
-            if off.any():
-                self._state, off = found, np.isfinite(distance)
-                self._linearized()
-            off[self._vertices[~self._is_known, 0]] = True
-            self.distance = self._state[:, 0].copy()
-            self.inexact = np.flatnonzero(off | (np.abs(self.distance - answer) > _SAME * answer))
+        off = np.abs(self._state - found)[self._nearest, 0] > _UNSETTLED * distance[self._nearest]
+        if off.any():
+            self._state, off = found, np.ones(len(off), bool)
+            self._linearized()
+        off |= np.isin(self._nearest, self._nodes[~self._is_known, 0])
+        self.distance = self._at_vertices(self._state[:, 0], np.inf)
+        near, far = self.distance[self._reached], answer[self._reached]
+        self.inexact = self._reached[off | (np.abs(near - far) > _SAME * far)]
+
+    def _at_vertices(self, of_nodes: FloatArray, elsewhere: float) -> FloatArray:
+        """Values (n,) at vertices, from those of nodes (k,)."""
+        result = np.full(self._simplices.n, elsewhere)
+        result[self._reached] = of_nodes[self._nearest]
+        return result
 
     def _linearized(self) -> FloatArray:
         """Linearize the updates at the current state, and return the Newton step (n, 4) to the fixed point."""
-        self._at, v = self._inputs(), self._vertices[:, 0]
+        self._at, v = self._inputs(), self._nodes[:, 0]
         # During the iteration T^2 may be negative on a facet. Its vertex keeps its distance in this step.
         with np.errstate(invalid="ignore", divide="ignore"):
             self._update.place(self._at)
@@ -392,16 +412,17 @@ class FixedPointDerivative(SimplexDerivative):
 
     def _by_positions(self, rows: FloatArray) -> FloatArray:
         adjoint = np.stack([self._adjoint(row) for row in rows])
-        result = np.zeros((*adjoint.shape[:2], 3))
+        result = np.zeros((len(rows), self._simplices.n, 3))
         for (i, x), by in self._derivatives("X"):
             for into, row in zip(result, adjoint, strict=True):
                 into[:, x] += self._summed(self._vertices[:, i], row, by, len(into))
         return result
 
     def _by_starts(self, row: FloatArray) -> FloatArray:
-        adjoint, vertices = self._adjoint(row), self._sources.vertices
+        adjoint, n_sources, begins = self._adjoint(row), len(self._sources.vertices), self._facet < 0
         ((_, by),) = self._derivatives("start")
-        return np.asarray(adjoint[vertices, 0] + self._summed(self._first, adjoint, by, len(vertices)))
+        own = np.bincount(self._source[begins], adjoint[begins, 0], n_sources)
+        return np.asarray(own + self._summed(self._source[self._nodes[:, 0]], adjoint, by, n_sources))
 
     def by_metric(self, g: ArrayLike) -> FloatArray:
         """The gradient (n, 3, 3) or (m, 3, 3) by the tensors given to `metric_operators`; `g` is (n,).
@@ -431,19 +452,19 @@ class FixedPointDerivative(SimplexDerivative):
     def _moved(self, dV: FloatArray) -> FloatArray:
         change = np.zeros_like(self._state)
         for (i, x), by in self._derivatives("X"):
-            change[self._vertices[:, 0]] += by * dV[self._vertices[:, i], x][:, None]
-        return np.asarray(self._solved(change)[:, 0])
+            change[self._nodes[:, 0]] += by * dV[self._vertices[:, i], x][:, None]
+        return self._at_vertices(self._solved(change)[:, 0], 0.0)
 
     def _summed(self, where: IntArray, row: FloatArray, by: FloatArray, size: int) -> FloatArray:
-        """The adjoint `row` (n, 4) times the derivatives (k, 4), added up by entry (k,) of an input."""
-        return np.asarray(np.bincount(where, (row[self._vertices[:, 0]] * by).sum(axis=1), size), np.float64)
+        """The adjoint `row` (nodes, 4) times the derivatives (k, 4), added up by entry (k,) of an input."""
+        return np.asarray(np.bincount(where, (row[self._nodes[:, 0]] * by).sum(axis=1), size), np.float64)
 
     def _inputs(self) -> _Inputs:
-        simplices, facet, distance = self._simplices, self._vertices[:, 1:], self._state[:, 0]
+        simplices, facet, distance = self._simplices, self._nodes[:, 1:], self._state[:, 0]
         # A metric that is constant in the simplex is one input for all corners.
         corner = self._corner if simplices.velocity is not None else self._corner[:, :1]
         tensors = simplices.metric(self._simplex[:, None], corner)
-        start = self._sources.vertex_offset[self._first]
+        start = self._sources.vertex_offset[self._source[self._nodes[:, 0]]]
         return _Inputs(distance[facet], self._state[facet, 1:], simplices.place[self._vertices], tensors, start)
 
     def _derivatives(self, name: str) -> Iterator[tuple[tuple[int, ...], FloatArray]]:
@@ -461,8 +482,8 @@ class FixedPointDerivative(SimplexDerivative):
         row, column, value = [np.arange(self._state.size)], [np.arange(self._state.size)], [np.ones(self._state.size)]
         for name in ("distance", "slope"):
             for (i, *x), by in self._derivatives(name):
-                row.append((4 * self._rank[self._vertices[:, :1]] + np.arange(4)).ravel())
-                column.append(np.repeat(4 * self._rank[self._vertices[:, i + 1]] + (1 + x[0] if x else 0), 4))
+                row.append((4 * self._rank[self._nodes[:, :1]] + np.arange(4)).ravel())
+                column.append(np.repeat(4 * self._rank[self._nodes[:, i + 1]] + (1 + x[0] if x else 0), 4))
                 value.append(-by.ravel())
         A = sp.csc_array((np.concatenate(value), (np.concatenate(row), np.concatenate(column))))
         try:
@@ -479,8 +500,10 @@ class FixedPointDerivative(SimplexDerivative):
         return np.asarray(self._factor.solve(ordered.ravel(), way).reshape(-1, 4)[self._rank])
 
     def _adjoint(self, row: FloatArray) -> FloatArray:
-        """The adjoint state x (n, 4) of (1 - dF/dy)^T x = g, for a gradient g (n,) by distances."""
-        return self._solved(np.pad(row[:, None], ((0, 0), (0, 3))), "T")
+        """The adjoint state x (nodes, 4) of (1 - dF/dy)^T x = g, for a gradient g (n,) by distances."""
+        right = np.zeros_like(self._state)
+        right[self._nearest, 0] = row[self._reached]
+        return self._solved(right, "T")
 
 
 def gradient_rows(g: ArrayLike, distance: FloatArray, most: int = 2) -> FloatArray:

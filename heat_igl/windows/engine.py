@@ -41,6 +41,10 @@ class Engine(ABC):
         found[found >= than] = np.inf
         return found
 
+    def complaint(self, sources: SourceSet, distance: FloatArray) -> str | None:  # noqa: ARG002
+        """The text of a warning about a distance (n,), if one is due; called in the order of the answers."""
+        return None
+
 
 class Triangles(ABC):
     """A surface of triangles, with its components."""

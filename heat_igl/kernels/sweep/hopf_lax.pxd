@@ -7,8 +7,10 @@ cdef extern from *:
     #define SETTLED 5e-4
     // What a vertex may rise, as a share of its distance, though those it depends on do not: then its second order halves.
     #define RISEN 0.1
+    // By how many longest edges others may be nearer to a vertex from which a source is followed on: 0 to .25 measured.
+    #define CLOSE 0.1
     """
-    double SETTLED, RISEN
+    double SETTLED, RISEN, CLOSE
 
 
 cdef class HopfLax:
@@ -18,10 +20,12 @@ cdef class HopfLax:
     cdef Py_ssize_t left
     cdef const int[:, ::1] corners
     cdef const int[::1] first, incident
-    cdef unsigned char[::1] fixed
-    cdef double[::1] d, pending
-    cdef int[::1] label, n_visits
-    # Distance at the nearest source, the change that is not handed on, and that of the slope of the last vertex.
+    cdef unsigned char[::1] fixed, leads
+    cdef double[::1] d, pending, limit
+    # Which vertices lead on to those around them, and those that the source has reached, in this order.
+    cdef int[::1] label, n_visits, reached
+    cdef int n_reached
+    # Distance at the source, the change that is not handed on, and that of the slope of the last vertex.
     cdef double low, settled, turn[3]
     # The corner whose facet gave each vertex its distance, the place there, and what it adds to T linear.
     cdef int[::1] facet
@@ -34,6 +38,9 @@ cdef class HopfLax:
     cdef unsigned char[::1] state
     cdef double[::1] sum
 
+    cdef void forget(self, int v) noexcept nogil
+    cdef void march(self) noexcept nogil
+    cdef void lead_on(self, int v) noexcept nogil
     cdef void reach(self, int v) noexcept nogil
     cdef void wait(self, int v) noexcept nogil
     cdef void sharpen(self) noexcept nogil

@@ -11,7 +11,7 @@ Its second differences along the edges of the facet are found from the slopes of
 as far as these agree with the distances, and with the metric of the simplex.
 
 Distances begin with those along edges. Vertices are visited from near to far, some again, then in rounds, each after
-those it has its distance from.
+those it has its distance from. Where fronts of two sources meet, T is not smooth: each source is followed alone.
 """
 
 import cython
@@ -19,7 +19,7 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import pair
-from cython.cimports.heat_igl.kernels.sweep.hopf_lax import RISEN, SETTLED
+from cython.cimports.heat_igl.kernels.sweep.hopf_lax import CLOSE, RISEN, SETTLED
 from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, SimplexUpdate, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
@@ -42,23 +42,30 @@ class HopfLax:
     """
 
     def __init__(self, corners, first, incident, *in_metric):
-        self.corners, self.first, self.incident = corners, first, incident
-        self.update = SimplexUpdate(corners, *in_metric)
-
-    def shorten(self, d: cython.double[::1], label: cython.int[::1], left: cython.Py_ssize_t = 0) -> None:
-        """Lower distances `d` (n,) to paths along edges, in place; labels (n,) are handed on (Dijkstra 1959).
-
-        With visits `left`, each vertex gets one when it is reached, and others as long as these last.
-        """
-        n, n_taken = len(d), 0
-        self.d, self.label, self.low, self.waiting, self.left = d, label, np.min(d), PriorityQueue(n), left
+        self.corners, self.first, self.incident, n = corners, first, incident, len(first) - 1
+        update = self.update = SimplexUpdate(corners, *in_metric)
+        self.waiting, self.reached, self.n_reached = PriorityQueue(n), np.zeros(n, np.int32), 0
         self.facet, self.pending, self.fixed = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n, np.uint8)
+        self.leads, self.label, self.d = np.zeros(n, np.uint8), np.full(n, -1, np.int32), np.full(n, INFINITY)
+        self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
+        self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
+        update.d, update.slope, update.is_sloped, update.weight = (
+            self.d,
+            np.zeros((n, 3)),
+            np.zeros(n, np.uint8),
+            self.weight,
+        )
+        update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
+        self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
+        # Changes add up along a path.
+        self.settled = SETTLED * n ** (-1.0 / update.p)
+
+    def shorten(self, d: cython.double[::1], label: cython.int[::1]) -> None:
+        """Lower distances `d` (n,) to paths along edges, in place; labels (n,) are handed on (Dijkstra 1959)."""
+        self.d, self.label, self.limit, self.left, self.low = d, label, d, 0, np.min(d)
         with cython.nogil:
-            for v in range(self.d.shape[0]):
-                if d[v] < INFINITY and left > 0:
-                    self.wait(v)
-            # Without visits, only along edges that may be shorter than the difference of distances.
-            for s in range(0 if left > 0 else self.corners.shape[0]):
+            # Only along edges that may be shorter than the difference of distances.
+            for s in range(self.corners.shape[0]):
                 for i in range(self.corners.shape[1]):
                     for j in range(self.corners.shape[1]):
                         u: cython.int = self.corners[s, j]
@@ -67,23 +74,108 @@ class HopfLax:
                         may = may and gap > self.update.slack[s] * sqrt(self.update.mean[s, pair(i, j)])
                         if may and gap > edge_length(self.update, s, i, j):
                             self.reach(u)
-            while self.waiting.count > 0:
-                n_taken += 1
-                if n_taken % ASK == 0 and is_interrupted():
-                    break
-                v: cython.int = cython.cast(cython.int, self.waiting.first())
-                self.waiting.set_key(v, 0.0)
-                is_first: cython.bint = self.facet[v] < 0
-                if self.pending[v] == 0.0:
-                    # A source, and no other is nearer.
-                    self.fixed[v] = 1
-                elif self.left > 0:
-                    self.left -= not is_first
-                    self.renew(v)
-                if is_first:
-                    self.reach(v)
-        self.left = 0
+            self.march()
         raise_caught()
+
+    def spread(self, source: cython.int, start: cython.double, limit: cython.double[::1]):
+        """Find distances of second order from one source, as far as it may be the nearest; `record` has the rest.
+
+        Parameters
+        ----------
+        source, start : int, float
+            The vertex, and the distance at which it begins.
+        limit : (n,) float64
+            What is known of the distance from all sources, ``inf`` if nothing is.
+
+        Returns
+        -------
+        vertices, distance : (k,) int32, (k,) float64
+            The source and the vertices that were visited, ascending.
+        """
+        # Where metrics are long in one direction, distances depend on larger ones, and the first order takes too long.
+        left: cython.Py_ssize_t = len(limit) // 2
+        self.limit, self.low, self.update.start = limit, start, start
+        with cython.nogil:
+            for at in range(self.n_reached):
+                self.forget(self.reached[at])
+        self.n_reached, self.reached[0], self.d[source] = 1, source, start
+        self.wait(source)
+        while self.waiting.count > 0 and not is_interrupted():
+            self.left = left
+            with cython.nogil:
+                self.march()
+            left, self.left = self.left, 0
+            found, d = np.sort(self.reached[: self.n_reached]), np.asarray(self.d)
+            # Of equal distances the vertex of the lower number comes first.
+            self.roots = found[np.argsort(d[found], kind="stable")]
+            with cython.nogil:
+                self.sharpen()
+                # Vertices that have become nearer, and so have not led on until now.
+                for at in range(self.roots.shape[0]):
+                    self.lead_on(self.roots[at])
+        raise_caught()
+        return found, d[found]
+
+    def record(self, v):
+        """What is known of visited vertices v (k,) from the last source.
+
+        Returns
+        -------
+        facet, place : (k,) int32, (k, p) float64
+            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1, and
+            the shares of the other corners, in their order, at the best place on that facet.
+        slope, is_sloped : (k, 3) float64, (k,) uint8
+            The derivative of distance by the position of each vertex, and whether it is known.
+        weight : (k,) float64
+            How far T is of second order for a vertex: from 1 to 0, where T is linear.
+        """
+        update = self.update
+        at = np.asarray(self.facet)[v], np.asarray(self.place)[v]
+        return *at, np.asarray(update.slope)[v], np.asarray(update.is_sloped)[v], np.asarray(self.weight)[v]
+
+    def forget(self, v: cython.int) -> cython.void:
+        """Make v a vertex that no source has reached."""
+        self.d[v], self.facet[v], self.pending[v], self.fixed[v], self.leads[v] = INFINITY, -1, 0.0, 0, 0
+        self.weight[v], self.step[v], self.risen[v], self.n_visits[v] = 1.0, 0.0, 0.0, 0
+        self.update.is_sloped[v], self.update.trusted_in[v] = 0, -1
+        for k in range(3):
+            self.update.slope[v, k] = 0.0
+        for k in range(self.update.p):
+            self.place[v, k] = 0.0
+
+    def march(self) -> cython.void:
+        """From near to far: visit vertices, as long as visits are left, and reach those around them."""
+        n_taken: cython.int = 0
+        while self.waiting.count > 0:
+            n_taken += 1
+            if n_taken % ASK == 0 and is_interrupted():
+                break
+            v: cython.int = cython.cast(cython.int, self.waiting.first())
+            self.waiting.set_key(v, 0.0)
+            is_first: cython.bint = self.facet[v] < 0
+            if self.pending[v] == 0.0:
+                # The source.
+                self.fixed[v] = 1
+            elif self.left > 0:
+                self.left -= not is_first
+                self.renew(v)
+            self.lead_on(v)
+
+    def lead_on(self, v: cython.int) -> cython.void:
+        """Reach the vertices around v once, unless other sources are clearly nearer to v.
+
+        A shortest path runs where its source is the nearest, perhaps between vertices that are nearer to others. Fronts
+        of sources one edge h apart differ in direction by h / R at the distance R, so by up to h^2 / 2 R on both sides
+        of their border.
+        """
+        square: cython.double = 0.0
+        excess: cython.double = self.d[v] - self.limit[v]
+        if excess > 0.0:
+            for k in range(self.first[v], self.first[v + 1]):
+                square = max(square, self.update.widest[self.incident[k] // self.corners.shape[1]])
+        if not self.leads[v] and (excess <= CLOSE * sqrt(square) or 2.0 * excess * (self.d[v] - self.low) <= square):
+            self.leads[v] = 1
+            self.reach(v)
 
     def reach(self, v: cython.int) -> cython.void:
         """Lower distances around v to those along edges from v, where vertices were not visited."""
@@ -97,6 +189,9 @@ class HopfLax:
                     far: cython.double = self.d[v] + edge_length(self.update, s, c, i)
                     # Not by rounding, which would pass along many edges.
                     if far < self.d[u] * (1 - 1e-12):
+                        if self.d[u] == INFINITY:
+                            self.reached[self.n_reached] = u
+                            self.n_reached += 1
                         self.d[u], self.label[u], self.pending[u] = far, self.label[v], INFINITY
                         self.wait(u)
 
@@ -104,51 +199,13 @@ class HopfLax:
         """Let v wait, the nearest first."""
         self.waiting.set_key(v, 1.0 / (self.d[v] - self.low))
 
-    def settle(self, d, label, offset):
-        """Lower distances to those of second order, in place.
-
-        Parameters
-        ----------
-        d, label : (n,) float64, (n,) int32
-            Distances, ``inf`` but at the sources, and the source of each vertex, -1 for none; changed.
-        offset : (k,) float64
-            Of each source.
-
-        Returns
-        -------
-        facet, place : (n,) int32, (n, p) float64
-            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1, and
-            the shares of the other corners, in their order, at the best place on that facet.
-        slope, is_sloped : (n, 3) float64, (n,) uint8
-            The derivative of distance by the position of each vertex, and whether it is known.
-        weight : (n,) float64
-            How far T is of second order for a vertex: from 1 to 0, where T is linear.
-        """
-        n, update = len(d), self.update
-        place, weight, slope, is_sloped = np.zeros((n, update.p)), np.ones(n), np.zeros((n, 3)), np.zeros(n, np.uint8)
-        self.place, self.step, self.weight = place, np.zeros(n), weight
-        self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
-        update.d, update.label, update.low, update.offset = d, label, np.min(d), offset
-        update.slope, update.is_sloped, update.weight = slope, is_sloped, weight
-        update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
-        self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
-        # Changes add up along a path.
-        self.settled = SETTLED * n ** (-1.0 / update.p)
-        # Where metrics are long in one direction, distances depend on larger ones, and this order takes too long.
-        self.shorten(d, label, n // 2)
-        self.roots = np.argsort(d, kind="stable").astype(np.int32)
-        with cython.nogil:
-            self.sharpen()
-        raise_caught()
-        return np.asarray(self.facet), place, slope, is_sloped, weight
-
     def sharpen(self) -> cython.void:
         """Visit vertices in rounds, each after those it has its distance from."""
         is_settled: cython.bint = False
         while not is_settled and not is_interrupted():
             is_settled = True
             self.arrange()
-            for at in range(self.d.shape[0]):
+            for at in range(self.n_reached):
                 v = self.order[at]
                 # Where the metric turns far within a simplex, distances may go in circles: more so each time.
                 if self.pending[v] > self.settled * self.n_visits[v]:
@@ -246,13 +303,9 @@ class HopfLax:
         s, c = best_at // size, best_at % size
         self.update.face(s, c)
         self.d[v], self.facet[v], self.step[v] = best, best_at, best
-        most: cython.int = 0
         for i in range(size - 1):
             self.update.share[i] = self.place[v, i] = kept[i]
             self.step[v] -= kept[i] * self.update.level[i]
-            if kept[i] > kept[most]:
-                most = i
-        self.label[v] = self.label[self.corners[s, self.update.side[most]]]
         self.update.find_slope(s, c)
 
     def arrange(self) -> cython.void:
@@ -266,8 +319,9 @@ class HopfLax:
         size: cython.int = self.corners.shape[1]
         n_done: cython.int = 0
         so_far: cython.double = 0.0
-        self.state[:] = 0
-        for at in range(self.order.shape[0]):
+        for at in range(self.n_reached):
+            self.state[self.roots[at]] = 0
+        for at in range(self.n_reached):
             n_open: cython.int = 1
             self.stack[0] = self.roots[at]
             while n_open > 0:

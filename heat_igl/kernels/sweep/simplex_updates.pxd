@@ -19,10 +19,8 @@ cdef class SimplexUpdate(Facet):
     cdef double[::1] d
     # What bounds the values through each simplex.
     cdef double[::1] widest, slack, growths
-    # The source of each vertex, the offset of each, the least distance, and by how much T may sag on the facet.
-    cdef int[::1] label
-    cdef const double[::1] offset
-    cdef double low, most_sag
+    # By how much T may sag on the facet.
+    cdef double most_sag
     # The derivative of distance by position, where known, and its trust in the metric of one row or simplex.
     cdef double[:, ::1] slope
     cdef double[::1] trusted

@@ -154,7 +154,7 @@ class SimplexUpdate(Facet):
         """Whether corner c of s gains by `far`, which is farther: with T linear, only if angles at c are obtuse."""
         sq = cython.address(self.mean[s, 0])
         d: cython.double = self.d[self.corners[s, c]]
-        may: cython.bint = (self.d[self.corners[s, far]] - d) * (d - self.low) < 0.5 * self.widest[s]
+        may: cython.bint = (self.d[self.corners[s, far]] - d) * (d - self.start) < 0.5 * self.widest[s]
         for i in range(self.p + 1):
             may |= i != c and i != far and sq[pair(c, far)] + sq[pair(c, i)] < sq[pair(i, far)]
         return may and self.through(s, c, d) < d
@@ -168,7 +168,7 @@ class SimplexUpdate(Facet):
         above: cython.double = nearest - best
         # Between corners at one distance from a point, the square is less by at most a third of a squared edge.
         most: cython.double = 0.5 * self.widest[s]
-        near: cython.double = max(nearest - self.low, sqrt(most))
+        near: cython.double = max(nearest - self.start, sqrt(most))
         farther: cython.double = self.level[0] + self.level[1] + self.level[2]  # the third of a triangle is 0
         # Where T sags by no more than `above`, or a corner was not reached yet.
         if above >= near or above * (2.0 * near - above) >= most or farther == INFINITY:
@@ -202,9 +202,6 @@ class SimplexUpdate(Facet):
 
         It may be inf if it is not below `limit`.
         """
-        self.start = INFINITY
-        for i in range(self.p):
-            self.start = min(self.start, self.offset[self.label[self.corners[s, self.side[i]]]])
         self.lay(s, c)
         is_source: cython.bint = False
         x: cython.double[3]
@@ -257,7 +254,7 @@ class SimplexUpdate(Facet):
         """
         v: cython.int = self.corners[s, self.side[i]]
         u: cython.int = self.corners[s, self.side[j]]
-        if self.label[v] != self.label[u] or not (self.is_sloped[v] and self.is_sloped[u]):
+        if not (self.is_sloped[v] and self.is_sloped[u]):
             return 0.0
         Di: cython.double = self.D[i]
         Dj: cython.double = self.D[j]
