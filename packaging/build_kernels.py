@@ -52,11 +52,13 @@ WIDE = ("linear/multifrontal", "linear/substitution")
 VECTORS = {"avx2": "-mavx2 -mfma", "avx512": "-mavx512f -mavx512dq -mavx512vl -mfma -mprefer-vector-width=512"}
 VECTORS_MSVC = {"avx2": "/arch:AVX2", "avx512": "/arch:AVX512"}
 # The same bits on every processor: no fused multiplications. Square roots set no errno, so they are one instruction.
-# -O3, and the lines of C in tracebacks, took 13 % more of the compiler's time, and no less at run time but in `WIDE`.
+# -O3, and the lines of C in tracebacks, took 13 % more of the compiler's time, and no less at run time but in `WIDE`
+# and `UNROLLED`, which has many loops over a few numbers.
 OPTIONS = (
     "-O2 -g0 -DCYTHON_CLINE_IN_TRACEBACK=0 -fno-math-errno -fno-trapping-math -ffp-contract=off "
     "-Wno-unused-function -Wno-sign-compare"
 )
+UNROLLED = ("sweep/simplex_metrics",)
 ANY_ORDER = "-O3 -fassociative-math -fno-signed-zeros -ffp-contract=fast"
 OPTIONS_MSVC = "/O2 /fp:precise"
 
@@ -143,7 +145,8 @@ class BuildKernels(build_ext):
         if self.compiler.compiler_type == "msvc":
             options = f"{OPTIONS_MSVC} {VECTORS_MSVC.get(vectors, '')}"
         else:
-            options = f"{OPTIONS} {ANY_ORDER if kernel in WIDE else ''} {VECTORS.get(vectors, '')}"
+            order = ANY_ORDER if kernel in WIDE else "-O3 -fno-wrapv" if name in UNROLLED else ""
+            options = f"{OPTIONS} {order} {VECTORS.get(vectors, '')}"
         extension.extra_compile_args = options.split()
         extension.define_macros = [] if CHECKED else [("CYTHON_WITHOUT_ASSERTIONS", None)]
         super().build_extension(extension)

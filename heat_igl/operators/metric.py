@@ -397,16 +397,6 @@ class _LaterOperators(Operators):
         """Number of vertices."""
         return self._made.n if self.is_surface else self.mesh.n_vertices
 
-    @property
-    def n_given(self) -> int:
-        """Number of vertices of the mesh."""
-        return self.mesh.n_vertices
-
-    @property
-    def has_surface(self) -> bool:
-        """Whether the triangles are one."""
-        return self.is_surface
-
     @cached_property
     def _made(self) -> Operators:
         return self._make(*self._of)
@@ -429,9 +419,11 @@ class _LaterOperators(Operators):
         return getattr(self._made, name)
 
 
-# Fields with a default, which is no attribute of an instance that is not made.
+# Fields with a default, which is no attribute of an instance that is not made, and what is known without them.
 for _name in ("lengths", "longest_distances", "metric", "surface"):
     setattr(_LaterOperators, _name, property(attrgetter(f"_made.{_name}")))
+for _name, _known in ("n_given", "mesh.n_vertices"), ("has_surface", "is_surface"):
+    setattr(_LaterOperators, _name, property(attrgetter(_known)))
 
 
 def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray, group: AnyArray | None) -> Operators:
@@ -498,8 +490,9 @@ def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, Any, Any]:
         axes = plane_axes(mesh)
         symmetric = np.swapaxes(axes, 1, 2) @ symmetric @ axes
     first, group = equal_runs(symmetric) if p == 3 else (slice(None), slice(None))
-    root = inverse_root(symmetric[first], mesh)
-    return symmetric[first], float(np.sqrt(least_eigenvalue("metric", root[2][group, 0], g))), root, group
+    symmetric = symmetric[first]
+    root = inverse_root(symmetric, mesh)
+    return symmetric, float(np.sqrt(least_eigenvalue("metric", root[2][group, 0], g))), root, group
 
 
 def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[Any, float, Any]:

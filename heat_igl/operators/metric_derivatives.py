@@ -33,7 +33,11 @@ class SideLengths:
         length = mesh.edge_lengths
         # The derivative (3, k) of the length of each edge by the vector along it; 0 for edges without length.
         along = np.stack([x[head] - x[tail] for x in mesh.V.T])
-        self.mesh, self._slopes = mesh, np.divide(along, length, out=along, where=length > 0)
+        self.mesh, self._by_edge = mesh, np.divide(along, length, out=along, where=length > 0)
+
+    @property
+    def _slopes(self) -> FloatArray:
+        return np.asarray(self._by_edge)
 
     def by_positions(self, by_side: FloatArray) -> FloatArray:
         """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
@@ -69,14 +73,20 @@ class MetricSides(SideLengths):
             corners = np.einsum("mkx,mcx->mck", plane_axes(mesh), corners - corners[:, :1])
         # From the next corner to the one after.
         self._along = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
-        slopes = np.einsum("mij,mcj->mci", self._metric, self._along)
-        self._own = np.sqrt(np.einsum("mci,mci->mc", slopes, self._along))
-        is_ascending = mesh.F[:, [1, 2, 0]] < mesh.F[:, [2, 0, 1]]
-        slopes /= np.where(is_ascending, self._own, -self._own)[..., None]
-        of_side = mesh.facets.of_face.ravel()
-        self._n_faces = np.bincount(of_side)
-        columns = slopes.reshape(len(of_side), -1).T
-        self._slopes = np.stack([np.bincount(of_side, column) / self._n_faces for column in columns])
+        self._own = np.sqrt((self._along @ self._metric * self._along).sum(axis=2))
+        self._n_faces = np.bincount(mesh.facets.of_face.ravel())
+
+    @property
+    def _slopes(self) -> FloatArray:
+        if self._metric.shape[1] == 2:
+            raise ValueError(
+                "a metric (m, 2, 2) turns with the planes of the triangles, and the positions are not differentiated: "
+                "give it in space (m, 3, 3), or use by_metric and by_lengths"
+            )
+        is_ascending = self.mesh.F[:, [1, 2, 0]] < self.mesh.F[:, [2, 0, 1]]
+        slopes = self._along @ self._metric / np.where(is_ascending, self._own, -self._own)[..., None]
+        of_side = self.mesh.facets.of_face.ravel()
+        return np.stack([np.bincount(of_side, x) / self._n_faces for x in slopes.reshape(len(of_side), -1).T])
 
     def by_metric(self, by_side: FloatArray) -> FloatArray:
         """The derivative by the metric, in the shape in which it was given, from that by the lengths (m, 3)."""
@@ -89,24 +99,7 @@ class MetricSides(SideLengths):
         own = (self._mean(by_side) * self._own).sum(axis=1)
         return np.asarray(-own * np.sqrt(self._metric[:, 0, 0]))
 
-    def by_positions(self, by_side: FloatArray) -> FloatArray:
-        """The derivative (n, 3) by the positions, from that by the lengths (m, 3)."""
-        self._check_in_space()
-        return super().by_positions(by_side)
-
-    def push_positions(self, dV: FloatArray) -> FloatArray:
-        """How the lengths (m, 3) change when the vertices move by dV (n, 3)."""
-        self._check_in_space()
-        return super().push_positions(dV)
-
     def _mean(self, by_side: FloatArray) -> FloatArray:
         """The mean (m, 3) over the faces at each edge."""
         of_side = self.mesh.facets.of_face
         return np.asarray((np.bincount(of_side.ravel(), by_side.ravel()) / self._n_faces)[of_side])
-
-    def _check_in_space(self) -> None:
-        if self._metric.shape[1] == 2:
-            raise ValueError(
-                "a metric (m, 2, 2) turns with the planes of the triangles, and the positions are not differentiated: "
-                "give it in space (m, 3, 3), or use by_metric and by_lengths"
-            )

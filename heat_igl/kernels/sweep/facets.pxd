@@ -88,7 +88,6 @@ cdef class Facet:
     cdef double T, near, sx, even, bent, factor, factor_1
     cdef double rise[3], own[3], w[3], u[3], inverse[6], a[3][3]
 
-    cdef double dual(self, int k, const double* e) noexcept nogil
     cdef double along_edges(self) noexcept nogil
     cdef double length(self, const double* x) noexcept nogil
     cdef double lean(self, int i) noexcept nogil

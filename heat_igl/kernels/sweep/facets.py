@@ -23,20 +23,6 @@ class Facet:
     `share`. For p = 2 the third of each is 0.
     """
 
-    def dual(self, k: cython.int, e: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """The square of a slope in the inverse metric: e at corner k - 1, or that which rises by e if q = 1."""
-        w: cython.double[3]
-        if self.q > 1:
-            multiply(cython.address(self.W[k][0]), e, w)
-            return w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-        m: cython.double[6]
-        inverse: cython.double[6]
-        m[0], m[1], m[2], m[3] = self.product[0], self.product[1], self.product[2], self.product[4]
-        m[4], m[5] = self.product[5], self.product[8] if self.p == 3 else 1.0
-        invert(m, inverse)
-        multiply(inverse, e, w)
-        return e[0] * w[0] + e[1] * w[1] + e[2] * w[2]
-
     def along_edges(self) -> cython.double:
         """The least value along an edge to v; sets `share`."""
         at: cython.int = 0

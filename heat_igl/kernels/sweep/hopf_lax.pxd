@@ -20,8 +20,10 @@ cdef class HopfLax:
     cdef Py_ssize_t left
     cdef const int[:, ::1] corners
     cdef const int[::1] first, incident
-    cdef unsigned char[::1] fixed, leads
-    cdef double[::1] d, pending, limit
+    # Distance, the same of visited vertices alone, the change that visits have not taken in, and distance from all sources.
+    cdef double[::1] d, known, pending, limit
+    # Facets that have changed since they were asked.
+    cdef unsigned char[::1] changed, leads
     # Which vertices lead on to those around them, and those that the source has reached, in this order.
     cdef int[::1] label, n_visits, reached
     cdef int n_reached

@@ -45,16 +45,12 @@ class HopfLax:
         self.corners, self.first, self.incident, n = corners, first, incident, len(first) - 1
         update = self.update = SimplexUpdate(corners, *in_metric)
         self.waiting, self.reached, self.n_reached = PriorityQueue(n), np.zeros(n, np.int32), 0
-        self.facet, self.pending, self.fixed = np.full(n, -1, np.int32), np.zeros(n), np.zeros(n, np.uint8)
+        self.facet, self.pending, self.known = np.full(n, -1, np.int32), np.zeros(n), np.full(n, INFINITY)
         self.leads, self.label, self.d = np.zeros(n, np.uint8), np.full(n, -1, np.int32), np.full(n, INFINITY)
+        self.changed = np.zeros(incident.shape[0], np.uint8)
         self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
-        update.d, update.slope, update.is_sloped, update.weight = (
-            self.d,
-            np.zeros((n, 3)),
-            np.zeros(n, np.uint8),
-            self.weight,
-        )
+        update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
         update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
         self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
         # Changes add up along a path.
@@ -67,13 +63,13 @@ class HopfLax:
             # Only along edges that may be shorter than the difference of distances.
             for s in range(self.corners.shape[0]):
                 for i in range(self.corners.shape[1]):
-                    for j in range(self.corners.shape[1]):
-                        u: cython.int = self.corners[s, j]
-                        gap: cython.double = d[self.corners[s, i]] - d[u]
-                        may: cython.bint = gap > 0.0 and self.pending[u] == 0.0
-                        may = may and gap > self.update.slack[s] * sqrt(self.update.mean[s, pair(i, j)])
-                        if may and gap > edge_length(self.update, s, i, j):
-                            self.reach(u)
+                    for j in range(i):
+                        gap: cython.double = d[self.corners[s, i]] - d[self.corners[s, j]]
+                        least: cython.double = self.update.slack[s] * self.update.slack[s]
+                        if gap * gap > least * self.update.mean[s, pair(i, j)]:
+                            u: cython.int = self.corners[s, j if gap > 0.0 else i]
+                            if self.pending[u] == 0.0 and fabs(gap) > edge_length(self.update, s, i, j):
+                                self.reach(u)
             self.march()
         raise_caught()
 
@@ -135,7 +131,7 @@ class HopfLax:
 
     def forget(self, v: cython.int) -> cython.void:
         """Make v a vertex that no source has reached."""
-        self.d[v], self.facet[v], self.pending[v], self.fixed[v], self.leads[v] = INFINITY, -1, 0.0, 0, 0
+        self.d[v], self.known[v], self.facet[v], self.pending[v], self.leads[v] = INFINITY, INFINITY, -1, 0.0, 0
         self.weight[v], self.step[v], self.risen[v], self.n_visits[v] = 1.0, 0.0, 0.0, 0
         self.update.is_sloped[v], self.update.trusted_in[v] = 0, -1
         for k in range(3):
@@ -155,7 +151,7 @@ class HopfLax:
             is_first: cython.bint = self.facet[v] < 0
             if self.pending[v] == 0.0:
                 # The source.
-                self.fixed[v] = 1
+                self.known[v] = self.d[v]
             elif self.left > 0:
                 self.left -= not is_first
                 self.renew(v)
@@ -242,15 +238,16 @@ class HopfLax:
                 most = max(most, fabs(by))
             for c in range(size):
                 u = self.corners[s, c]
-                if u == v or self.fixed[u] or self.facet[u] < 0 or not most > max(self.settled, self.pending[u]):
+                if u == v or self.facet[u] < 0 or not most > self.settled:
                     continue
                 # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
                 if (
-                    self.d[v] < self.d[u]
+                    most <= self.pending[u]
+                    or self.d[v] < self.d[u]
                     or self.facet[u] // size == s
                     or ((change == INFINITY or self.d[v] < old) and self.update.gains(s, c, self.incident[k] % size))
                 ):
-                    self.pending[u] = most
+                    self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
                     if self.left > 0:
                         self.wait(u)
 
@@ -265,25 +262,27 @@ class HopfLax:
         best: cython.double = INFINITY
         best_at: cython.int = -1
         kept: cython.double[3]
+        # Facets that have not changed were no better, unless the one of the last visit is worse now.
+        asks_all: cython.bint = True
         # Without corners that were not visited, for which it would be done again, if it gets nearer by the others.
         for is_open in range(2):
-            n_left: cython.int = 0
+            self.update.d = cython.address(self.d[0]) if is_open else cython.address(self.known[0])
             # The facet of the last visit first: it rules out most of the others.
             for k in range(self.first[v] - 1, self.first[v + 1]):
                 at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
-                if at < 0 or (at == self.facet[v] and k >= self.first[v]):
+                if at < 0 or (k >= self.first[v] and (at == self.facet[v] or not (asks_all or self.changed[at]))):
                     continue
                 s: cython.int = at // size
                 c: cython.int = at % size
-                has_open: cython.bint = False
-                for i in range(size):
-                    u: cython.int = self.corners[s, i]
-                    has_open |= i != c and self.facet[u] < 0 and not self.fixed[u]
-                n_left += has_open != is_open
-                if has_open != is_open:
+                has_open: cython.bint = not is_open
+                for i in range(size if is_open else 0):
+                    has_open |= i != c and self.known[self.corners[s, i]] == INFINITY
+                if not has_open:
                     continue
                 value: cython.double = self.update.through(s, c, best)
-                if k < self.first[v]:
+                self.changed[at] = False
+                if k < self.first[v] and value < INFINITY:
+                    asks_all = value > self.d[v] * (1 + EQUAL)
                     rise = -self.step[v]
                     for i in range(size - 1):
                         rise -= self.place[v, i] * self.update.level[i]
@@ -292,7 +291,7 @@ class HopfLax:
                     best, best_at = value, at
                     for i in range(size - 1):
                         kept[i] = self.update.share[i]
-            if n_left == 0 or best < self.d[v] + EQUAL * fabs(best):
+            if best < self.d[v] + EQUAL * fabs(best):
                 break
         if best_at < 0:
             return
@@ -302,7 +301,8 @@ class HopfLax:
             self.weight[v] *= 0.5
         s, c = best_at // size, best_at % size
         self.update.face(s, c)
-        self.d[v], self.facet[v], self.step[v] = best, best_at, best
+        self.update.d = cython.address(self.known[0])
+        self.d[v], self.known[v], self.facet[v], self.step[v] = best, best, best_at, best
         for i in range(size - 1):
             self.update.share[i] = self.place[v, i] = kept[i]
             self.step[v] -= kept[i] * self.update.level[i]

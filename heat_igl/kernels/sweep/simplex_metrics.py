@@ -49,6 +49,7 @@ def lengths_in_velocity(
     rise: cython.double[4]
     along: cython.double[3]
     across: cython.double[3]
+    at: cython.pointer[cython.const[cython.double]][4]
     with cython.nogil:
         for i in range(velocity.shape[0]):
             invert(cython.address(velocity[i, 0]), cython.address(inverse[i, 0]))
@@ -58,27 +59,21 @@ def lengths_in_velocity(
             for k in range(6):
                 W[k] = 0.0
             for i in range(size):
-                fastest = max(fastest, mean_velocity(cython.address(velocity[rows[s, i], 0])))
+                at[i] = cython.address(velocity[rows[s, i], 0])
                 for x in range(3):
                     for j in range(i):
                         e[3 * pair(i, j) + x] = V[corners[s, j], x] - V[corners[s, i], x]
                     E[3 * i + x] = V[corners[s, 0], x] - V[corners[s, i], x]
                 for k in range(6):
-                    W[k] += velocity[rows[s, i], k] / size
-                rise[i] = mean_velocity(cython.address(velocity[rows[s, 0], 0]))
-                rise[i] -= mean_velocity(cython.address(velocity[rows[s, i], 0]))
+                    W[k] += at[i][k] / size
+                rise[i] = mean_velocity(at[0]) - mean_velocity(at[i])
+                fastest = max(fastest, mean_velocity(at[i]))
             invert(W, I)
+            for i in range(size):
+                squares_of(cython.address(inverse[rows[s, i], 0]), e, n_pairs, squares + 6 * i)
             squares_of(I, e, n_pairs, cython.address(mean[s, 0]))
             gradient(E + 3, rise + 1, size - 1, here)
             squares_of(W, here, 1, cython.address(growth[s]))
-            growth[s] = sqrt(growth[s]) / mean_velocity(W)
-            for k in range(n_pairs):
-                longest = max(longest, mean[s, k])
-            # In a flat simplex, the arc over a long edge would leave it, for velocities far above those at the corners.
-            fastest /= mean_velocity(W)
-            growth[s] = min(growth[s], 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
-            for i in range(size):
-                squares_of(cython.address(inverse[rows[s, i], 0]), e, n_pairs, squares + 6 * i)
             # How much faster it is in the middle between two corners than in the mean, to first order.
             faster: cython.double = 1.0
             for k in range(n_pairs):
@@ -86,16 +81,24 @@ def lengths_in_velocity(
                 two: cython.double = squares[k]
                 multiply(I, e + 3 * k, along)
                 multiply(I, along, across)
+                # Of the corners where it is fastest.
+                most: cython.double = 0.0
+                second: cython.double = 0.0
                 for i in range(size):
                     one, two = min(one, squares[6 * i + k]), max(two, squares[6 * i + k])
-                    multiply(cython.address(velocity[rows[s, i], 0]), along, here)
-                    rise[i] = here[0] * across[0] + here[1] * across[1] + here[2] * across[2]
-                    for j in range(i):
-                        faster = max(faster, 0.5 * (rise[i] + rise[j]) / mean[s, k])
-                widest[s] = max(widest[s], two)
-                variation += (one + two - 2.0 * sqrt(one * two)) / (n_pairs * m * mean[s, k])
+                    multiply(at[i], along, here)
+                    here[3] = here[0] * across[0] + here[1] * across[1] + here[2] * across[2]
+                    second = max(second, min(most, here[3]))
+                    most = max(most, here[3])
+                faster = max(faster, 0.5 * (most + second) / mean[s, k])
+                longest, widest[s] = max(longest, mean[s, k]), max(widest[s], two)
+                variation += (one + two - 2.0 * sqrt(one * two)) / mean[s, k]
             slack[s] = 1.0 / faster
-    return *found, variation
+            # In a flat simplex, the arc over a long edge would leave it, for velocities far above those at the corners.
+            fastest /= mean_velocity(W)
+            growth[s] = sqrt(growth[s]) / mean_velocity(W)
+            growth[s] = min(growth[s], 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
+    return *found, variation / (n_pairs * max(m, 1))
 
 
 def velocities_at_corners(
@@ -214,6 +217,8 @@ def fits_around(
     mean: cython.double[41]
     work: cython.double[18]
     slope: cython.double[18]
+    known: cython.p_double[4]
+    missed: cython.p_double[4]
     row[0] = 1.0
     with cython.nogil:
         for s in range(corners.shape[0]):
@@ -224,20 +229,23 @@ def fits_around(
             for k in range(3 if n_columns == 41 else 0):
                 normal[k] = axes[s, 0, (k + 1) % 3] * axes[s, 1, (k + 2) % 3]
                 normal[k] -= axes[s, 0, (k + 2) % 3] * axes[s, 1, (k + 1) % 3]
+            i: cython.int = 0
+            for j in range(4):
+                for k in range(j, 10):
+                    mean[i] = row[j] * row[k]
+                    i += 1
+            mean[34] = 0.0
+            for k in range(6):
+                mean[34] += _OFTEN[k] * row[4 + k] * row[4 + k]
+            i = 35
+            for j in range(3 if n_columns == 41 else 0):
+                for k in range(j, 3):
+                    mean[i] = normal[j] * normal[k]
+                    i += 1
             for c in range(size):
-                u: cython.int = corners[s, c]
-                i: cython.int = 0
-                for j in range(4):
-                    for k in range(j, 10):
-                        at[u, i] += row[j] * row[k]
-                        i += 1
-                for k in range(6):
-                    at[u, 34] += _OFTEN[k] * row[4 + k] * row[4 + k]
-                i = 35
-                for j in range(3 if n_columns == 41 else 0):
-                    for k in range(j, 3):
-                        at[u, i] += normal[j] * normal[k]
-                        i += 1
+                to = cython.address(at[corners[s, c], 0])
+                for k in range(n_columns):
+                    to[k] += mean[k]
         for v in range(X.shape[0]):
             others: cython.double = -1.0
             for k in range(41):
@@ -247,11 +255,12 @@ def fits_around(
                     met[corners[incident[i] // size, c]] += 1
             for i in range(first[v], first[v + 1]):
                 for c in range(size):
-                    u = corners[incident[i] // size, c]
+                    u: cython.int = corners[incident[i] // size, c]
                     if met[u] > 0:
                         others += cython.cast(cython.double, first[u + 1] - first[u]) / size
+                        of = cython.address(at[u, 0])
                         for k in range(n_columns):
-                            mean[k] += met[u] * at[u, k]
+                            mean[k] += met[u] * of[k]
                         met[u] = 0
             total: cython.double = max(mean[0], 1.0)
             for k in range(n_columns):
@@ -302,12 +311,15 @@ def fits_around(
                 most: cython.double = 1.0
                 for c in range(size):
                     most = min(most, share[corners[s, c]])
+                    known[c] = cython.address(result[corners[s, c], 0])
+                    missed[c] = cython.address(at[corners[s, c], 0])
                 for k in range(6):
-                    miss: cython.double = W[group[s], k]
+                    miss: cython.double = size * W[group[s], k]
                     for c in range(size):
-                        miss -= result[corners[s, c], k] / size
+                        miss -= known[c][k]
+                    miss *= most / size
                     for c in range(size):
-                        at[corners[s, c], k] += most * miss
+                        missed[c][k] += miss
             for v in range(X.shape[0]):
                 for k in range(6):
                     result[v, k] += at[v, k] / max(first[v + 1] - first[v], 1)

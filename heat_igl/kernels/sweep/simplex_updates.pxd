@@ -16,7 +16,7 @@ cdef class SimplexUpdate(Facet):
     # The corners of the facet in the simplex, and distance at these.
     cdef int side[3]
     cdef double level[3]
-    cdef double[::1] d
+    cdef double* d
     # What bounds the values through each simplex.
     cdef double[::1] widest, slack, growths
     # By how much T may sag on the facet.

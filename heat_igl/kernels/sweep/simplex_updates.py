@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.sweep import facets
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, gradient, mean_velocity, pair, squares_of
 from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
@@ -304,13 +305,22 @@ class SimplexUpdate(Facet):
             return 0.0
         row: cython.int = self.rows[s, self.side[i]] if self.q > 1 else s
         if self.trusted_in[v] != row:
-            e: cython.double[3]
-            for j in range(3):
-                e[j] = self.slope[v, j] if self.q > 1 else 0.0
-                if self.q == 1 and j < self.p:
-                    for k in range(3):
-                        e[j] += self.slope[v, k] * self.E[j][k]
-            square: cython.double = self.dual(i + 1 if self.q > 1 else 0, e)
+            square: cython.double = 0.0
+            if self.q > 1:
+                squares_of(self.W[i + 1], cython.address(self.slope[v, 0]), 1, cython.address(square))
+            else:
+                # By products with vectors to the corners, in the inverse of the metric that has the products of these.
+                m: cython.double[6]
+                inverse: cython.double[6]
+                m[0], m[1], m[2], m[3] = self.product[0], self.product[1], self.product[2], self.product[4]
+                m[4], m[5] = self.product[5], self.product[8] if self.p == 3 else 1.0
+                facets.invert(m, inverse)
+                for j in range(3):
+                    m[j] = 0.0
+                    for k in range(3 if j < self.p else 0):
+                        m[j] += self.slope[v, k] * self.E[j][k]
+                facets.multiply(inverse, m, m + 3)
+                square = m[0] * m[3] + m[1] * m[4] + m[2] * m[5]
             square = log(square) if square > 0.0 else 1.0
             self.trusted[v], self.trusted_in[v] = max(1.0 - square * square, 0.0), row
         return self.trusted[v]
