@@ -286,8 +286,9 @@ def operators_in_metric(
     del own, squares
     # Triangles without area know no metric in their plane.
     has_area = bool((mesh.measures > 0).all())
-    simplices = MetricSimplices.in_metric(mesh, g, least, root=root) if has_area else None
+    root = inverse_root(g, mesh) if root is None and has_area else root
     del g
+    simplices = MetricSimplices.in_metric(mesh, None, least, root=root) if has_area else None
     return _unfolded(mesh, sides, simplices, laplacian, given)
 
 

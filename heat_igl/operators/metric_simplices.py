@@ -79,7 +79,7 @@ class MetricSimplices:
         """The faces of a mesh with a metric (m, 3, 3) on each, or (n, 3, 3) at each vertex, and its `least` length.
 
         Where it is the same everywhere, distance is that in space after a linear map. What `inverse_root` returns may
-        be given. Tetrahedra may have metrics (k, 3, 3) by `group`.
+        be given, of triangles alone. Tetrahedra may have metrics (k, 3, 3) by `group`.
         """
         p, corners = mesh.F.shape[1] - 1, mesh.F.astype(np.int32)
         if p == 3 and all(np.abs(some - g[0]).max() <= _ROUNDING * np.abs(g[0]).max() for some in (g[-9:], g)):
@@ -98,6 +98,7 @@ class MetricSimplices:
         at_vertex, share = fits_around(corners, mesh.V - mesh.V.mean(axis=0), velocity, group, axes, *incident)
         del incident
         if not (share > _ROUNDING).any():
+            g = np.linalg.matrix_power(symmetric(velocity), -2) if g is None else g
             return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3)
         smallest, largest = inverse_root(at_vertex)[2].T
         share[smallest <= 0] = 0
@@ -128,8 +129,8 @@ class MetricSimplices:
             one, other = np.tril_indices(self.corners.shape[1], -1)
             e = self.place[self.corners[:, one]] - self.place[self.corners[:, other]]
             lengths = np.sqrt(((e if self.tensors is None else e @ self.tensors[self.group]) * e).sum(axis=2))
-        mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths))
-        return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0.0
+        mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths), np.float32)
+        return None, mean, mean.max(axis=1).astype(np.float32), one_each, 0 * one_each, 0.0
 
     def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:
         """The tensors (..., 3, 3) of chosen simplices (...) at corners (...)."""

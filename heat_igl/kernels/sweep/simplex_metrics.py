@@ -33,12 +33,12 @@ def lengths_in_velocity(
     size: cython.int = corners.shape[1]
     n_pairs: cython.int = size * (size - 1) // 2
     m = corners.shape[0]
-    found = np.zeros_like(velocity), np.zeros((m, n_pairs)), np.zeros(m), np.ones(m), np.zeros(m)
+    found = np.zeros_like(velocity), np.zeros((m, n_pairs)), *(np.zeros(m, np.float32) for _ in range(3))
     inverse: cython.double[:, ::1] = found[0]
     mean: cython.double[:, ::1] = found[1]
-    widest: cython.double[::1] = found[2]
-    slack: cython.double[::1] = found[3]
-    growth: cython.double[::1] = found[4]
+    widest: cython.float[::1] = found[2]
+    slack: cython.float[::1] = found[3]
+    growth: cython.float[::1] = found[4]
     variation: cython.double = 0.0
     squares: cython.double[24]
     here: cython.double[6]
@@ -73,7 +73,8 @@ def lengths_in_velocity(
                 squares_of(cython.address(inverse[rows[s, i], 0]), e, n_pairs, squares + 6 * i)
             squares_of(I, e, n_pairs, cython.address(mean[s, 0]))
             gradient(E + 3, rise + 1, size - 1, here)
-            squares_of(W, here, 1, cython.address(growth[s]))
+            squares_of(W, here, 1, rise)
+            steep: cython.double = sqrt(rise[0]) / mean_velocity(W)
             # How much faster it is in the middle between two corners than in the mean, to first order.
             faster: cython.double = 1.0
             for k in range(n_pairs):
@@ -96,8 +97,7 @@ def lengths_in_velocity(
             slack[s] = 1.0 / faster
             # In a flat simplex, the arc over a long edge would leave it, for velocities far above those at the corners.
             fastest /= mean_velocity(W)
-            growth[s] = sqrt(growth[s]) / mean_velocity(W)
-            growth[s] = min(growth[s], 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
+            growth[s] = min(steep, 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
     return *found, variation / (n_pairs * max(m, 1))
 
 

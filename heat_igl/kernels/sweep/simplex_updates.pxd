@@ -18,7 +18,7 @@ cdef class SimplexUpdate(Facet):
     cdef double level[3]
     cdef double* d
     # What bounds the values through each simplex.
-    cdef double[::1] widest, slack, growths
+    cdef const float[::1] widest, slack, growths
     # By how much T may sag on the facet.
     cdef double most_sag
     # The derivative of distance by position, where known, and its trust in the metric of one row or simplex.
