@@ -28,7 +28,8 @@ from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 
 # Corners of curves are put on a grid of this many steps along each side of a face, so that integers hold them exactly.
 _STEPS = 2**50
-# Corners nearer than this to a vertex, an edge or each other, as a share of the face, are the same point.
+# Corners nearer than this to a vertex, an edge or each other, as a share of the face, are the same point. With 1e-12
+# 400 random cuts keep areas, lengths and distances to 1e-14 as well; with 1e-5 lengths change by 7e-6.
 _SAME = 1e-9
 
 

@@ -12,6 +12,7 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 
+from heat_igl import plan
 from heat_igl.errors import AccuracyWarning, FactorizationError, positive, require_choice
 from heat_igl.heat.checking import AnswerCheck, Checker, Comparison, Comparisons, thinnest
 from heat_igl.heat.source_terms import SourceAssembler
@@ -35,17 +36,7 @@ from heat_igl.operators import (
     operators,
     point_cloud_operators,
 )
-from heat_igl.plan import (
-    FARTHEST_SPREAD,
-    RANDOM_SIDES,
-    T_COEF,
-    T_COEF_EVEN_POINTS,
-    T_COEF_FITTED,
-    T_COEF_RANDOM_POINTS,
-    T_COEF_ROUGH,
-    Plan,
-    heat_plan,
-)
+from heat_igl.plan import Plan, heat_plan
 from heat_igl.runtime import Pool, in_order, n_threads, warn_caller
 from heat_igl.typing import FloatArray
 
@@ -214,9 +205,9 @@ def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[
         return step, options.t
     t_coef = options.t_coef
     if t_coef is None:
-        t_coef = T_COEF
+        t_coef = plan.T_COEF
         if fitted:
-            t_coef = T_COEF_ROUGH if is_rough_or_narrow(domain) else T_COEF_FITTED
+            t_coef = plan.T_COEF_ROUGH if is_rough_or_narrow(domain) else plan.T_COEF_FITTED
     requested = t_coef * domain.mean_edge_lengths**2
     steps = np.maximum(requested, smallest_time_steps(domain, fitted))
     used = np.unique(domain.components[domain.referenced])
@@ -237,7 +228,7 @@ def check_large_step(options: SolverOptions, domain: Operators) -> None:
     if step is None and options.t_coef is not None:
         step = options.t_coef * domain.mean_edge_length**2
     name, value = ("t", options.t) if options.t is not None else ("t_coef", options.t_coef)
-    if step is not None and np.sqrt(step) > FARTHEST_SPREAD * domain.longest_distance:
+    if step is not None and np.sqrt(step) > plan.FARTHEST_SPREAD * domain.longest_distance:
         raise ValueError(
             f"{name} = {value:.4g} is too large: heat spreads over sqrt(t) = {np.sqrt(step):.4g}, and the longest "
             f"distance on the mesh is {domain.longest_distance:.4g}, so heat is level; t is a squared length"
@@ -298,7 +289,7 @@ def prepare_mesh(
             domain = point_cloud_operators(mesh, options.laplacian, on_laplacian)
             sides = np.sort(igl.edge_lengths(mesh.triangles.V, mesh.triangles.F), axis=1)
             ratio = np.median(sides[:, 2] / np.maximum(sides[:, 0], np.finfo(float).tiny))
-            usual = T_COEF_RANDOM_POINTS if ratio > RANDOM_SIDES else T_COEF_EVEN_POINTS
+            usual = plan.T_COEF_RANDOM_POINTS if ratio > plan.RANDOM_SIDES else plan.T_COEF_EVEN_POINTS
         else:
             domain = operators(mesh, options.laplacian, on_laplacian)
         seconds = time.perf_counter() - start

@@ -15,7 +15,8 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from heat_igl.intrinsic.triangulation import IntrinsicTriangulation
 
-# The triangle inequality holds with this margin, in mean edge lengths.
+# The triangle inequality holds with this margin, in mean edge lengths. With 1e-9 heat gives the same on 95 shapes, with
+# 1e-6 it is 160 % wrong on a needle.
 _MARGIN = 1e-8
 # Edges around corners that coincide, in mean edge lengths.
 _SHORTEST = 1e-10

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from heat_igl import plan
 from heat_igl.intrinsic import (
     IntrinsicTriangulation,
     closed_cover,
@@ -12,23 +13,6 @@ from heat_igl.intrinsic import (
     intrinsic_delaunay,
 )
 from heat_igl.operators.matrices import Laplacian, Operators
-from heat_igl.plan import (
-    ENOUGH_FOR_HEAT,
-    FEW_FOR_HEAT,
-    GROWTH,
-    LARGE_RADIUS,
-    LARGE_SHARE,
-    LARGEST_RADIUS,
-    MORE,
-    NARROW,
-    NEGATIVE_SHARE,
-    ONE_CELL_WIDE,
-    ROUGH_FOR_HEAT,
-    STEEPEST_WEIGHT,
-    THIN_SHARE,
-    THIN_SINE,
-    UNEVEN_SHARE,
-)
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
 # Vertices whose angle defects are averaged: the standard error of the mean is then 3 % of their standard deviation.
@@ -48,7 +32,7 @@ def fit_for_heat(
         return refined(triangulation, component, np.ones(n_components, bool))
     if laplacian == "auto":
         is_uneven = uneven_components(triangulation, component)
-        if is_uneven[component[triangulation.F[:, 0]]].mean() > UNEVEN_SHARE:
+        if is_uneven[component[triangulation.F[:, 0]]].mean() > plan.UNEVEN_SHARE:
             return refined(triangulation, component, is_uneven)
     if laplacian == "auto" and has_negative_boundary(triangulation):
         return intrinsic_delaunay(closed_cover(triangulation))
@@ -62,7 +46,7 @@ def has_negative_boundary(triangulation: IntrinsicTriangulation) -> bool:
         return False
     angle = corner_angles(triangulation.l[outer // 3])[np.arange(len(outer)), outer % 3]
     weight = np.minimum(1 / np.tan(angle), 0.0)
-    return bool(weight.min() < STEEPEST_WEIGHT or -weight.sum() > NEGATIVE_SHARE * triangulation.n_used)
+    return bool(weight.min() < plan.STEEPEST_WEIGHT or -weight.sum() > plan.NEGATIVE_SHARE * triangulation.n_used)
 
 
 def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray) -> BoolArray:
@@ -70,16 +54,16 @@ def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray
 
     All, where there are few triangles at all.
     """
-    if triangulation.n_used < FEW_FOR_HEAT:
+    if triangulation.n_used < plan.FEW_FOR_HEAT:
         return np.ones(int(component.max(initial=-1)) + 1, bool)
     thin, large = _thin_and_large(triangulation, component)
-    return np.asarray((thin > THIN_SHARE) | (large > LARGE_SHARE))
+    return np.asarray((thin > plan.THIN_SHARE) | (large > plan.LARGE_SHARE))
 
 
 def share_on_large_triangles(triangulation: IntrinsicTriangulation, component: IntArray) -> float:
     """Share of the faces that are in components which triangles cover that are large for the component."""
     _, large = _thin_and_large(triangulation, component)
-    return float(np.mean(large[component[triangulation.F[:, 0]]] > LARGE_SHARE))
+    return float(np.mean(large[component[triangulation.F[:, 0]]] > plan.LARGE_SHARE))
 
 
 def _thin_and_large(triangulation: IntrinsicTriangulation, component: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -90,8 +74,8 @@ def _thin_and_large(triangulation: IntrinsicTriangulation, component: IntArray) 
     # Twice the circumradius; the shortest side is this times the sine of the smallest angle.
     with np.errstate(divide="ignore", invalid="ignore"):
         diameter = a * b * c / (2 * area)
-        is_thin = ~(np.minimum(np.minimum(a, b), c) >= THIN_SINE * diameter)
-    is_large = diameter > 2 * LARGE_RADIUS * _area_per_vertex(triangulation, component) ** 0.5
+        is_thin = ~(np.minimum(np.minimum(a, b), c) >= plan.THIN_SINE * diameter)
+    is_large = diameter > 2 * plan.LARGE_RADIUS * _area_per_vertex(triangulation, component) ** 0.5
     of_face = component[triangulation.F[:, 0]]
     total, thin, large = (
         np.bincount(of_face, counted, n_components) for counted in (area, area * is_thin, area * is_large)
@@ -113,11 +97,11 @@ def refined(triangulation: IntrinsicTriangulation, component: IntArray, is_chose
     unit = np.where(
         is_chosen[component[triangulation.F[:, 0]]], _area_per_vertex(triangulation, component) ** 0.5, np.inf
     )
-    scale = min(1.0, (triangulation.n_used / ENOUGH_FOR_HEAT) ** 0.5)
+    scale = min(1.0, (triangulation.n_used / plan.ENOUGH_FOR_HEAT) ** 0.5)
     made = delaunay_refinement(
         triangulation,
-        sheets * (GROWTH * triangulation.n + MORE),
-        largest_radius=LARGEST_RADIUS * scale if scale < 1 else np.inf,
+        sheets * (plan.GROWTH * triangulation.n + plan.MORE),
+        largest_radius=plan.LARGEST_RADIUS * scale if scale < 1 else np.inf,
         unit=unit,
     )
     # Beside vertices in the same place, triangles are cut into ones without area.
@@ -140,9 +124,9 @@ def is_rough_or_narrow(domain: Operators) -> bool:
     added = (domain.n - triangulation.n) / (2 if surface.triangulation.is_cover else 1)
     n = triangulation.n_used + added
     n_outer = np.count_nonzero(domain.boundary & domain.referenced)
-    if NARROW * n < n_outer < ONE_CELL_WIDE * n:
+    if plan.NARROW * n < n_outer < plan.ONE_CELL_WIDE * n:
         return True
-    return mean_angle_defect(triangulation) * triangulation.n_used > ROUGH_FOR_HEAT * n
+    return mean_angle_defect(triangulation) * triangulation.n_used > plan.ROUGH_FOR_HEAT * n
 
 
 def mean_angle_defect(triangulation: IntrinsicTriangulation, at_boundary: bool = False) -> float:

@@ -285,7 +285,7 @@ class _Builder:
     def __init__(self, n: int, F: IntArray | None, mesh: Mesh | None, name: str) -> None:
         self._n, self._F, self._mesh, self._name = n, F, mesh, name
         self._offset = np.empty(0)  # of each source so far
-        self._vertices: list[tuple[IntArray, IntArray]] = []
+        self._vertices = [(_NOWHERE, _NOWHERE)]
         self._points: list[tuple[SurfacePoints, IntArray]] = []
         self._curves: list[tuple[SurfaceCurve, int]] = []
 
@@ -334,7 +334,7 @@ class _Builder:
 
     def finish(self) -> SourceSet:
         points = self._points_in_faces() if self._points else NO_POINTS
-        vertices, label = _concatenated(self._vertices, (_NOWHERE, _NOWHERE))
+        vertices, label = _concatenated(self._vertices)
         # A vertex that is named twice is the one with the smallest offset; of equal ones, the first.
         kept = nearest_first(vertices, self._offset[label], label)
         label = label[kept]
@@ -349,8 +349,7 @@ class _Builder:
 
     def _points_in_faces(self) -> SourcePoints:
         """All points but those in a vertex, which are counted among the vertices."""
-        none = (_NOWHERE, np.empty((0, 3)), _NOWHERE)
-        faces, barycentric, label = _concatenated([(p.faces, p.barycentric, label) for p, label in self._points], none)
+        faces, barycentric, label = _concatenated([(p.faces, p.barycentric, label) for p, label in self._points])
         barycentric = on_simplex(barycentric)
         in_vertex = barycentric.max(axis=1) == 1
         if self._F is not None and in_vertex.any():
@@ -361,9 +360,8 @@ class _Builder:
         return SourcePoints(faces[inside], barycentric[inside], label, self._offset[label])
 
     def _all_segments(self) -> SourceSegments:
-        none = (_NOWHERE, np.empty((0, 3)), np.empty((0, 3)), _NOWHERE)
         faces, start, end, label = _concatenated(
-            [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves], none
+            [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves]
         )
         return SourceSegments(faces, on_simplex(start), on_simplex(end), label, self._offset[label])
 
@@ -374,8 +372,8 @@ def on_simplex(barycentric: FloatArray) -> FloatArray:
     return np.asarray(kept / kept.sum(axis=1, keepdims=True))
 
 
-def _concatenated(rows: list[tuple[Any, ...]], none: tuple[AnyArray, ...]) -> tuple[AnyArray, ...]:
-    return rows[0] if len(rows) == 1 else tuple(np.concatenate(column) for column in zip(none, *rows, strict=True))
+def _concatenated(rows: Sequence[tuple[Any, ...]]) -> list[AnyArray]:
+    return [np.concatenate(column) for column in zip(*rows, strict=True)]
 
 
 def samples(
