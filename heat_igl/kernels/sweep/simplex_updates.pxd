@@ -19,8 +19,6 @@ cdef class SimplexUpdate(Facet):
     cdef double* d
     # What bounds the values through each simplex.
     cdef const float[::1] widest, slack, growths
-    # By how much T may sag on the facet.
-    cdef double most_sag
     # The derivative of distance by position, where known, and its trust in the metric of one row or simplex.
     cdef double[:, ::1] slope
     cdef double[::1] trusted
@@ -36,7 +34,7 @@ cdef class SimplexUpdate(Facet):
     cdef bint gains(self, int s, int c, int far) noexcept nogil
     cdef double through(self, int s, int c, double best) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
-    cdef double curved(self, int s, int c, double limit) noexcept nogil
+    cdef double curved(self, int s, int c, double limit, double least) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
     cdef double trust(self, int s, int i) noexcept nogil
     cdef void find_slope(self, int s, int c) noexcept nogil

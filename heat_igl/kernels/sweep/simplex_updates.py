@@ -174,9 +174,9 @@ class SimplexUpdate(Facet):
         # Where T sags by no more than `above`, or a corner was not reached yet.
         if above >= near or above * (2.0 * near - above) >= most or farther == INFINITY:
             return INFINITY
-        self.most_sag = near - sqrt(max(near * near - most, 0.0))
-        room: cython.double = (self.most_sag - above) / self.slack[s]
-        return self.curved(s, c, best) if self.linear(s, c, room) - nearest < room else INFINITY
+        room: cython.double = (near - sqrt(max(near * near - most, 0.0)) - above) / self.slack[s]
+        rise: cython.double = self.linear(s, c, room) - nearest
+        return self.curved(s, c, best, nearest + self.slack[s] * rise) if rise < room else INFINITY
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """What `Facet` knows of s and its metric, after `face`."""
@@ -198,34 +198,33 @@ class SimplexUpdate(Facet):
             self.W[i] = cython.address(self.velocity[self.rows[s, at], 0])
             self.s[i] = mean_velocity(self.W[i])
 
-    def curved(self, s: cython.int, c: cython.int, limit: cython.double) -> cython.double:
+    def curved(self, s: cython.int, c: cython.int, limit: cython.double, least: cython.double) -> cython.double:
         """The least value at corner c of simplex s with T of second order, after `linear`; sets `share`.
 
-        It may be inf if it is not below `limit`.
+        It may be inf if it is not below `limit`; with T linear it is `least` or more.
         """
         self.lay(s, c)
-        is_source: cython.bint = False
+        near: cython.double = INFINITY
+        deep: cython.double = 0.0
         x: cython.double[3]
         for i in range(self.p):
             self.D[i] = self.level[i] - self.start
-            is_source = is_source or not self.D[i] > 0.0
+            near = min(near, self.D[i])
+        is_source: cython.bint = not near > 0.0
         if is_source and self.q > 1:
             # T is not linear on an edge to the source, and its square not quadratic.
             return self.along_edges()
-        L: cython.double = self.length(self.share)
-        low: cython.double = INFINITY
-        at: cython.double = 0.0
-        for i in range(self.p):
-            low = min(low, self.D[i] + self.g[i])
-            at += self.g[i] * self.share[i]
-        # No value is below the tangent plane here of that with T linear by more than T sags.
-        if L > 0.0 and self.start + L + low - at - self.most_sag >= limit:
-            return INFINITY
         for i in range(self.p):
             x[i] = self.trust(s, i)
             for j in range(i):
                 sag: cython.double = self.sag_between(s, i, j, x[i] - x[j], min(x[i], x[j]))
                 self.sag[i][j] = self.sag[j][i] = self.weight[self.corners[s, c]] * sag
+                # Products of two shares add up to a third at most.
+                deep = max(deep, self.sag[i][j] / 3.0)
+        near = max(near, sqrt(deep))
+        if least - near + sqrt(near * near - deep) >= limit:
+            return INFINITY
+        L: cython.double = self.length(self.share)
         best: cython.double = self.newton(L, limit)
         if is_source:
             # Straight from the source, where the square of T may have no derivatives.
