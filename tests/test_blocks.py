@@ -134,9 +134,9 @@ def test_rows_do_not_depend_on_blocks_or_threads(sphere, method, monkeypatch):
     for n_threads in ("1", "2"):
         monkeypatch.setenv("HEAT_IGL_NUM_THREADS", n_threads)
         for most in (1, 5, 8):
-            monkeypatch.setattr(threads, "_MOST", most)
+            monkeypatch.setattr(threads, "BLOCK", most)
             assert np.abs(solver.distances(sets) - one_by_one).max() < 1e-9 * np.pi
-    monkeypatch.setattr(threads, "_MOST", 8)
+    monkeypatch.setattr(threads, "BLOCK", 8)
     monkeypatch.setattr("heat_igl.heat.batches.n_threads", lambda: 3)
     three = solver.distances(sets)
     assert (three == solver.distances(sets)).all()
