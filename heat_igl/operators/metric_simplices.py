@@ -130,7 +130,7 @@ class MetricSimplices:
             e = self.place[self.corners[:, one]] - self.place[self.corners[:, other]]
             lengths = np.sqrt(((e if self.tensors is None else e @ self.tensors[self.group]) * e).sum(axis=2))
         mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths), np.float32)
-        return None, mean, mean.max(axis=1).astype(np.float32), one_each, 0 * one_each, 0.0
+        return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0.0
 
     def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:
         """The tensors (..., 3, 3) of chosen simplices (...) at corners (...)."""
