@@ -1,17 +1,18 @@
 """Kernel of distance in any metric: the Hopf-Lax formula on each triangle or tetrahedron.
 
-The distance at a corner v of a simplex is the least of T(x) + |v - x| over the points x of the facet opposite, with T
-the distance on the facet between its corners, and the length of v - x in the metric of the simplex.
+The distance at a corner v of a simplex is the minimum of T(x) + |v - x| over the points x of the opposite facet. T is
+the distance on the facet, interpolated between its corners, and |v - x| is the length in the metric of the simplex.
 
-*First order*: T is linear. Then the update is monotone in the distances at the corners, so that updates in any order
-lead to one fixed point, which converges to the distance in a continuous metric (Bornemann and Rasch 2006).
+*First order*: T is linear. Then the update is monotone in the distances at the corners, and updates in any order have
+one fixed point, which converges to the distance in a continuous metric (Bornemann and Rasch 2006).
 
-*Second order*: the square of T is quadratic, as the squared distance from a point in one metric is, at the source too.
-Its second differences along the edges of the facet are found from the slopes of distance at the corners, and are used
-as far as these agree with the distances, and with the metric of the simplex.
+*Second order*: the square of T is quadratic, as the squared distance from a point in a constant metric is. Its second
+differences along the edges of the facet follow from the slopes of distance at the corners. They are used as far as they
+agree with the distances and with the metric of the simplex.
 
-Distances begin with those along edges. Vertices are visited from near to far, some again, then in rounds, each after
-those it has its distance from. Where fronts of two sources meet, T is not smooth: each source is followed alone.
+The first distances are those along edges. Vertices are visited from near to far, some several times, and then in
+rounds, each vertex after those that its distance comes from. T is not smooth where the fronts of two sources meet, so
+that each source is followed alone.
 """
 
 import cython
@@ -74,21 +75,21 @@ class HopfLax:
         raise_caught()
 
     def spread(self, source: cython.int, start: cython.double, limit: cython.double[::1]):
-        """Find distances of second order from one source, as far as it may be the nearest; `record` has the rest.
+        """Find distances of second order from one source, where it may be the nearest; `record` returns the rest.
 
         Parameters
         ----------
         source, start : int, float
             The vertex, and the distance at which it begins.
         limit : (n,) float64
-            What is known of the distance from all sources, ``inf`` if nothing is.
+            The distance from all sources as far as it is known, ``inf`` elsewhere.
 
         Returns
         -------
         vertices, distance : (k,) int32, (k,) float64
-            The source and the vertices that were visited, ascending.
+            The visited vertices, the source included, in ascending order, and their distances.
         """
-        # Where metrics are long in one direction, distances depend on larger ones, and the first order takes too long.
+        # In strongly anisotropic metrics distances depend on larger ones, and the pass from near to far takes too long.
         left: cython.Py_ssize_t = len(limit) // 2
         self.limit, self.low, self.update.start = limit, start, start
         with cython.nogil:
@@ -123,7 +124,7 @@ class HopfLax:
         slope, is_sloped : (k, 3) float64, (k,) uint8
             The derivative of distance by the position of each vertex, and whether it is known.
         weight : (k,) float64
-            How far T is of second order for a vertex: from 1 to 0, where T is linear.
+            The weight of the second order at each vertex: 1 for all of it, 0 for linear T.
         """
         update = self.update
         at = np.asarray(self.facet)[v], np.asarray(self.place)[v]
@@ -203,7 +204,8 @@ class HopfLax:
             self.arrange()
             for at in range(self.n_reached):
                 v = self.order[at]
-                # Where the metric turns far within a simplex, distances may go in circles: more so each time.
+                # If the metric turns far within a simplex, dependencies may be cyclic: each further visit of a vertex
+                # needs a larger change.
                 if self.pending[v] > self.settled * self.n_visits[v]:
                     is_settled = False
                     self.n_visits[v] += 1
@@ -224,7 +226,7 @@ class HopfLax:
         self.hand_on(v, old, change)
 
     def hand_on(self, v: cython.int, old: cython.double, change: cython.double) -> cython.void:
-        """Ask for visits to the vertices around v, whose value was `old`, by how much it and the slope changed."""
+        """Request visits to the vertices around v after its value, which was `old`, or its slope has changed."""
         size: cython.int = self.corners.shape[1]
         for k in range(self.first[v], self.first[v + 1]):
             s: cython.int = self.incident[k] // size
@@ -254,8 +256,8 @@ class HopfLax:
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it.
 
-        With T linear it is at most that at the last place, so that it never rises but with the distances there. By the
-        second order it may, since the slopes there changed, and rise again and again. What it rises so is summed.
+        With T linear, the value rises only if the distances at its last place rise. With the second order it may also
+        rise because slopes have changed there, again and again; if that adds up, the second order is reduced.
         """
         size: cython.int = self.corners.shape[1]
         rise: cython.double = -INFINITY
@@ -309,12 +311,13 @@ class HopfLax:
         self.update.find_slope(s, c)
 
     def arrange(self) -> cython.void:
-        """Order vertices topologically: each behind the corners that have a share of its place, but for circles.
+        """Order vertices topologically, each after the corners that its distance comes from, except in cycles.
 
-        Vertices of a circle have their distances from each other. What each adds to T linear, the step, may be less
-        than 0 by the second order. If it sums to less than 0 around a circle, its vertices lower each other for ever.
+        The distances in a cycle come from each other. The step of a vertex is what it adds to linear T; with the second
+        order it may be negative. If the steps of a cycle sum to less than 0, its vertices would lower each other for
+        ever: then the second order is reduced, see `open_circle`.
 
-        Of several such orders that by distance is taken, whatever the numbers of vertices and the order of corners.
+        Of several topological orders the one by distance is taken, whatever the numbers of vertices and corners.
         """
         size: cython.int = self.corners.shape[1]
         n_done: cython.int = 0
