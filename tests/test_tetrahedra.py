@@ -140,7 +140,8 @@ def test_beyond_an_edge_at_which_two_bodies_touch():
 
 
 def test_where_two_bodies_share_a_vertex():
-    mesh = without(2, lambda centre: np.isin((centre > 0.5).sum(axis=1), [1, 2]), 0.0)
+    """Between the vertices of edges, distance continued along these: up to 5 % too far."""
+    mesh = without(4, lambda centre: np.isin((centre > 0.5).sum(axis=1), [1, 2]), 0.0)
     middle = nearest_vertex(mesh, 0.5)
     found = GeodesicSolver(mesh).distance(int(np.argmin(np.linalg.norm(mesh.V, axis=1))))
     beyond = mesh.V.max(axis=1) > 0.5
@@ -148,28 +149,17 @@ def test_where_two_bodies_share_a_vertex():
     np.testing.assert_allclose(found[beyond], through[beyond], rtol=1e-9)
 
 
-@pytest.mark.parametrize("k", [2, 30, 400])
-def test_nearest_of_many_sources(k):
-    mesh = scattered(2500, 1)
-    sources = np.random.default_rng(2).choice(mesh.n_vertices, k, replace=False)
-    exact, nearest = cKDTree(mesh.V[sources]).query(mesh.V)
-    found = GeodesicSolver(mesh).voronoi(sources)
-    assert (found.distance >= exact - 1e-12).all()
-    assert np.abs(found.distance - exact).mean() < 1e-5 * exact.mean()
-    assert (found.distance <= 1.01 * exact).all()
-    assert (found.labels == nearest).mean() > 0.999
-    rows = GeodesicSolver(mesh).distances([sources, [5]])
-    np.testing.assert_array_equal(rows[0], found.distance)
-
-
-def test_a_source_that_no_neighbour_belongs_to():
+@pytest.mark.parametrize(("k", "seed"), [(2, 1), (30, 1), (400, 1), (400, 2)])
+def test_nearest_of_many_sources(k, seed):
     """Of 400 sources, one cell was so narrow that a vertex in it had no neighbour there: 6 % too far."""
-    mesh = scattered(2500, 2)
-    sources = np.random.default_rng(2).choice(mesh.n_vertices, 400, replace=False)
+    mesh = scattered(2500, seed)
+    sources = np.random.default_rng(2).choice(mesh.n_vertices, k, replace=False)
     exact, nearest = cKDTree(mesh.V[sources]).query(mesh.V)
     found = GeodesicSolver(mesh).voronoi(sources)
     np.testing.assert_allclose(found.distance, exact, rtol=1e-9)
     np.testing.assert_array_equal(found.labels, nearest)
+    rows = GeodesicSolver(mesh).distances([sources, [5]])
+    np.testing.assert_array_equal(rows[0], found.distance)
 
 
 def test_walls_behind_a_sharp_edge():
@@ -238,7 +228,7 @@ def test_the_line_behind_an_edge_stays_inside():
             bent = np.flatnonzero((way >= 0) & (way[edges[way]] == -1).all(axis=1))
             ends = np.stack([np.full(len(bent), source), bent])
             A, B = mesh.V[edges[way[bent]].T]
-            along = ((mesh.V[ends] - A) * (B - A)).sum(axis=2) / ((B - A) ** 2).sum(axis=1)
+            along = ((mesh.V[ends] - A) * (B - A)).sum(axis=2) / np.maximum(((B - A) ** 2).sum(axis=1), 1e-12)
             near = np.linalg.norm(mesh.V[ends] - A - along[..., None] * (B - A), axis=2)
             bend = np.clip((along * near[::-1]).sum(axis=0) / np.maximum(near.sum(axis=0), 1e-12), 0, 1)[:, None]
             places = 5 * (mesh.V[bent] + steps * (A + bend * (B - A) - mesh.V[bent]))
@@ -247,6 +237,16 @@ def test_the_line_behind_an_edge_stays_inside():
             assert (inside | ~is_clear).mean(axis=0).min(initial=1) > 0.98
             count += len(bent)
     assert count > 5000
+
+
+@pytest.mark.parametrize("k", [1, 30])
+def test_values_at_which_sources_begin_only_differ(k):
+    """With values far above the lengths, lines were compared by shares of the values: 2 % of the body too far."""
+    mesh = l_shape(8, 0.25)
+    sources, offsets = np.arange(k) * (mesh.n_vertices // k), np.random.default_rng(k).uniform(0, 0.2, k)
+    solver = GeodesicSolver(mesh)
+    found, other = (solver.distance(heat_igl.OffsetSources(sources, offsets + start)) for start in (0, 1e6))
+    np.testing.assert_allclose(other - 1e6, found, atol=1e-8)
 
 
 @pytest.mark.parametrize("hollow", [0.0, 0.25], ids=["cube", "cavity"])

@@ -20,12 +20,10 @@ from heat_igl.sweep.simplex_derivative import SimplexDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
-# Rounds of lines and ways that bend, with several sources in a small body.
-_MOST_ROUNDS = 5
 # Of the places nearest in space so many are compared by their offsets; so many vertices at a time.
 _MOST_NEAR, _ROWS = 64, 16384
 # How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
-_BESIDE, _BESIDE_OF_FEW = 1.0, 2.0
+_BESIDE = 1.0
 # What the kernel of bends knows of the way to a vertex.
 _STRAIGHT, _UNKNOWN = -1, -2
 # Sine of the angle by which a body must exceed half a turn at an edge.
@@ -54,9 +52,12 @@ class LineEngine(SimplexEngine):
     def reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
         """Boundary edges at which the inside takes more than half a turn, and edges where more than two walls meet.
 
-        Returns the edges (e, 2) int32; unit vectors (e, 3) out of the body, halfway between the two walls, zero where
-        more than two meet; and cosines (e,) of the angles between these vectors and the walls.
+        A vertex at which parts of the body touch is an edge from itself to itself. Returns the edges (e, 2) int32; unit
+        vectors (e, 3) out of the body, halfway between the two walls, zero where more than two meet; and cosines (e,)
+        of the angles between these vectors and the walls.
         """
+        from scipy.sparse import csgraph
+
         V, corners = self._V, self._corners
         tetrahedron, corner = np.nonzero(self._body.sides_behind() < 0)
         walls = np.sort(corners[tetrahedron[:, None], (corner[:, None] + [1, 2, 3]) % 4].astype(np.int64), axis=1)
@@ -81,7 +82,15 @@ class LineEngine(SimplexEngine):
         # The sides of a slit coincide, at a whole turn.
         cosine = np.einsum("ij,ij->i", along_wall[one], along_wall[other])
         bends = (counts > 2) | ((counts == 2) & ((sine < -_FLAT) | ((sine < _FLAT) & (cosine > 0))))
-        return edges[bends].astype(np.int32), outward[bends], np.einsum("ij,ij->i", along_wall[one], outward)[bends]
+        # The walls around a vertex, from edge to edge; at edges where more than two meet, ways bend anyway.
+        corner = 3 * wall[:, None] + np.repeat([[0, 1], [0, 2], [1, 2]], len(walls), axis=0)
+        pairs = np.stack([corner[one[counts == 2]], corner[other[counts == 2]]]).reshape(2, -1)
+        fan = csgraph.connected_components(sp.coo_array((np.ones(pairs.shape[1]), pairs), shape=2 * (walls.size,)))[1]
+        n_fans = np.bincount(walls.ravel()[np.unique(fan, return_index=True)[1]])
+        touching = np.setdiff1d(np.flatnonzero(n_fans > 1), edges[counts > 2])
+        found = np.concatenate([edges[bends], np.stack([touching, touching], axis=1)]).astype(np.int32)
+        cosine = np.einsum("ij,ij->i", along_wall[one], outward)[bends]
+        return found, np.pad(outward[bends], ((0, len(touching)), (0, 0))), np.pad(cosine, (0, len(touching)))
 
     @cached_property
     def _body(self) -> Any:
@@ -144,27 +153,24 @@ class LineEngine(SimplexEngine):
 
         Returns these edges (e, 2), and the edge (n,) around which the way to each vertex bends last.
         """
-        begin = distance.copy()
+        # Values are compared by shares of them.
+        least = offset.min()
+        distance -= least
+        offset = offset - least
         order, nearest = self._from_near(vertices, offset)
         edges, outward, wall = self.reflex_edges
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
-        turns = np.isin(vertices, edges).astype(np.uint8)
-        beside = _BESIDE_OF_FEW if self._is_small else _BESIDE
-        is_repeated = self._is_small and len(edges) > 0 and len(vertices) > 1
-        for _round in range(_MOST_ROUNDS if is_repeated else 1):
-            before, guess = distance.copy(), nearest.copy()
-            look_around(order, self._body, vertices, offset, turns, len(edges) > 0, guess, distance, begin, label)
-            is_seen = distance < before
-            if not is_seen.any():
-                break
-            way[is_seen] = _STRAIGHT
-            bend_around(edges, outward, wall, self._body, beside, vertices, offset, distance, begin, label, way)
+        before = distance.copy()
+        look_around(order, self._body, vertices, offset, edges, nearest, distance, label)
+        way[distance < before] = _STRAIGHT
+        bend_around(edges, outward, wall, self._body, _BESIDE, vertices, offset, distance, label, way)
+        distance += least
         return edges, way
 
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         """As of all engines, without a list of edges: voxels have seven times as many as vertices."""
-        self._body.along_edges(np.arange(len(distance)), distance, label, np.empty_like(distance))
+        self._body.along_edges(distance, label)
 
 
 def nearest_in_value(V: FloatArray, places: FloatArray, offset: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -11,6 +11,4 @@ ends have distances.
 - `bends`: each edge, from near to far, whose ends have got shorter distances is fitted, and vertices around it take the
   ways around it as far as they see it; until no end gets shorter. Distance along an edge is that from one point beside
   it, if this agrees at the middle and the quarters, else the values there.
-
-Where tetrahedra touch in a point only, and in small bodies with several sources, lines and bends are found in turn.
 """

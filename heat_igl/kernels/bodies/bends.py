@@ -54,7 +54,6 @@ def bend_around(
     sources: cython.const[cython.int][::1],
     offset: cython.const[cython.double][::1],
     d: cython.double[::1],
-    begin: cython.double[::1],
     label: cython.int[::1],
     way: cython.int[::1],
 ):
@@ -74,16 +73,17 @@ def bend_around(
     between that direction and the walls. A vertex may lie `beside` the part of the body that an edge hides, by this
     share of its longest edge, and the edge still is a candidate. `way` (n,) int32 is the edge around which the way to
     each vertex bends last, -1 on straight ways, -2 where it is not known. The other arguments are those of
-    `sight.look_around`; `d`, `begin`, `label` and `way` are changed.
+    `sight.look_around`; `d`, `label` and `way` are changed.
     """
     n, e = body.positions.shape[0], edges.shape[0]
     ends = np.asarray(body.positions)[np.asarray(edges)]
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1, keepdims=True)
+    # A vertex as an edge has a length that divides.
+    lengths = np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1, keepdims=True), 1e-300)
     tangent = (ends[:, 1] - ends[:, 0]) / lengths
     beyond, across = np.full((e, 5), np.inf), np.cross(tangent, outward)
     known = [tangent, ends[:, 0], lengths, np.zeros((e, 4)), beyond, outward, across, np.asarray(wall)[:, None]]
     table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 3))], axis=1)
-    one = _Bends(body, sources, offset, d, begin, label)
+    one = _Bends(body, sources, offset, d, label)
     one.edges, one.beside, one.way = edges, beside, way
     if e > 0:
         one.edge = cython.cast(cython.pointer[_Edge], cython.address(table[0, 0]))
@@ -92,14 +92,11 @@ def bend_around(
     one.fit_of = np.arange(e, dtype=np.int32) << _FIT_BITS
     one.newest, one.met = np.full((2, n), _NONE, np.int32)
     one.met_by, one.waiting, one.bound = np.full(e, _NONE, np.int32), PriorityQueue(n), np.array(d)
-    one.line.lit = cython.address(one.way[0])
-    unknown = np.ones(n, bool)
-    is_lone: cython.bint = False
     n_asked: cython.Py_ssize_t = 0
-    while unknown.any():
+    while True:
         with cython.nogil:
             for i in range(e):
-                one.begin_around(i, is_lone)
+                one.begin_around(i)
             while one.waiting.count > 0 and not one.failed:
                 n_asked += 1
                 if n_asked % ASK == 0 and is_interrupted():
@@ -109,14 +106,12 @@ def bend_around(
         if one.failed:
             raise MemoryError("no memory for the ways around edges of the body")
         before = np.array(d)
-        unknown = np.isinf(before)
-        if is_lone and unknown.any():
-            # Behind a point or an edge at which tetrahedra touch, no line continues.
-            is_beside = np.repeat(unknown, np.diff(body.first_neighbour))
-            body.along_edges(np.unique(np.asarray(body.neighbours)[is_beside]), d, label, begin)
-            unknown = np.asarray(d) < before
-            np.asarray(way)[unknown] = -2
-        is_lone = True
+        if one.is_lone:
+            body.along_edges(d, label)
+            np.asarray(way)[np.asarray(d) < before] = -2
+        if np.isfinite(before).all() or (one.is_lone and (np.asarray(d) == before).all()):
+            break
+        one.is_lone = True
 
 
 @cython.final
@@ -135,9 +130,9 @@ class _Bends(Ray):
     that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has `fit_of` its
     edge when it was made, whether it has been `asked` for, and the value of the way, `INFINITY` once the line has been
     followed. All edges that were offered to a vertex are in `lists` that begin at `met` (n,); `met_by` (e,) is the
-    vertex whose lists put the last mark on an edge.
+    vertex whose lists put the last mark on an edge. Edges begin from one end if this `is_lone`.
     The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`, and `sought` is
-    the edge to which the `line` goes.
+    the edge that is fitted.
     """
 
     edges: cython.const[cython.int][:, ::1]
@@ -158,6 +153,7 @@ class _Bends(Ray):
     n_lists: cython.int
     n_most: cython.int
     failed: cython.bint
+    is_lone: cython.bint
     waiting: PriorityQueue
     bound: cython.double[::1]
     beside: cython.double
@@ -174,17 +170,12 @@ class _Bends(Ray):
         x: cython.double[3]
         a: cython.int = self.edges[i, 0]
         b: cython.int = self.edges[i, 1]
-        # A way may bend at an end that is not reached yet, equally short to rounding.
-        if self.d[a] == INFINITY:
-            self.label[a] = self.label[b]
-        if self.d[b] == INFINITY:
-            self.label[b] = self.label[a]
         to_a: cython.double = min(self.d[a], self.d[b] + self.edge[i].length)
         to_b: cython.double = min(self.d[b], self.d[a] + self.edge[i].length)
         for k in range(3):
             x[k] = 0.5 * (self.body.positions[a, k] + self.body.positions[b, k])
-        self.turn_towards(a, x)
-        self.turn_towards(b, x)
+        self.reach(a, x, INFINITY, False)
+        self.reach(b, x, INFINITY, False)
         # The way to one end continues along the edge unless it is hidden at the other end.
         a_reaches: cython.bint = self.value(a, cython.address(self.body.positions[b, 0])) >= to_b * (1 - GAIN)
         b_reaches: cython.bint = self.value(b, cython.address(self.body.positions[a, 0])) >= to_a * (1 - GAIN)
@@ -192,23 +183,17 @@ class _Bends(Ray):
         for j in range(1, 4):
             for k in range(3):
                 x[k] = self.body.positions[a, k] + 0.25 * j * self.edge[i].length * self.edge[i].tangent[k]
-            self.share = 0.25 * j
             off: cython.double = 0.25 * j * self.edge[i].length
             self.edge[i].at[j] = min(to_a + off, to_b + self.edge[i].length - off)
-            if a_reaches or self.is_lit_from(a, x):
-                self.edge[i].at[j] = min(self.edge[i].at[j], self.value(a, x))
-            if b_reaches or self.is_lit_from(b, x):
-                self.edge[i].at[j] = min(self.edge[i].at[j], self.value(b, x))
-            if j == 2:
-                self.edge[i].has_before = self.way[a] > -2
-                if self.way[a] >= 0:
-                    self.around(self.way[a], x, True)
+            self.edge[i].at[j] = self.reach(a, x, self.edge[i].at[j], not a_reaches)
+            self.edge[i].at[j] = self.reach(b, x, self.edge[i].at[j], not b_reaches)
+            self.edge[i].has_before = self.way[a] > -2
+            if j == 2 and self.way[a] > -2:
+                self.look_back(self.way[a], a, x)
                 self.edge[i].before[0] = self.edge[i].before[1] = 0.0
                 for k in range(3):
-                    if self.way[a] == -1:
-                        self.bend[k] = self.body.positions[self.sources[self.label[a]], k]
-                    self.edge[i].before[0] += (self.bend[k] - self.edge[i].end[k]) * self.edge[i].outward[k]
-                    self.edge[i].before[1] += (self.bend[k] - self.edge[i].end[k]) * self.edge[i].across[k]
+                    self.edge[i].before[0] += (self.line.goal[k] - self.edge[i].end[k]) * self.edge[i].outward[k]
+                    self.edge[i].before[1] += (self.line.goal[k] - self.edge[i].end[k]) * self.edge[i].across[k]
         self.lay_flat(i, a, b)
 
     @cython.cfunc
@@ -248,19 +233,40 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def turn_towards(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
-        """Of the ways to v that are equally short since they bend at a vertex, choose the one to a point x near v."""
+    def reach(
+        self,
+        v: cython.int,
+        x: cython.pointer[cython.const[cython.double]],
+        most: cython.double,
+        is_followed: cython.bint,
+    ) -> cython.double:
+        """Distance at a point x near v by the ways to v that are equally short since they bend at a vertex, or `most`.
+
+        The shortest one becomes the way to v, or its line `is_followed` from x, which is on the edge `sought`.
+        """
+        way: cython.int = self.way[v]
+        if way < 0:
+            is_there: cython.bint = not is_followed or (
+                way == -1 and self.value(v, x) < most and self.is_lit(way, v, x)
+            )
+            return min(self.value(v, x), most) if is_there else most
         here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
-        if self.way[v] >= 0:
-            self.around(self.way[v], here, True)
-        if self.way[v] < 0 or 0 < self.share < 1:
-            return
-        end: cython.int = self.edges[self.way[v], 0 if self.share == 0 else 1]
+        self.around(way, here, True)
+        is_between: cython.bint = 0 < self.share < 1
+        is_chosen: cython.bint = most == INFINITY
+        end: cython.int = self.edges[way, 0 if self.share < 1 else 1]
         for k in range(self.first_at_end[end], self.first_at_end[end + 1]):
             i: cython.int = self.at_end[k]
+            value: cython.double = self.around(i, x, False)
+            if value >= most or (i != way and is_between):
+                continue
             is_equal: cython.bint = fabs(self.around(i, here, False) - self.d[v]) <= GAIN * self.d[v]
-            if is_equal and self.around(i, x, False) < self.value(v, x) and self.is_hidden_from_before(i, v):
-                self.way[v] = i
+            if i != way and not (is_equal and self.is_hidden_from_before(i, v)):
+                continue
+            if not is_followed or self.is_lit(i, v, x):
+                most = value
+                self.way[v] = i if is_chosen else way
+        return most
 
     @cython.cfunc
     @cython.nogil
@@ -312,28 +318,43 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def is_lit_from(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
-        """Whether the source from which the way to v is straight sees the point of the edge at `share`."""
-        return self.way[v] == -1 and self.is_seen_by(self.sources[self.label[v]], x)
-
-    @cython.cfunc
-    @cython.nogil
-    def is_seen_by(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
-        """Whether the line from v to a point of the edge `sought`, at `share`, stays in the tetrahedra."""
+    def look_back(self, i: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
+        """Make the place where a way to x bends around edge i the goal of the `line`, or the source of v if i is -1."""
         line: cython.pointer[Line] = cython.address(self.line)
-        line.goal, line.stamp = x, _NONE
-        line.goal_a = self.edges[self.sought, 1 if self.share > 1 - NUDGE else 0]
-        line.goal_b = self.edges[self.sought, 0 if self.share < NUDGE else 1]
-        return self.is_near(line, v) or self.follows(line, v)
+        line.origin = x
+        if i >= 0:
+            self.around(i, x, True)
+            line.goal = self.bend
+            line.goal_a = self.edges[i, 1 if self.share > 1 - NUDGE else 0]
+            line.goal_b = self.edges[i, 0 if self.share < NUDGE else 1]
+        else:
+            line.goal_a = line.goal_b = self.sources[self.label[v]]
+            line.goal = cython.address(self.body.positions[line.goal_a, 0])
 
     @cython.cfunc
     @cython.nogil
-    def begin_around(self, i: cython.int, is_lone: cython.bint) -> cython.void:
+    def is_lit(self, i: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
+        """Whether the line back from a point x of the edge `sought` stays inside."""
+        self.look_back(i, v, x)
+        line: cython.pointer[Line] = cython.address(self.line)
+        a: cython.int = self.edges[self.sought, 0]
+        for k in range(self.body.first[a], self.body.first[a + 1]):
+            t: cython.int = self.body.incident[k] >> 2
+            corners: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[t, 0])
+            if self.edges[self.sought, 1] in (corners[0], corners[1], corners[2], corners[3]):
+                found: cython.int = self.arrives(line, 4 * t, -1, -1)
+                if found > 0 or (found == -1 and self.is_blocked(line, 2 * NUDGE * self.body.reach[a])):
+                    return found > 0
+        return False
+
+    @cython.cfunc
+    @cython.nogil
+    def begin_around(self, i: cython.int) -> cython.void:
         """Make an edge whose ends, or one if it `is_lone`, have shorter distances a candidate for those around them."""
         to_a: cython.double = self.d[self.edges[i, 0]]
         to_b: cython.double = self.d[self.edges[i, 1]]
         is_new: cython.bint = self.edge[i].at[0] > to_a * (1 + GAIN) or self.edge[i].at[4] > to_b * (1 + GAIN)
-        is_known: cython.bint = (min(to_a, to_b) if is_lone else max(to_a, to_b)) < INFINITY
+        is_known: cython.bint = (min(to_a, to_b) if self.is_lone else max(to_a, to_b)) < INFINITY
         if is_new and is_known and self.fit_of[i] & _MOST_FITS < _MOST_FITS:
             self.sought, self.met_by[i] = i, _NONE
             self.fit(i)
@@ -471,21 +492,22 @@ class _Bends(Ray):
             if self.waiting.key[v] * value > 1 + GAIN:
                 return
         self.offers[k].value = INFINITY
-        self.around(i, cython.address(self.body.positions[v, 0]), True)
-        self.sought = i
+        self.look_back(i, v, cython.address(self.body.positions[v, 0]))
+        line: cython.pointer[Line] = cython.address(self.line)
         if is_longer:
             self.offer_around(i, v)
-        elif self.is_seen_by(v, self.bend):
+        elif self.follows(line, v):
             self.d[v], self.way[v] = value, i
-            self.begin[v] = value - self.body.away(v, self.bend)
-            self.label[v] = self.label[self.edges[i, 0 if self.share < 0.5 else 1]]
+            # A way may bend at an end that is not reached yet, equally short to rounding.
+            end: cython.int = self.edges[i, self.share >= 0.5]
+            self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, self.share < 0.5]]
             self.offer_around(i, v)
             for m in range(self.first_at_end[v], self.first_at_end[v + 1]):
-                self.begin_around(self.at_end[m], False)
+                self.begin_around(self.at_end[m])
         else:
             self.mark_met(v)
             for c in range(1, 4):
-                self.offer_at(self.body.cells[self.line.t, (self.line.out + c) & 3], v)
+                self.offer_at(self.body.cells[line.t, (line.out + c) & 3], v)
         self.shortest(v)
 
     @cython.cfunc

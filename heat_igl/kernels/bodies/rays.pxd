@@ -13,14 +13,11 @@ cdef extern from *:
 # A line on its way through tetrahedra. It goes `forward` or against the axis `up`, from p; seen along it, it is at the
 # origin of `x` and `y`, where the corners are of the triangle through which it leaves tetrahedron t, in this order if
 # `sign` is 1; `out` is the fourth corner of t. It arrives where a tetrahedron `has` the vertices `goal_a` and `goal_b`,
-# bits 1 and 2, and between three vertices that see the goal, bit 4: for these, `lit` is `stamp`. It meets the plane of
-# the triangle that was last tried at `ahead` / `of_all` along `up`.
+# bits 1 and 2. It meets the plane of the triangle that was last tried at `ahead` / `of_all` along `up`.
 cdef struct Line:
     const double* origin
     const double* goal
     int goal_a, goal_b
-    const int* lit
-    int stamp
     int up, east, north
     double p_x, p_y, p_z, tilt_x, tilt_y, forward
     int t, out
@@ -53,13 +50,11 @@ cdef class Ray:
     cdef const int[::1] sources
     cdef const double[::1] offset
     cdef double[::1] d
-    cdef double[::1] begin
     cdef int[::1] label
     cdef int[::1] last_cone
     cdef int[::1] last_wall
 
     cdef bint follows(self, Line* line, int v) noexcept nogil
-    cdef bint is_near(self, Line* line, int v) noexcept nogil
     cdef bint arrives_from(self, Line* line, int begin) noexcept nogil
     cdef int arrives(self, Line* line, int begin, int into, int toward) noexcept nogil
     cdef bint is_blocked(self, Line* line, double room) noexcept nogil

@@ -2,7 +2,7 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, ON_SIDE, Line
+from cython.cimports.heat_igl.kernels.bodies.rays import NUDGE, ON_SIDE, Line
 from cython.cimports.heat_igl.kernels.prefetch import prefetch
 from cython.cimports.libc.math import fabs, sqrt
 
@@ -112,13 +112,13 @@ class Body:
         """The distance of two vertices in space."""
         return self.away(v, cython.address(self.positions[u, 0]))
 
-    def along_edges(self, first, d: cython.double[::1], label: cython.int[::1], begin: cython.double[::1]) -> None:
-        """Lower distances `d` (n,) to paths along edges from the `first` vertices; `begin` is where the last begins."""
+    def along_edges(self, d: cython.double[::1], label: cython.int[::1]) -> None:
+        """Lower distances `d` (n,) to paths along edges."""
         n: cython.int = d.shape[0]
         # A circular buffer: no vertex waits twice, so n places suffice.
-        count: cython.int = len(first)
-        waiting: cython.int[::1] = np.resize(first, n).astype(np.int32)
-        is_waiting: cython.uchar[::1] = (np.bincount(first, minlength=n) > 0).astype(np.uint8)
+        count: cython.int = n
+        waiting: cython.int[::1] = np.arange(n, dtype=np.int32)
+        is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
         at: cython.int = 0
         with cython.nogil:
             while count > 0:
@@ -130,7 +130,7 @@ class Body:
                     u: cython.int = self.neighbours[k]
                     # Not by rounding, which would pass along many edges.
                     if d[v] < d[u] and d[v] + self.apart(v, u) < d[u] * (1 - 1e-12):
-                        d[u], begin[u], label[u] = d[v] + self.apart(v, u), d[v], label[v]
+                        d[u], label[u] = d[v] + self.apart(v, u), label[v]
                         if not is_waiting[u]:
                             is_waiting[u] = True
                             waiting[at + count if at + count < n else at + count - n] = u
@@ -141,16 +141,16 @@ class Body:
 class Ray:
     """Distances of the vertices of a body, and lines that are followed to see whether a way is clear.
 
-    `sources`, `offset`, `d`, `begin` and `label` are those of `sight.look_around`. `last_cone` (n,) is the corner at
+    `sources`, `offset`, `d` and `label` are those of `sight.look_around`. `last_cone` (n,) is the corner at
     each vertex at which its last line began, and `last_wall` (n,) the one opposite the wall at which a line ended last.
     """
 
-    def __init__(self, body: Body, sources, offset, d, begin, label):
-        self.body, self.sources, self.offset, self.d, self.begin, self.label = body, sources, offset, d, begin, label
+    def __init__(self, body: Body, sources, offset, d, label):
+        self.body, self.sources, self.offset, self.d, self.label = body, sources, offset, d, label
         self.last_cone, self.last_wall = np.full((2, d.shape[0]), -1, np.int32)
 
     def follows(self, line: cython.pointer[Line], v: cython.int) -> cython.bint:
-        """Whether the line from v, which is not near its goal, stays in the tetrahedra."""
+        """Whether the line from v stays in the tetrahedra."""
         line.origin = cython.address(self.body.positions[v, 0])
         self.aim(line, 0, -1, 0.0, -1)
         # The next line is often hidden by the same wall.
@@ -169,18 +169,6 @@ class Ray:
                 if self.arrives_from(line, self.body.incident[k]):
                     return True
                 self.aim(line, 0, -1, 0.0, -1)
-        return False
-
-    def is_near(self, line: cython.pointer[Line], v: cython.int) -> cython.bint:
-        """Whether the goal is in a tetrahedron at v."""
-        # A point of such a one is at most as far away as a corner.
-        if self.body.away(v, line.goal) <= self.body.reach[v] * (1 + GAIN):
-            for k in range(self.body.first[v], self.body.first[v + 1]):
-                has: cython.int = 0
-                for c in range(4):
-                    has |= _has(line, self.body.cells[self.body.incident[k] // 4, c])
-                if has & 3 == 3:
-                    return True
         return False
 
     def arrives_from(self, line: cython.pointer[Line], begin: cython.int) -> cython.bint:
@@ -203,6 +191,8 @@ class Ray:
         for i in range(3):
             line.x[i] *= line.sign
             line.has[i] = _has(line, line.corner[i])
+        if line.has[0] | line.has[1] | line.has[2] | _has(line, self.body.cells[k >> 2, k & 3]) == 3:
+            return 1
         for _steps in range(_MOST_STEPS):
             found: cython.int = _step(self.body, line)
             if found == -1:
@@ -307,7 +297,7 @@ class Ray:
 @cython.nogil
 def _has(line: cython.pointer[Line], v: cython.int) -> cython.int:
     """What a tetrahedron `has` with v."""
-    return (v == line.goal_a) + 2 * (v == line.goal_b) + 4 * (line.lit[v] == line.stamp)
+    return (v == line.goal_a) + 2 * (v == line.goal_b)
 
 
 @cython.cfunc
@@ -315,8 +305,6 @@ def _has(line: cython.pointer[Line], v: cython.int) -> cython.int:
 @cython.nogil
 def _step(body: Body, line: cython.pointer[Line]) -> cython.int:
     """Go on to the next tetrahedron: 1 if the line has arrived, -1 at a wall, -2 if there is none, else 0."""
-    if line.has[0] & line.has[1] & line.has[2] & 4:
-        return 1
     k: cython.int = (cython.address(body.cells[0, 0]) + 8 * line.t)[4 + line.out]
     if k < 0:
         return -1
@@ -326,7 +314,7 @@ def _step(body: Body, line: cython.pointer[Line]) -> cython.int:
         prefetch(cython.address(body.cells[0, 0]) + 8 * (corners[4 + c] >> 2))
     o: cython.int = corners[k & 3]
     has_o: cython.int = _has(line, o)
-    if (line.has[0] | line.has[1] | line.has[2] | has_o) & 3 == 3:
+    if line.has[0] | line.has[1] | line.has[2] | has_o == 3:
         return 1
     at: cython.pointer[cython.const[cython.double]] = cython.address(body.positions[0, 0]) + 3 * o
     z: cython.double = at[line.up] - line.p_z

@@ -4,7 +4,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, NUDGE, Body, Line, Ray
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
-from cython.cimports.libc.math import INFINITY
+from cython.cimports.libc.math import INFINITY, fabs
 
 from heat_igl.kernels.signals import raise_caught
 
@@ -18,36 +18,34 @@ def look_around(
     body: Body,
     sources: cython.const[cython.int][::1],
     offset: cython.const[cython.double][::1],
-    turns: cython.const[cython.uchar][::1],
-    is_concave: cython.bint,
+    edges: cython.const[cython.int][:, ::1],
     guess: cython.int[::1],
     d: cython.double[::1],
-    begin: cython.double[::1],
     label: cython.int[::1],
 ):
     """Lower `d` (n,) to straight lines from the sources of neighbours, as far as these lines stay inside.
-
-    Each vertex first looks for a given source, if any.
 
     Where the cell of a source is narrow, the tetrahedra through which a line comes in may have all their corners in
     other cells. Candidates are then the sources of all vertices around (Danielsson 1980, there for pixels), and a line
     is followed through the tetrahedra.
 
     All vertices are in `order` (n,), roughly from near to far. Source i of k is at vertex ``sources[i]``, and distance
-    begins there at ``offset[i]``; ways bend at it if ``turns[i]``, so that not all tetrahedra there see the same.
-    `is_concave` tells whether ways bend anywhere. A vertex looks first for the source `guess` (n,), unless that is -1.
-    `begin` (n,) is the value at which the front that arrives seems to begin, and `label` (n,) the source of each; with
-    `d` and `guess` they are changed.
+    begins there at ``offset[i]``. Ways bend around the `edges` (e, 2); not all tetrahedra at a source there see the
+    same. A vertex looks first for the source `guess` (n,), unless that is -1. `label` (n,) is the source of each; with
+    `d` and `guess` it is changed.
     """
     n = order.shape[0]
-    one = _Sight(body, sources, offset, d, begin, label)
-    one.turns, one.is_concave, one.guess = turns, is_concave, guess
+    one = _Sight(body, sources, offset, d, label)
+    one.turns, one.is_concave, one.guess = np.isin(sources, edges).astype(np.uint8), edges.shape[0] > 0, guess
     one.lit = np.full(n, -1, np.int32)
     np.asarray(one.lit)[np.asarray(sources)] = np.arange(sources.shape[0])
-    one.to_source.lit = cython.address(one.lit[0])
+    cells = round(2 * float(np.cbrt(n)))
+    one.open, one.knows_walls = np.full((6, cells, cells), np.inf), sources.shape[0] == 1 or not one.is_concave
     is_waiting: cython.uchar[::1] = np.ones(n, np.uint8)
     one.is_waiting = is_waiting
     with cython.nogil:
+        for i in range(edges.shape[0] if one.knows_walls else 0):
+            one.is_clear(edges[i, 0], edges[i, 1], True)
         for _passes in range(_MOST_PASSES):
             n_changed: cython.Py_ssize_t = 0
             for i in range(n):
@@ -65,7 +63,13 @@ def look_around(
 @cython.final
 @cython.cclass
 class _Sight(Ray):
-    """What is read and written, the source that is looked for, the line to it, and `lit` (n,), the source on a line."""
+    """What is read and written, the source that is looked for, the line to it, and `lit` (n,), the source on a line.
+
+    If a neighbour sees the source, a vertex does, too, unless an edge around which ways bend lies between the two
+    lines: a wall that hides only one of them ends at such an edge. The only source sees these edges through the cells
+    on the sides of a cube around it, which are `open` (6, c, c) up to a depth; there are twice as many along a side as
+    there would be vertices along that of a cube. With these cells, or without such edges, it `knows_walls`.
+    """
 
     turns: cython.const[cython.uchar][::1]
     is_concave: cython.bint
@@ -74,14 +78,62 @@ class _Sight(Ray):
     lit: cython.int[::1]
     sought: cython.int
     to_source: Line
+    open: cython.double[:, :, ::1]
+    knows_walls: cython.bint
+
+    @cython.cfunc
+    @cython.nogil
+    def is_clear(self, a: cython.int, b: cython.int, hides: cython.bint) -> cython.bint:
+        """Whether no edge hides the line between two vertices from the only source; if it `hides`, it closes cells."""
+        centre: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[self.sources[0], 0])
+        cells: cython.int = self.open.shape[1]
+        x: cython.double[6]
+        part: cython.double[2]
+        low: cython.int[2]
+        high: cython.int[2]
+        for side in range(6):
+            up: cython.int = side >> 1
+            for c in range(2):
+                at: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[b if c else a, 0])
+                for i in range(3):
+                    x[3 * c + i] = at[(up + i) % 3] - centre[(up + i) % 3]
+                x[3 * c] = x[3 * c] if side & 1 else -x[3 * c]
+            # The part of the line that is seen through this side, which is never farther off the axis than along it.
+            part[0], part[1] = 0.0, 1.0
+            slack: cython.double = GAIN * (fabs(x[0]) + fabs(x[3]))
+            for k in range(4):
+                sign: cython.double = 1 - 2 * (k & 1)
+                first: cython.double = x[0] + sign * x[1 + (k >> 1)] + slack
+                last: cython.double = x[3] + sign * x[4 + (k >> 1)] + slack
+                if first < 0:
+                    part[0] = max(part[0], first / (first - last) if last >= 0 else 2.0)
+                elif last < 0:
+                    part[1] = min(part[1], first / (first - last))
+            if part[0] > part[1]:
+                continue
+            low[0] = low[1] = cells
+            high[0] = high[1] = -1
+            for c in range(2):
+                depth: cython.double = x[0] + part[c] * (x[3] - x[0])
+                # The source itself is seen in no direction.
+                for i in range(2 if depth > slack else 0):
+                    place: cython.double = (x[1 + i] + part[c] * (x[4 + i] - x[1 + i])) / depth
+                    place = max(0.5 * cells * (place + 1), 0.0)
+                    low[i] = min(low[i], cython.cast(cython.int, place * (1 - GAIN)))
+                    high[i] = max(high[i], min(cython.cast(cython.int, place * (1 + GAIN)), cells - 1))
+            for i in range(low[0], high[0] + 1):
+                for j in range(low[1], high[1] + 1):
+                    if hides:
+                        self.open[side, i, j] = min(self.open[side, i, j], x[0], x[3])
+                    elif self.open[side, i, j] <= max(x[0], x[3]) * (1 + GAIN):
+                        return False
+        return True
 
     @cython.cfunc
     @cython.nogil
     def look(self, v: cython.int) -> cython.int:
         """Give v the shortest line from a source of its neighbours that stays inside; returns whether there is one."""
-        below: cython.double = self.d[v]
-        if below < INFINITY:
-            below -= GAIN * (below - self.begin[v])
+        below: cython.double = self.d[v] * (1 - GAIN)
         looks: cython.int = _MOST_LOOKS
         nearest: cython.int = self.guess[v]
         if nearest >= 0:
@@ -110,7 +162,7 @@ class _Sight(Ray):
     @cython.nogil
     def take(self, v: cython.int, label: cython.int) -> cython.void:
         """Give v the straight line from a source, and wake those around it that may have use for this source."""
-        self.d[v], self.begin[v], self.label[v] = self.line(v, label), self.offset[label], label
+        self.d[v], self.label[v] = self.line(v, label), label
         self.lit[v] = label
         for k in range(self.body.first_neighbour[v], self.body.first_neighbour[v + 1]):
             u: cython.int = self.body.neighbours[k]
@@ -153,9 +205,11 @@ class _Sight(Ray):
         line: cython.pointer[Line] = cython.address(self.to_source)
         line.goal, line.goal_a, line.goal_b = cython.address(self.body.positions[source, 0]), source, source
         self.sought = label
-        # The corner of a cavity may stand between three vertices that see the source.
-        line.stamp = -2 if self.is_concave else label
-        return self.is_near(line, v) or self.follows(line, v)
+        for k in range(self.body.first_neighbour[v], self.body.first_neighbour[v + 1] if self.knows_walls else 0):
+            u: cython.int = self.body.neighbours[k]
+            if self.lit[u] == label and (not self.is_concave or self.is_clear(u, v, False)):
+                return True
+        return self.follows(line, v)
 
     @cython.cfunc
     @cython.nogil
