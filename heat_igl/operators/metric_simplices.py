@@ -129,7 +129,7 @@ class MetricSimplices:
             one, other = np.tril_indices(self.corners.shape[1], -1)
             e = self.place[self.corners[:, one]] - self.place[self.corners[:, other]]
             lengths = np.sqrt(((e if self.tensors is None else e @ self.tensors[self.group]) * e).sum(axis=2))
-        mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths), np.float32)
+        mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths))
         return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0.0
 
     def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:

@@ -33,12 +33,12 @@ def lengths_in_velocity(
     size: cython.int = corners.shape[1]
     n_pairs: cython.int = size * (size - 1) // 2
     m = corners.shape[0]
-    found = np.zeros_like(velocity), np.zeros((m, n_pairs)), np.zeros(m), *(np.zeros(m, np.float32) for _ in range(2))
+    found = np.zeros_like(velocity), np.zeros((m, n_pairs)), np.zeros(m), np.zeros(m), np.zeros(m)
     inverse: cython.double[:, ::1] = found[0]
     mean: cython.double[:, ::1] = found[1]
     widest: cython.double[::1] = found[2]
-    slack: cython.float[::1] = found[3]
-    growth: cython.float[::1] = found[4]
+    slack: cython.double[::1] = found[3]
+    growth: cython.double[::1] = found[4]
     variation: cython.double = 0.0
     squares: cython.double[24]
     here: cython.double[6]

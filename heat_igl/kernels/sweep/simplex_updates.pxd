@@ -18,8 +18,7 @@ cdef class SimplexUpdate(Facet):
     cdef double level[3]
     cdef double* d
     # What bounds the values through each simplex.
-    cdef const double[::1] widest
-    cdef const float[::1] slack, growths
+    cdef const double[::1] widest, slack, growths
     # The derivative of distance by position, where known, and its trust in the metric of one row or simplex.
     cdef double[:, ::1] slope
     cdef double[::1] trusted

@@ -25,9 +25,9 @@ class SimplexUpdate(Facet):
     mean : (m, pairs) float64
         Squared distances in one metric for each simplex, in which T is found that is linear; pairs of corners in the
         order of `np.tril_indices`.
-    widest, slack : (m,) float64, (m,) float32
+    widest, slack : (m,) float64
         The square of the longest edge, and by which factor lengths may be shorter than in the mean metric.
-    growth : (m,) float32
+    growth : (m,) float64
         If q > 1, the length of the gradient of the mean velocity, in the metric of the centre.
     V : (n, 3) float64
         Positions.
