@@ -5,6 +5,7 @@ import pytest
 from conftest import flat_perturbed
 from surfaces import assert_connected, cube, to_polyline
 from test_exact import delaunay
+from test_exact_threads import counted
 from test_paths import MESHES
 
 from heat_igl import (
@@ -101,6 +102,17 @@ def test_curves_are_nearer_than_points_on_them_by_no_more_than_the_gaps(name):
         assert excess.min() > -1e-13
         assert excess.max() <= gap / 2
         assert np.median(excess) <= gap**2
+
+
+@pytest.mark.parametrize("n", [64, 512])
+def test_windows_over_a_fan_are_compared_with_few_others(n, monkeypatch):
+    """Windows from all n triangles cross each spoke, and most of them are the shortest somewhere."""
+    cone, counts = shapes.cone(n, 1), counted(monkeypatch)
+    level = isolines(cone, cone.V @ [1, 0.3, 0.1], 0.1)[0]
+    ExactSurface(intrinsic_triangulation(cone, MARGIN)).solve(source_set(level, cone.n_vertices, cone.F))
+    ((compared, found, _),) = counts
+    assert n**2 / 4 < found
+    assert 0 < compared < 2 * found
 
 
 @pytest.mark.parametrize("name", ["terrain", "moebius", "book"])

@@ -65,18 +65,24 @@ def test_two_threads_find_what_one_finds_from_curves():
         np.testing.assert_array_equal(*both_ways(mesh, curve))
 
 
-def test_the_second_thread_has_a_share(monkeypatch):
-    """Without this, equal distances could be those of one thread that did all."""
-    shares, alone = [], windows.search
+def counted(monkeypatch) -> list[np.ndarray]:
+    """Takes the statistics of each search on each thread."""
+    counts, alone = [], windows.search
 
     def search(*arguments):
-        done = alone(*arguments)
-        shares.append(int(arguments[-1][1]))
-        return done
+        counts.append(arguments[-1])
+        return alone(*arguments)
 
     monkeypatch.setattr(windows, "search", search)
+    return counts
+
+
+def test_the_second_thread_has_a_share(monkeypatch):
+    """Without this, equal distances could be those of one thread that did all."""
+    counts = counted(monkeypatch)
     mesh = ZOO["rough sphere"]()
     found = ExactSurface(intrinsic_triangulation(mesh)).solve(on(mesh, 0), threads=2)
+    shares = [count[1] for count in counts]
     assert len(shares) == 2
     assert sum(shares) == found.n_windows
     assert min(shares) > 0.1 * found.n_windows

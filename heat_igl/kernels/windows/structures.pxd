@@ -117,7 +117,7 @@ cdef struct Search:
     List* kept           # for each half-edge, see `trim_by_kept`, or NULL
     long long n_crossed  # lists that crossed a face in this search
     bint failed
-    long long n_windows, n_lists_done
+    long long n_windows, n_lists_done, n_compared
     double tolerance
     # The search ends at the cutoff, or once the `n_nearest` nearest vertices are known.
     double cutoff

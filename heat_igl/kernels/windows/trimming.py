@@ -41,14 +41,6 @@ def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double)
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _bend(w: cython.pointer(Window), reached: cython.double) -> cython.double:
-    """A bound on the derivative of `_slope` within a quarter of the distance from the root."""
-    return 0.0 if w.is_plane else 2.0 / reached
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
 def _change(
     u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, a: cython.double, b: cython.double
 ) -> cython.double:
@@ -86,7 +78,7 @@ def _meeting(
             high = x
         slope = _slope(u, x, a) - _slope(w, x, b)
         # Twice the second derivative, a bound within steps below a quarter of both distances.
-        bend = _bend(u, a) + _bend(w, b)
+        bend = (0.0 if u.is_plane else 2.0 / a) + (0.0 if w.is_plane else 2.0 / b)
         step = -y / slope if slope != 0.0 else INFINITY
         x += step
         if 4.0 * bend * fabs(step) <= fabs(slope) and low <= x <= high:
@@ -447,13 +439,17 @@ def is_covered(
 @cython.cfunc
 @cython.nogil
 def trim_by_kept(
-    s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int
+    s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int, turns: cython.int
 ) -> cython.int:
     """Trim windows where one that crossed h before is shorter; returns how many are left.
 
     Far from the ends of a needle, lines that wind around it reach each half-edge after those of the winding before have
     crossed, and the ends are too far away to trim them. So the windows that cross are kept. Both are trimmed where the
     other is shorter, as in a list: of several paths to a point the shortest stays.
+
+    Lines turn around a vertex less than once, so those that wind begin to turn around others again and again. Only
+    where they do (`turns`, see `List`), and next to the ends of h, are windows compared and kept: in a fan of triangles
+    each spoke is crossed by windows from all of them, most of which are the shortest somewhere.
     """
     j: cython.int
     k: cython.int = 0
@@ -473,8 +469,13 @@ def trim_by_kept(
             return 0
     for i in range(n):
         w = windows + i
+        if not -1 <= turns <= 1 and w.start > 0.0 and w.stop < s.length[h]:
+            windows[k] = w[0]
+            k += 1
+            continue
         j = 0
         while j < kept.count:
+            s.n_compared += 1
             u = kept.windows + j
             outcome: cython.int = 0 if _overlap_little(u, w) else _settle(s, u, w)
             if outcome == 2 or w.stop <= w.start:

@@ -130,8 +130,8 @@ def search(
     A front serves one search only; of a pair (see `pair`), one gets all sources and the other none. A source of
     `starts` on a side is listed once for every face there, and the ends of segments must be among the points. With
     `stops_early`, the search ends when the distances of the vertices `goal` and of all points `targets` are known.
-    Distances up to the cutoff are exact, larger ones may be too large. `statistics` (3,) takes the numbers of vertices
-    that were reached, of windows, and of lists that crossed a face.
+    Distances up to the cutoff are exact, larger ones may be too large. `statistics` (3,) takes the numbers of
+    comparisons with kept windows, of windows, and of lists that crossed a face.
     """
     s: cython.pointer(Search) = cython.address(front.state)
     source: cython.int[::1] = starts.vertices
@@ -172,7 +172,7 @@ def search(
             _run(s)
         empty_front(s)
         free_front(s)
-    statistics[0] = s.n_touched
+    statistics[0] = s.n_compared
     statistics[1] = s.n_windows
     statistics[2] = s.n_lists_done
     return not s.failed
