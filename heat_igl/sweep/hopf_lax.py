@@ -9,7 +9,14 @@ import numpy as np
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.operators import MetricSimplices
 from heat_igl.operators.metric_simplices import inverse_root, symmetric
-from heat_igl.plan import HALVED_AROUND, MOST_CHANGE, MOST_CHANGE_AT_WORST, MOST_TURNING, MOST_VARIATION
+from heat_igl.plan import (
+    HALVED_AROUND,
+    HALVED_AROUND_IN_BODIES,
+    MOST_CHANGE,
+    MOST_CHANGE_AT_WORST,
+    MOST_TURNING,
+    MOST_VARIATION,
+)
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
@@ -46,24 +53,24 @@ class HopfLaxEngine(SimplexEngine):
     def _unresolved(self, sources: SourceSet, distance: FloatArray) -> str | None:
         """How it shows that the mesh does not resolve the metric; None if it does."""
         n, size, start, beyond = len(distance), self._corners.shape[1], sources.vertex_offset.min(), distance.copy()
+        count = HALVED_AROUND
         if size == 4:
+            if (varies := np.sqrt(self._simplices.measured[-1])) > MOST_VARIATION:
+                return f"lengths of edges differ between the corners of a face by {100 * varies:.0f} % in the mean"
             # Between the first corners of some tetrahedra, and others that these meet in.
             chosen = np.arange(0, len(self._corners), len(self._corners) // _SAMPLE + 1)
             other, corner = np.divmod(self._incident[self._first[self._corners[chosen]]].ravel(), 4)
             first, two = self._simplices.metric(np.repeat(chosen, 4), 0), self._simplices.metric(other, corner)
             root = symmetric(inverse_root(first)[0])
             low, high = np.maximum(inverse_root(root @ two @ root)[2].T, _ROUNDING)
-            turns = np.quantile(np.sqrt(high / low).reshape(-1, 4).max(axis=1), 0.9)
-            if turns > MOST_TURNING:
-                return f"the ratio of two lengths changes by a factor of {turns:.2g} over edges at a tenth of them"
-            if (varies := np.sqrt(self._simplices.measured[-1])) > MOST_VARIATION:
-                return f"lengths of edges differ between the corners of a face by {100 * varies:.0f} % in the mean"
-            if n > HALVED_AROUND:
+            turning = np.quantile(np.sqrt(high / low).reshape(-1, 4).max(axis=1), 0.9)
+            if n > count and turning <= MOST_TURNING:
                 return None
+            count = count if n <= count else HALVED_AROUND_IN_BODIES
         # Shortest paths to the nearest vertices lie in the simplices around these and the sources.
         beyond[sources.vertices] = np.inf
-        near = np.argpartition(beyond, min(HALVED_AROUND, n) - 1)[:HALVED_AROUND]
-        around = (*near, *sources.vertices[:HALVED_AROUND])
+        near = np.argpartition(beyond, min(count, n) - 1)[:count]
+        around = (*near, *sources.vertices[:count])
         corners = np.concatenate([self._incident[self._first[v] : self._first[v + 1]] for v in around])
         halved = HopfLaxEngine(self._simplices.halved(np.unique(corners // size)))
         finer = halved.distance(sources)[near]
