@@ -351,7 +351,8 @@ def first_quadrilateral(V: FloatArray, F: IntArray) -> int | None:
         return None
     is_near = np.zeros(len(V), bool)
     is_near[F[chosen]] = True
-    near = np.flatnonzero(is_near[F].any(axis=1))
+    # Elements that may have a side or diagonal in common with one of these.
+    near = np.flatnonzero(is_near[F].sum(axis=1) > 1)
     pairs = np.sort(F[near][:, _SIDES_AND_DIAGONALS].reshape(-1, 2), axis=1)
     _, pair, count = connectivity.unique_rows(pairs, len(V))
     shared = (count[pair] > 1).reshape(-1, 6)[np.searchsorted(near, chosen)]

@@ -54,19 +54,18 @@ class HopfLaxEngine(SimplexEngine):
         """How it shows that the mesh does not resolve the metric; None if it does."""
         n, size, start, beyond = len(distance), self._corners.shape[1], sources.vertex_offset.min(), distance.copy()
         count = HALVED_AROUND
-        if size == 4:
-            if (varies := np.sqrt(self._simplices.measured[-1])) > MOST_VARIATION:
-                return f"lengths of edges differ between the corners of a face by {100 * varies:.0f} % in the mean"
+        if size == 4 and (varies := np.sqrt(self._simplices.measured[-1])) > MOST_VARIATION:
+            return f"lengths of edges differ between the corners of a face by {100 * varies:.0f} % in the mean"
+        if size == 4 and n > count:
             # Between the first corners of some tetrahedra, and others that these meet in.
             chosen = np.arange(0, len(self._corners), len(self._corners) // _SAMPLE + 1)
             other, corner = np.divmod(self._incident[self._first[self._corners[chosen]]].ravel(), 4)
             first, two = self._simplices.metric(np.repeat(chosen, 4), 0), self._simplices.metric(other, corner)
             root = symmetric(inverse_root(first)[0])
             low, high = np.maximum(inverse_root(root @ two @ root)[2].T, _ROUNDING)
-            turning = np.quantile(np.sqrt(high / low).reshape(-1, 4).max(axis=1), 0.9)
-            if n > count and turning <= MOST_TURNING:
+            if np.quantile(np.sqrt(high / low).reshape(-1, 4).max(axis=1), 0.9) <= MOST_TURNING:
                 return None
-            count = count if n <= count else HALVED_AROUND_IN_BODIES
+            count = HALVED_AROUND_IN_BODIES
         # Shortest paths to the nearest vertices lie in the simplices around these and the sources.
         beyond[sources.vertices] = np.inf
         near = np.argpartition(beyond, min(count, n) - 1)[:count]
