@@ -18,7 +18,7 @@ from surfaces import (
     two_arms,
 )
 
-from heat_igl import GeodesicSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
+from heat_igl import AccuracyWarning, GeodesicSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
 from heat_igl.intrinsic import HalfEdges, intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.windows.exact import ExactSurface, exact_distance
 from heat_igl.windows.tables import MARGIN, from_mesh
@@ -378,3 +378,13 @@ def test_straight_past_a_flat_vertex_next_to_the_source():
         V = np.concatenate([[source], source + apart[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])])
         expected = np.linalg.norm(V - source, axis=1)
         np.testing.assert_allclose(exact_distance(V, faces, 0), expected, rtol=0, atol=1e-12)
+
+
+def test_a_search_that_would_not_end_is_replaced():
+    """Lines wind around the tube, equal to rounding: the search took minutes, and no signal ended it."""
+    tube = shapes.cylinder(5, 9)
+    tube = Mesh(tube.V * [1, 1, 1e10], tube.F)
+    along = np.abs(tube.V[:, 2] - tube.V[7, 2])
+    with pytest.warns(AccuracyWarning, match="the search did not end"):
+        found = GeodesicSolver(tube, method="exact").distance(7)
+    assert found[along > 0] == pytest.approx(along[along > 0], rel=1e-9)

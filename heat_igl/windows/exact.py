@@ -352,14 +352,20 @@ def search(
         front = windows.Front(tables, found, TOLERANCE, leaving)
         if upper is not None:
             windows.bound(front, upper)
-        require_memory(run(front, starts, statistics))
+        require_memory(run(front, starts, statistics), statistics[0] < 0)
     return Searched(starts, found, wanted, int(statistics[1]), leaving)
 
 
-def require_memory(is_done: bool) -> None:
-    """Raise a MemoryError, or the signal that was caught, if a search of the kernel was not done."""
+class EndlessSearchError(RuntimeError):
+    """Paths that wind around a surface are equal to rounding, so that a search would not end."""
+
+
+def require_memory(is_done: bool, is_endless: bool = False) -> None:
+    """Raise an error, or the signal that was caught, if a search of the kernel was not done."""
     if not is_done:
         raise_caught()
+        if is_endless:
+            raise EndlessSearchError("the search did not end, as the surface is too thin for doubles")
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 
@@ -377,7 +383,7 @@ def _beside(tables: Tables, starts: Starts, found: Found, upper: FloatArray | No
         side_by_side(lambda call: done.append(call()), calls)
     finally:
         is_same = windows.part(first, second)
-    require_memory(all(done))
+    require_memory(all(done), statistics.min() < 0)
     is_nearer = np.flatnonzero(also.distance < found.distance)
     for mine, theirs in zip(found, also, strict=True):
         mine[is_nearer] = theirs[is_nearer]

@@ -20,6 +20,7 @@ from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine, MeshTriangles, Triangles, WindowEngine
+from heat_igl.windows.exact import EndlessSearchError
 
 if TYPE_CHECKING:
     from heat_igl.windows.directions import PathAngles
@@ -180,8 +181,11 @@ class GuardedEngine(Engine):
 
     def distance(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> FloatArray:
         """Distance (n,)."""
-        found = self.windows.distance(sources, cutoff, threads)
-        problem = self.problem(found, sources, cutoff)
+        try:
+            found = self.windows.distance(sources, cutoff, threads)
+            problem = self.problem(found, sources, cutoff)
+        except EndlessSearchError as error:
+            problem = str(error)
         return found if problem is None else self._replacement(problem, sources, cutoff, threads)[0]
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
@@ -193,8 +197,11 @@ class GuardedEngine(Engine):
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,) and nearest source (n,)."""
-        found = self.windows.labelled(sources, cutoff, threads)
-        problem = self.problem(found[0], sources, cutoff)
+        try:
+            found = self.windows.labelled(sources, cutoff, threads)
+            problem = self.problem(found[0], sources, cutoff)
+        except EndlessSearchError as error:
+            problem = str(error)
         return found if problem is None else self._replacement(problem, sources, cutoff, threads)
 
     def to_targets(self, sources: SourceSet, targets: SurfacePoints | IntArray) -> FloatArray:

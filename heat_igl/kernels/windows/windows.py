@@ -46,8 +46,11 @@ from cython.cimports.heat_igl.kernels.windows.structures import FLAT, MARGIN, PA
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdlib import free, malloc
 
-# After this number of lists, some milliseconds, signals are checked.
-_ASK = cython.declare(cython.longlong, 4096)
+# After this number of windows and comparisons, some milliseconds, signals are checked.
+_ASK = cython.declare(cython.longlong, 50_000)
+# A search ends in vain after so many for each half-edge: on surfaces that are stretched by 1e10, paths that wind around
+# them are equal to rounding. Others take up to 120, and fans of 2048 triangles 1400.
+_MOST = cython.declare(cython.longlong, 100_000)
 # Attempts to take the lock of the other thread before this thread sleeps.
 _TRIES = cython.declare(cython.int, 2000)
 
@@ -125,13 +128,13 @@ def search(
     cutoff: cython.double,
     statistics: cython.longlong[::1],
 ) -> bool:
-    """Exact distances from vertices, points and segments; false if memory runs out.
+    """Exact distances from vertices, points and segments; false if memory runs out, or the search would not end.
 
     A front serves one search only; of a pair (see `pair`), one gets all sources and the other none. A source of
     `starts` on a side is listed once for every face there, and the ends of segments must be among the points. With
     `stops_early`, the search ends when the distances of the vertices `goal` and of all points `targets` are known.
     Distances up to the cutoff are exact, larger ones may be too large. `statistics` (3,) takes the numbers of
-    comparisons with kept windows, of windows, and of lists that crossed a face.
+    comparisons with kept windows (-1 if the search would not end), of windows, and of lists that crossed a face.
     """
     s: cython.pointer(Search) = cython.address(front.state)
     source: cython.int[::1] = starts.vertices
@@ -172,7 +175,7 @@ def search(
             _run(s)
         empty_front(s)
         free_front(s)
-    statistics[0] = s.n_compared
+    statistics[0] = -1 if s.is_endless else s.n_compared
     statistics[1] = s.n_windows
     statistics[2] = s.n_lists_done
     return not s.failed
@@ -398,8 +401,12 @@ def _carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
         place = s.slot[entry.what]
         if place >= 0 and s.lists[place].key == entry.key:
             cross(s, entry.what)
-            if s.n_lists_done % _ASK == 0 and is_interrupted():
-                s.failed = True
+            work: cython.longlong = s.n_windows + s.n_compared
+            if work >= s.next_question:
+                s.next_question = work + _ASK
+                s.is_endless = work > _MOST * s.n_half_edges
+                if s.is_endless or is_interrupted():
+                    s.failed = True
         return
     v = entry.what - s.n_half_edges
     if v >= s.n + s.n_points:
