@@ -97,12 +97,13 @@ class HopfLax:
                 self.forget(self.reached[at])
         self.n_reached, self.reached[0], self.d[source] = 1, source, start
         self.wait(source)
+        found, d = np.asarray(self.reached[:1]), np.asarray(self.d)
         while self.waiting.count > 0 and not is_interrupted():
             self.left = left
             with cython.nogil:
                 self.march()
             left, self.left = self.left, 0
-            found, d = np.sort(self.reached[: self.n_reached]), np.asarray(self.d)
+            found = np.sort(self.reached[: self.n_reached])
             # Of equal distances the vertex of the lower number comes first.
             self.roots = found[np.argsort(d[found], kind="stable")]
             with cython.nogil:
