@@ -297,3 +297,18 @@ def test_geodesics_traced_from_the_source_arrive():
     # Paths that bend at a vertex are not straight.
     assert np.mean(off < 1e-9) > 0.8
     assert np.median(off) < 1e-12
+
+
+def test_the_bound_of_a_search_holds_for_each():
+    """A tetrahedron has 12 half-edges: 400 000 searches together take more windows than one may."""
+    mesh = Mesh([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    tables, k = from_mesh(mesh, 0), 400_000
+    value = np.empty(4 * k)
+    ends = local.Workspace(tables, mesh.V[tables.old_vertex]).search(
+        np.zeros(k, np.int32), np.empty(4 * k, np.int32), value
+    )
+    assert ends[-1] == 4 * k
+    assert tables.unscaled(value[-4:]).max() == pytest.approx(np.sqrt(8))
+    tube = shapes.cylinder(5, 9)
+    with pytest.raises(RuntimeError, match="the search did not end"):
+        distances_within(Mesh(tube.V * [1, 1, 1e10], tube.F), 1e12, [7])

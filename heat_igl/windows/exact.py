@@ -365,7 +365,7 @@ def require_memory(is_done: bool, is_endless: bool = False) -> None:
     if not is_done:
         raise_caught()
         if is_endless:
-            raise EndlessSearchError("the search did not end, as the surface is too thin for doubles")
+            raise EndlessSearchError("the search did not end, as the surface is too thin for doubles: remesh it")
         raise MemoryError("the windows of the exact distance do not fit into memory")
 
 

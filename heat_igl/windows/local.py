@@ -383,7 +383,7 @@ class Workspace:
             way,
             line,
         )
-        require_memory(n_done >= 0)
+        require_memory(n_done >= 0, n_done == -2)
         return ends[:n_done]
 
     def within(self, sources: AnyArray, radius: float) -> Near:

@@ -58,7 +58,7 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
     s.n_all_lists = s.n_all_heap = 0
     s.free_list = -1
     s.failed = s.meets_ties = s.is_shared = False
-    s.n_windows = s.n_lists_done = s.n_waiting = s.n_compared = s.next_question = 0
+    s.n_windows = s.n_lists_done = s.n_waiting = s.n_compared = s.before = s.next_question = 0
     s.is_endless = False
     s.n_nearest = s.n_crossed = 0
     s.lists, s.heap, s.kept = cython.NULL, cython.NULL, cython.NULL

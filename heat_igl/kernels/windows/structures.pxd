@@ -118,8 +118,9 @@ cdef struct Search:
     long long n_crossed  # lists that crossed a face in this search
     bint failed
     long long n_windows, n_lists_done, n_compared
-    # After how many windows and comparisons signals are checked next, and whether there were too many.
-    long long next_question
+    # How many windows and comparisons there were before this search, and after how many signals are checked next; whether
+    # this search had too many.
+    long long before, next_question
     bint is_endless
     double tolerance
     # The search ends at the cutoff, or once the `n_nearest` nearest vertices are known.

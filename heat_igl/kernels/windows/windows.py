@@ -253,7 +253,9 @@ def search_each(
     way: cython.int[:, ::1],
     line: cython.double[:, ::1],
 ) -> int:
-    """A separate search from each vertex of `source` (k,); returns the number of sources done, -1 if memory ran out.
+    """A separate search from each vertex of `source` (k,); returns the number of sources done.
+
+    It is -1 if memory ran out, and -2 if a search would not end.
 
     Each search ends early and resets the entries that it changed, so its cost does not depend on the size of the mesh.
     The front must be in its initial state, and is left in it.
@@ -312,7 +314,9 @@ def search_each(
             _forget(s)
         _forget(s)
         free_front(s)
-    return -1 if s.failed else n_done
+    if s.failed:
+        return -2 if s.is_endless else -1
+    return n_done
 
 
 def pair(
@@ -404,7 +408,7 @@ def _carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
             work: cython.longlong = s.n_windows + s.n_compared
             if work >= s.next_question:
                 s.next_question = work + _ASK
-                s.is_endless = work > _MOST * s.n_half_edges
+                s.is_endless = work - s.before > _MOST * s.n_half_edges
                 if s.is_endless or is_interrupted():
                     s.failed = True
         return
@@ -506,6 +510,7 @@ def _narrow(s: cython.pointer(Search)) -> cython.void:
 def _forget(s: cython.pointer(Search)) -> cython.void:
     """Reset the entries that a search wrote, for the next search on the same front."""
     empty_front(s)
+    s.before = s.n_windows + s.n_compared
     for i in range(s.n_touched):
         v = s.touched[i]
         s.distance[v] = s.emitted[v] = INFINITY
