@@ -52,7 +52,7 @@ class HopfLaxEngine(SimplexEngine):
 
     def _unresolved(self, sources: SourceSet, distance: FloatArray) -> str | None:
         """How it shows that the mesh does not resolve the metric; None if it does."""
-        n, size, start, beyond = len(distance), self._corners.shape[1], sources.vertex_offset.min(), distance.copy()
+        n, size, start = len(distance), self._corners.shape[1], sources.vertex_offset.min()
         count = HALVED_AROUND
         if size == 4 and (varies := np.sqrt(self._simplices.measured[-1])) > MOST_VARIATION:
             return f"lengths of edges differ between the corners of a face by {100 * varies:.0f} % in the mean"
@@ -67,6 +67,7 @@ class HopfLaxEngine(SimplexEngine):
                 return None
             count = HALVED_AROUND_IN_BODIES
         # Shortest paths to the nearest vertices lie in the simplices around these and the sources.
+        beyond = distance.copy()
         beyond[sources.vertices] = np.inf
         near = np.argpartition(beyond, min(count, n) - 1)[:count]
         around = (*near, *sources.vertices[:count])
@@ -81,7 +82,12 @@ class HopfLaxEngine(SimplexEngine):
         return f"if edges are halved, distance near the sources changes by {by}"
 
     def _lower(
-        self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray, fronts: Any = None
+        self,
+        vertices: AnyArray,
+        offset: FloatArray,
+        distance: FloatArray,
+        label: AnyArray,
+        fronts: list[tuple[AnyArray, ...]] | None = None,
     ) -> None:
         """Lower distance to the least of those of second order from each source alone, and add these to `fronts`."""
         scheme, limit = self._scheme, np.full(len(distance), np.inf)

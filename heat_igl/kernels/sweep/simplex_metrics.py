@@ -187,6 +187,44 @@ def _transform(
             i += 1
 
 
+@cython.cfunc
+@cython.nogil
+def _add_misses(
+    corners: cython.const[cython.int][:, ::1],
+    W: cython.const[cython.double][:, ::1],
+    group: cython.const[cython.int][::1],
+    first: cython.const[cython.int][::1],
+    share: cython.double[::1],
+    result: cython.double[:, ::1],
+    at: cython.double[:, ::1],
+) -> cython.void:
+    """Add to the velocities `result` (n, 6) at vertices by how much their mean over each simplex misses the given one.
+
+    A vertex gets the mean over its simplices, each times the least `share` at its corners. `at` (n, 6 or more) is
+    working memory.
+    """
+    size: cython.int = corners.shape[1]
+    known: cython.p_double[4]
+    missed: cython.p_double[4]
+    at[:, :6] = 0.0
+    for s in range(corners.shape[0]):
+        most: cython.double = 1.0
+        for c in range(size):
+            most = min(most, share[corners[s, c]])
+            known[c] = cython.address(result[corners[s, c], 0])
+            missed[c] = cython.address(at[corners[s, c], 0])
+        for k in range(6):
+            miss: cython.double = size * W[group[s], k]
+            for c in range(size):
+                miss -= known[c][k]
+            miss *= most / size
+            for c in range(size):
+                missed[c][k] += miss
+    for v in range(result.shape[0]):
+        for k in range(6):
+            result[v, k] += at[v, k] / max(first[v + 1] - first[v], 1)
+
+
 def fits_around(
     corners: cython.const[cython.int][:, ::1],
     X: cython.const[cython.double][:, ::1],
@@ -217,8 +255,6 @@ def fits_around(
     mean: cython.double[41]
     work: cython.double[18]
     slope: cython.double[18]
-    known: cython.p_double[4]
-    missed: cython.p_double[4]
     row[0] = 1.0
     with cython.nogil:
         for s in range(corners.shape[0]):
@@ -306,21 +342,5 @@ def fits_around(
                 share[v] = min(max(1.0 - 4.0 * (1.0 - explained / variance) * others / free, 0.0), 1.0)
         # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
         for _ in range(3):
-            at[:, :6] = 0.0
-            for s in range(corners.shape[0]):
-                most: cython.double = 1.0
-                for c in range(size):
-                    most = min(most, share[corners[s, c]])
-                    known[c] = cython.address(result[corners[s, c], 0])
-                    missed[c] = cython.address(at[corners[s, c], 0])
-                for k in range(6):
-                    miss: cython.double = size * W[group[s], k]
-                    for c in range(size):
-                        miss -= known[c][k]
-                    miss *= most / size
-                    for c in range(size):
-                        missed[c][k] += miss
-            for v in range(X.shape[0]):
-                for k in range(6):
-                    result[v, k] += at[v, k] / max(first[v + 1] - first[v], 1)
+            _add_misses(corners, W, group, first, share, result, at)
     return found, shares
