@@ -11,7 +11,6 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.cloud.empty_balls import on_one_side, roomiest_normals
 from heat_igl.kernels.cloud.local_fits import onto_quadrics, tangent_planes
-from heat_igl.kernels.cloud.nearest_points import nearest_points, tree_of_boxes
 from heat_igl.runtime import over_rows, warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -19,7 +18,8 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 K = 30
 # Points at a time: bounds the memory for their neighbours.
 _BLOCK = 1 << 12
-# Points in a leaf of the tree that sorts them: as many as in the smallest boxes.
+# Points in a leaf of the tree that sorts them. With scipy's 10, errors on 223 clouds are the same in the mean, at most
+# 8 % smaller and 5 % larger.
 _LEAF = 8
 # Ratio of the two smaller variances above which neighbours may be on several sheets: errors on 25 surfaces are the same
 # with 0.05, and a tenth larger without.
@@ -73,27 +73,34 @@ class PointTree:
     order: IntArray
 
     @cached_property
-    def boxes(self) -> FloatArray:
-        """The boxes around them, see `tree_of_boxes`."""
-        return np.asarray(tree_of_boxes(self.P))
-
-    @cached_property
     def neighbours(self) -> tuple[AnyArray, FloatArray]:
         """The `K` nearest other points (n, k + 1) int32 of each, after the point itself, and the distance (n,)."""
-        return self.neighbours_of(slice(None), min(K, len(self.P) - 1))
+        return self.neighbours_of(np.arange(len(self.P)), min(K, len(self.P) - 1))
 
-    def neighbours_of(self, chosen: slice | IntArray, k: int) -> tuple[AnyArray, FloatArray]:
-        """The k nearest other points (b, k + 1) int32 of some, after the point itself, and the distance (b,)."""
-        points = np.arange(len(self.P))[chosen]
-        index, distance = by_rows(lambda rows: self.nearest(self.P[points[rows]], k + 1), len(points))
-        # Squares of distances may underflow, and then others are as near as the point itself.
-        index[:, 0] = points
-        return index, distance
+    def neighbours_of(self, points: IntArray, k: int, stride: int = 1) -> tuple[AnyArray, FloatArray]:
+        """The k nearest others (b, k + 1) int32 of some points, after the point itself, and the distance (b,).
 
-    def nearest(self, places: FloatArray, k: int) -> tuple[AnyArray, FloatArray]:
-        """The k points (b, k) int32 nearest to places (b, 3), and the distance (b,) of the last."""
-        index, distance = nearest_points(self.P, self.boxes, places, k)
-        return index, distance
+        Others are every `stride`-th point.
+        """
+        from scipy.spatial import KDTree  # takes as long to import as the rest of the package
+
+        others = KDTree(self.P[::stride])
+
+        def nearest(rows: slice) -> tuple[AnyArray, AnyArray]:
+            distance, number = others.query(self.P[points[rows]], k + 1)
+            index, itself = stride * number.astype(np.int32), points[rows]
+            # The point may be none of the others, or as near as they are, since squares of distances underflow.
+            is_itself, reach = index == itself[:, None], distance[:, -1].copy()
+            is_itself[:, -1] |= ~is_itself.any(axis=1)
+            np.copyto(index, itself[:, None], where=is_itself, casting="same_kind")
+            distance[is_itself] = -1
+            unsorted = (distance[:, 1:] <= distance[:, :-1]).any(axis=1)
+            order = np.lexsort((index[unsorted], distance[unsorted]))
+            index[unsorted] = np.take_along_axis(index[unsorted], order, axis=1)
+            return index, reach
+
+        index, reach = by_rows(nearest, len(points))
+        return index, reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,15 +279,8 @@ def _thickness(tree: PointTree, index: AnyArray) -> float:
 
 def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyArray:
     """The indices (b, k + 1) int32 of some points of the tree and of their k neighbours, among every `stride`-th."""
-    if stride == 1:
-        return tree.neighbours[0][chosen, : k + 1] if k <= K else tree.neighbours_of(chosen, k)[0]
-    fewer = PointTree(np.ascontiguousarray(tree.P[::stride]), tree.order[::stride])
-    near: AnyArray = stride * by_rows(lambda rows: fewer.nearest(tree.P[chosen[rows]], k + 1), len(chosen))[0]
-    # The point itself comes first: if it is not among them, in place of the farthest.
-    is_other = near[:, 0] != chosen
-    near[is_other, 1:] = near[is_other, :-1]
-    near[:, 0] = chosen
-    return near
+    is_known = k <= K and stride == 1
+    return tree.neighbours[0][chosen, : k + 1] if is_known else tree.neighbours_of(chosen, k, stride)[0]
 
 
 def _onto_quadrics(P: FloatArray, index: AnyArray) -> FloatArray:

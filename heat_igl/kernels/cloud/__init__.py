@@ -3,8 +3,6 @@
 A row holds a point and its k nearest points. Points are sorted by the leaves of a tree, so that neighbours are near in
 memory. Kernels work on a range of rows and share no state.
 
-`nearest_points`
-    The k nearest points of each place, by boxes around points that follow each other.
 `local_fits`
     The tangent plane of each neighbourhood by principal components, and the quadric through it, onto which noisy points
     are moved.
