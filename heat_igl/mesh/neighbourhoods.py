@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 
@@ -75,32 +76,31 @@ class PointTree:
     @cached_property
     def neighbours(self) -> tuple[AnyArray, FloatArray]:
         """The `K` nearest other points (n, k + 1) int32 of each, after the point itself, and the distance (n,)."""
-        return self.neighbours_of(np.arange(len(self.P)), min(K, len(self.P) - 1))
+        index = self.neighbours_of(np.arange(len(self.P)), min(K, len(self.P) - 1))
+        return index, np.linalg.norm(self.P[index[:, -1]] - self.P, axis=1)
 
-    def neighbours_of(self, points: IntArray, k: int, stride: int = 1) -> tuple[AnyArray, FloatArray]:
-        """The k nearest others (b, k + 1) int32 of some points, after the point itself, and the distance (b,).
+    def neighbours_of(self, points: IntArray, k: int, stride: int = 1) -> AnyArray:
+        """The k nearest others (b, k + 1) int32 of some points, after the point itself: among every `stride`-th."""
+        others = self._search if stride == 1 else _search(self.P[::stride])
 
-        Others are every `stride`-th point.
-        """
-        from scipy.spatial import KDTree  # takes as long to import as the rest of the package
-
-        others = KDTree(self.P[::stride])
-
-        def nearest(rows: slice) -> tuple[AnyArray, AnyArray]:
+        def nearest(rows: slice) -> tuple[AnyArray]:
             distance, number = others.query(self.P[points[rows]], k + 1)
-            index, itself = stride * number.astype(np.int32), points[rows]
+            index, itself = stride * number.astype(np.int32), points[rows, None]
             # The point may be none of the others, or as near as they are, since squares of distances underflow.
-            is_itself, reach = index == itself[:, None], distance[:, -1].copy()
+            is_itself = index == itself
             is_itself[:, -1] |= ~is_itself.any(axis=1)
-            np.copyto(index, itself[:, None], where=is_itself, casting="same_kind")
+            np.copyto(index, itself, where=is_itself, casting="same_kind")
             distance[is_itself] = -1
             unsorted = (distance[:, 1:] <= distance[:, :-1]).any(axis=1)
             order = np.lexsort((index[unsorted], distance[unsorted]))
             index[unsorted] = np.take_along_axis(index[unsorted], order, axis=1)
-            return index, reach
+            return (index,)
 
-        index, reach = by_rows(nearest, len(points))
-        return index, reach
+        return by_rows(nearest, len(points))[0]
+
+    @cached_property
+    def _search(self) -> Any:
+        return _search(self.P)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +127,15 @@ class Neighbourhoods:
 
 def point_tree(P: FloatArray) -> PointTree:
     """The points P (n, 3), sorted as in the leaves of a k-d tree: in the same order, however they were numbered."""
+    order = np.argsort(P @ np.sqrt([1.0, 2.0, 3.0]), kind="stable")
+    order = order[np.asarray(_search(P[order]).indices, np.int64)]
+    return PointTree(P[order], order)
+
+
+def _search(P: FloatArray) -> Any:
     from scipy.spatial import KDTree  # takes as long to import as the rest of the package
 
-    order = np.argsort(P @ np.sqrt([1.0, 2.0, 3.0]), kind="stable")
-    order = order[np.asarray(KDTree(P[order], _LEAF).indices, np.int64)]
-    return PointTree(P[order], order)
+    return KDTree(P, _LEAF)
 
 
 def neighbourhoods(tree: PointTree, normals: FloatArray | None = None) -> Neighbourhoods:
@@ -211,7 +215,7 @@ def without_noise(tree: PointTree) -> PointTree:
     if not _is_noisy(tree, sample):
         return tree
     for k, stride in _spreads(tree, sample):
-        index = _nearest(tree, np.arange(n), k, stride)
+        index = tree.neighbours_of(np.arange(n), k, stride)
         for _ in range(_PASSES):
             tree = PointTree(_onto_quadrics(tree.P, index), tree.order)
     return tree
@@ -228,18 +232,18 @@ def _is_noisy(tree: PointTree, sample: IntArray) -> bool:
     share = few / _deviations(tree, sample, K)[1]
     if share < _THICK_NOISE_NOT_DETAIL:
         return False
-    if share < _NOISE_NOT_DETAIL and _thickness(tree, _nearest(tree, sample, K // 2)) <= _NO_DISC:
+    if share < _NOISE_NOT_DETAIL and _thickness(tree, tree.neighbours_of(sample, K // 2)) <= _NO_DISC:
         return False
-    other = _deviations(tree, tree.neighbours[0][sample, 1], K // 2)[0]
+    other = _deviations(tree, tree.neighbours_of(sample, 1)[:, 1], K // 2)[0]
     alike = 2 * (way * other).sum(axis=1) / np.maximum((way**2 + other**2).sum(axis=1), _TINY)
     least = alike.mean() - 4 * alike.std() / np.sqrt(len(sample))
-    is_ball = least > _ALIKE and _thickness(tree, _nearest(tree, sample, K)) > _NO_SURFACE
+    is_ball = least > _ALIKE and _thickness(tree, tree.neighbours_of(sample, K)) > _NO_SURFACE
     return bool(least <= _SHEETS_ALIKE and not is_ball)
 
 
 def _deviations(tree: PointTree, points: IntArray, k: int) -> tuple[FloatArray, float]:
     """The ways (b, 3) of points to quadrics of k neighbours, and the median noise around these, in spacings."""
-    moved, noise = onto_quadrics(tree.P, _nearest(tree, points, k))
+    moved, noise = onto_quadrics(tree.P, tree.neighbours_of(points, k))
     return moved - tree.P[points], float(np.median(noise)) * np.sqrt(k / np.pi)
 
 
@@ -251,8 +255,8 @@ def _spreads(tree: PointTree, sample: IntArray) -> list[tuple[int, int]]:
     """
     n = len(tree.P)
     k, stride, most = K, 1, min(_LARGEST_K, n // 4)
-    found = {k: _thickness(tree, _nearest(tree, sample, k)) for k in (K // 2, K)}
-    near = _nearest(tree, sample, most if found[K] > _THICKNESS else K)
+    found = {k: _thickness(tree, tree.neighbours_of(sample, k)) for k in (K // 2, K)}
+    near = tree.neighbours_of(sample, most if found[K] > _THICKNESS else K)
     while found[k] > _THICKNESS and k < most:
         k = min(2 * k, most)
         found[k] = _thickness(tree, near[:, : k + 1].copy())
@@ -268,19 +272,13 @@ def _spreads(tree: PointTree, sample: IntArray) -> list[tuple[int, int]]:
         return [(flattest, 1)]
     while found[k] > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
         stride *= 4
-        found[k] = _thickness(tree, _nearest(tree, sample, k, stride))
+        found[k] = _thickness(tree, tree.neighbours_of(sample, k, stride))
     return [(k, stride), (k, 1)]
 
 
 def _thickness(tree: PointTree, index: AnyArray) -> float:
     """The median ratio of the two smaller variances of neighbourhoods, rows of `index` (b, k + 1)."""
     return float(np.median(tangent_planes(tree.P, index)[1]))
-
-
-def _nearest(tree: PointTree, chosen: IntArray, k: int, stride: int = 1) -> AnyArray:
-    """The indices (b, k + 1) int32 of some points of the tree and of their k neighbours, among every `stride`-th."""
-    is_known = k <= K and stride == 1
-    return tree.neighbours[0][chosen, : k + 1] if is_known else tree.neighbours_of(chosen, k, stride)[0]
 
 
 def _onto_quadrics(P: FloatArray, index: AnyArray) -> FloatArray:
