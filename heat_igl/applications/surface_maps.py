@@ -19,7 +19,7 @@ from heat_igl.windows import pair_distances
 
 Statistic = Literal["mean", "min", "centre"]
 
-# Pairs of vertices in memory at a time.
+# Pairs of vertices in memory at a time. From 2^16 to 2^22 the time is the same within 3 %, with 2^12 a quarter longer.
 _PAIRS = 2**20
 # Of heat flow: with 6, 8 and 12 the width of the kernel is .36, .39 and .18 % too large, with 4 it is 6 % too small.
 _STEPS = 8

@@ -31,12 +31,14 @@ if TYPE_CHECKING:
     from heat_igl.cluster import BatchReport
 
 _DENSE, _SPARSE = (".npy", ".csv", ".mat"), (".npz", ".mat")
-# Queries that are timed for the estimate: the time of one varies by up to two thirds of the mean on a mesh of parts.
+# Queries that are timed for the estimate: of six meshes, five are then estimated within 6 % (standard error) and one of
+# parts within 10 %; with 16 within 12 and 20 %.
 _QUERIES = 64
-# Rows of a matrix that are made symmetric at a time: temporary arrays hold no more.
+# Rows of a matrix that are made symmetric at a time, which bounds temporary arrays. From 32 to 512 the time differs by
+# a third, with all of 6000 rows it is three times as long.
 _ROWS = 512
-
-# Meshes of a data set on which queries are timed for the estimate.
+# Meshes of a data set on which queries are timed for the estimate: of random folders of 60 meshes of 30 kinds half are
+# within a factor of 1.26, and with 32 meshes 1.11.
 _MESHES = 8
 
 

@@ -30,10 +30,9 @@ from heat_igl.io.chunks import (
 from heat_igl.runtime.threads import BLOCK
 from heat_igl.typing import AnyArray, IntArray
 
-# Most rows of a block, whose work is lost if the worker dies, and most values, 16 MiB in single precision.
+# Most rows of a block, whose work is lost if the worker dies, and most values of a chunk, 16 MiB in single precision. A
+# block of `BLOCK` rows that hold more has several chunks.
 _MOST_ROWS, _ENTRIES = 64, 2**22
-# Longest row of one chunk: a block of `BLOCK` longer rows has several chunks, each within 32 MiB.
-_COLUMNS = 2**20
 # Formats 1 to 3 have no checksums of metadata.
 _FORMAT = 4
 # The files of a group. The small ones, which `begin` writes, are under the checksum of the attributes.
@@ -188,7 +187,8 @@ class Store:
                 shutil.rmtree(path)
             for label, entries in sources.items():
                 made(label, entries.shape, entries.shape, "int64", -1, ("source_entry",))[:] = entries
-            chunks = min(rows_per_block(n), k), min(n, _COLUMNS)
+            rows = min(rows_per_block(n), k)
+            chunks = rows, min(n, _ENTRIES // rows)
             distance = made("distance", (k, n), chunks, dtype, np.nan, ("source", "vertex"))
             now = {**attributes, "status": "running"}
             # Last, since without it the mesh counts as not begun.

@@ -25,7 +25,8 @@ _RAISED = 0.005
 _SHORT_ON_AVERAGE, _SHORT_AT_WORST, _TOO_STEEP = 0.05, 0.06, 0.025
 # Of tetrahedra, on which heat is less accurate: good ones of a box reach 0.05.
 _SHORT_IN_VOLUMES, _WORST_IN_VOLUMES = 0.1, 0.2
-# Vertices and edges to check: the check then takes a few percent of a query.
+# Vertices and edges to check. Of 33 answers on 11 meshes six are warned of, as by all vertices and edges, which take 4
+# to 11 % of a query more; with a quarter of both one warning is missed.
 _MOST_VERTICES, _MOST_EDGES = 2000, 1000
 # Lines from many sources to fewer vertices.
 _MOST_LINES = 16000

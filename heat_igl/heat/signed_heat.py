@@ -38,13 +38,15 @@ from heat_igl.windows import MeshTriangles, guarded_windows
 # Normals diffuse over half an edge: the best of 0.25, 0.5 and 1 along closed curves, and across gaps all three are
 # alike (docs/signed_theory.md).
 _T_COEF = 0.25
-# Share of the border between the sides that heat may close without a warning: above it, most of that is not given.
+# Share of the border between the sides that heat may close without a warning. On 840 broken levels of eleven meshes the
+# sign is wrong at 0.6 % of the vertices below it, and at 6 % above.
 _CLOSED_BY_HEAT = 0.5
 # Share of the vertices beside curves that may be on the other side for the heat, whose zero curve is up to half an edge
 # off. It is 4 % at most on 48 broken levels (docs/signed_theory.md).
 _CONTRADICTED = 0.05
 
-# Normals that sum to less than this share of the length of the curves have cancelled, up to rounding.
+# Normals that sum to less than this share of the length of the curves have cancelled: those of 64 levels with their
+# opposites to 6e-16, of others to 1.2 and more.
 _CANCELLED = 1e-9
 
 Level = Literal["zero", "constant", "none"]

@@ -37,7 +37,8 @@ from heat_igl.windows import MeshTriangles, PathAngles, WindowEngine
 from heat_igl.windows.directions import axis_of_second_side, carried
 
 VectorMethod = Literal["heat", "windows"]
-# Vectors shorter than this share of the longest at a neighbour are rounding: those that arrive cancel.
+# Vectors shorter than this share of the longest at a neighbour are rounding: those that arrive cancel. Between opposite
+# vectors on a grid the share is 8e-16 in the middle and 8e-10 beside it; of 32 random transports it is at least 3e-3.
 _CANCELLED = 1e-10
 # The time step of vectors in that of heat, for t = h^2. At h^2 / 2, transport on spheres is wrong by 1.5 to 2 times as
 # much; vectors are farther from their shortest paths with longer steps.

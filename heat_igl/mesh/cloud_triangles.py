@@ -34,8 +34,6 @@ _LARGEST_GAP = 0.9
 # Product of two normals below which neighbours belong to different sheets; at right angles they may share an edge. With
 # -0.6, -0.4 and -0.1, errors on twelve clouds with normals are 14 and 5 % larger, and 4 % smaller.
 _OTHER_SHEET = -0.25
-# Cosine of the angle to the next triangle above which the two fold back and may join sheets wrongly: 60 degrees.
-FOLDED_BACK = 0.5
 # The same above which a triangle is put into a gap only if it closes it, a right angle whatever the rounding, as of a
 # notch that belongs to stairs; and above which it never is, since both lie on each other, as within a flat border.
 _RIGHT_ANGLE, _MOST_FOLDED = -0.1, 0.99
