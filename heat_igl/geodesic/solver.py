@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, reduce
 from typing import TYPE_CHECKING, cast, get_args
@@ -313,9 +314,9 @@ class GeodesicSolver(BatchedSolver):
             `distance` (n,) and `labels` (n,).
         """
         limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
-        found = self._asked(chosen).labelled(chosen, limit, n_threads())
+        *found, complaint = self._asked(chosen).answer(chosen, limit, n_threads())
         distance, labels = map(self._with_copies, found)
-        warn_of(self._complaint(distance, chosen, None))
+        warn_of(complaint)
         distance[distance > limit] = np.inf
         labels[np.isinf(distance)] = -1
         return LabelledDistance(distance, labels)
@@ -389,7 +390,9 @@ class GeodesicSolver(BatchedSolver):
         # The formula interpolates tensors per face before it uses them: it has no derivatives by those given.
         if isinstance(asked := self._asked(chosen), SimplexEngine) and not getattr(domain, "metric", None):
             asked = HopfLaxEngine(same) if (same := getattr(domain, "in_tensors", None)) else asked
-            return asked.distance(chosen), asked.derivative(chosen)
+            distance, complaint = asked.judged(chosen)
+            warn_of(complaint)
+            return distance, asked.derivative(chosen)
         from heat_igl.operators import SideLengths
 
         engine = self._windows("derivatives are those of")
@@ -431,17 +434,14 @@ class GeodesicSolver(BatchedSolver):
             return self._engine.to_targets(chosen, places)
         if isinstance(places, SurfacePoints):
             raise ValueError("targets inside faces need windows: leave method away, or name vertices")
-        distance = self._engine.distance(chosen)
-        warn_of(self._complaint(distance, chosen, None))
+        distance, complaint = self._engine.judged(chosen)
+        warn_of(complaint)
         return distance[places]
 
     def _moved(self, V: ArrayLike) -> GeodesicSolver:
         if isinstance(self._domain, Operators):
             raise ValueError("this solver was made from operators and has no vertices to move: make it again")
         return GeodesicSolver(self._domain.with_vertices(V), method=self._method, tolerance=self._tolerance)
-
-    def _complaint(self, distance: FloatArray, sources: SourceSet, check: object) -> str | None:  # noqa: ARG002
-        return self._asked(sources).complaint(sources, distance)
 
     def _source_set(self, sources: Sources) -> SourceSet:
         part, domain, faces = self._part, self._domain, None
@@ -456,9 +456,9 @@ class GeodesicSolver(BatchedSolver):
 
     def _answers(
         self, source_sets: list[SourceSet], cutoff: float = np.inf, threads: int = 1
-    ) -> tuple[FloatArray, list[None]]:
-        rows = [self._asked(sources).distance(sources, cutoff, threads) for sources in source_sets]
-        return self._with_copies(np.stack(rows)), [None] * len(rows)
+    ) -> tuple[FloatArray, Sequence[str | None]]:
+        rows, complaints = zip(*(self._asked(each).judged(each, cutoff, threads) for each in source_sets), strict=True)
+        return self._with_copies(np.stack(rows)), complaints
 
 
 def _sweep_engine(triangles: Triangles) -> SweepEngine:

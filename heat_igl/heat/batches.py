@@ -89,8 +89,8 @@ class BatchedSolver(ABC):
     @abstractmethod
     def _answers(
         self, source_sets: list[SourceSet], cutoff: float = np.inf, threads: int = 1
-    ) -> tuple[FloatArray, Sequence[AnswerCheck | None]]:
-        """Distances (k, n) from k sets of sources, and by how much each violates bounds; on any thread.
+    ) -> tuple[FloatArray, Sequence[AnswerCheck | str | None]]:
+        """Distances (k, n) from k sets of sources, and by how much each violates bounds or a text; on any thread.
 
         What is beyond the cutoff may be left ``inf``. A search may use `threads` threads.
         """
@@ -104,9 +104,9 @@ class BatchedSolver(ABC):
         """Values (..., n) in which copies have those of their originals."""
         return values if self._originals is None else values[..., self._originals]
 
-    def _complaint(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck | None) -> str | None:  # noqa: ARG002
+    def _complaint(self, distance: FloatArray, sources: SourceSet, check: Any) -> str | None:  # noqa: ARG002
         """The text of a warning about an answer (n,), if one is due; in the order of the sets, on one thread."""
-        return None
+        return check if isinstance(check, str) else None
 
     def with_vertices(self, V: ArrayLike) -> Self:
         """A new solver after the vertices have moved; this one stays as it is.
@@ -167,8 +167,8 @@ class BatchedSolver(ABC):
             By heat, if it underflowed on the way, so that distances beyond are too short; if the answer is off by more
             than 3.5 % in the mean or 12.5 % of the largest distance at a vertex, compared with another engine, as the
             first three from such sources are; from points and curves on polygons, if it leaves bounds that need no
-            reference by so much that it is wrong (see `AnswerCheck`). By the Hopf-Lax formula, if the first three
-            answers show that the mesh does not resolve the metric.
+            reference by so much that it is wrong (see `AnswerCheck`). By the Hopf-Lax formula, where it shows
+            that the mesh does not resolve the metric.
         """
         limit, chosen = checked_cutoff(cutoff), self._source_set(sources)
         (distance,), (check,) = self._answers([chosen], limit, n_threads())

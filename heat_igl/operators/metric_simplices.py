@@ -155,10 +155,10 @@ class MetricSimplices:
         lengths = kernel(corners, self.velocity, self.rows, *self.measured[:-1], self.place).edge_lengths()
         return ends.reshape(-1, 2), lengths.ravel()
 
-    def halved(self, chosen: Any = slice(None)) -> MetricSimplices:
-        """Chosen simplices in their metric, all edges of which are halved; the vertices keep their numbers."""
-        corners, size, velocity = self.corners[chosen], self.corners.shape[1], None
-        lengths, group, rows = (None if x is None else x[chosen] for x in (self.lengths, self.group, self.rows))
+    def halved(self) -> MetricSimplices:
+        """The simplices in their metric with all edges halved; the vertices keep their numbers."""
+        corners, size, velocity = self.corners, self.corners.shape[1], None
+        lengths, group, rows = self.lengths, self.group, self.rows
         cut: Any = lambda x: np.concatenate([x.take(part, axis=1) for part in _PARTS[size]])  # noqa: E731
         ends, middle = _middles(corners)
         place = np.concatenate([self.place, self.place[ends].mean(axis=1)])

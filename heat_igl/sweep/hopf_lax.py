@@ -7,23 +7,11 @@ from typing import Any
 import numpy as np
 
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
-from heat_igl.operators import MetricSimplices
-from heat_igl.operators.metric_simplices import inverse_root, symmetric
-from heat_igl.plan import (
-    HALVED_AROUND,
-    HALVED_AROUND_IN_BODIES,
-    MOST_CHANGE,
-    MOST_CHANGE_AT_WORST,
-    MOST_TURNING,
-    MOST_VARIATION,
-)
+from heat_igl.plan import MOST_DOUBT, MOST_DOUBT_AT_WORST
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
-from heat_igl.typing import AnyArray, FloatArray
-
-_SAMPLE = 250  # tetrahedra of which it is asked how far the metric turns
-_ROUNDING = 1e-12
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 
 class HopfLaxEngine(SimplexEngine):
@@ -35,51 +23,30 @@ class HopfLaxEngine(SimplexEngine):
         Triangles or tetrahedra with `tensors`; `heat_igl.kernels.sweep.hopf_lax` describes the scheme.
     """
 
-    def __init__(self, simplices: MetricSimplices) -> None:
-        super().__init__(simplices)
-        self._doubted = 3  # so many of the next answers are checked
+    def answer(
+        self,
+        sources: SourceSet,
+        cutoff: float = np.inf,  # noqa: ARG002
+        threads: int = 1,  # noqa: ARG002
+    ) -> tuple[FloatArray, IntArray, str | None]:
+        """What `labelled` returns, and how it shows that the mesh does not resolve the metric, if it does."""
+        distance, label = self._begun(sources)
+        doubt = self._lower(sources.vertices.astype(np.int32), sources.vertex_offset, distance, label)
+        self._keep_bounds(sources, distance, label)
+        far = distance - sources.vertex_offset[label]
+        away = np.flatnonzero(np.isfinite(distance) & (far > 0))
+        wrong, complaint = 100 * np.append(doubt[away] / far[away], 0.0), None
+        if wrong.mean() > MOST_DOUBT or wrong.max() > MOST_DOUBT_AT_WORST:
+            complaint = (
+                "the metric changes farther than the mesh resolves: slopes contradict distances, which may be wrong by "
+                f"{wrong.mean():.2g} % in the mean, and by {wrong.max():.2g} % at vertex {away[wrong.argmax()]}: "
+                "take a finer mesh"
+            )
+        return distance, np.concatenate([sources.vertex_label, [-1]])[label], complaint
 
-    def complaint(self, sources: SourceSet, distance: FloatArray) -> str | None:
-        """How it shows in one of the first answers that the mesh does not resolve the metric, once."""
-        self._doubted -= 1
-        if self._doubted < 0 or not (found := self._unresolved(sources, distance)):
-            return None
-        self._doubted = 0
-        return (
-            f"the metric changes farther than the mesh resolves: {found}, and distance may be wrong by several "
-            "percent, and by tens at single vertices: take a finer mesh"
-        )
-
-    def _unresolved(self, sources: SourceSet, distance: FloatArray) -> str | None:
-        """How it shows that the mesh does not resolve the metric; None if it does."""
-        n, size, start = len(distance), self._corners.shape[1], sources.vertex_offset.min()
-        count = HALVED_AROUND
-        if size == 4 and (varies := np.sqrt(self._simplices.measured[-1])) > MOST_VARIATION:
-            return f"lengths of edges differ between the corners of a face by {100 * varies:.0f} % in the mean"
-        if size == 4 and n > count:
-            # Between the first corners of some tetrahedra, and others that these meet in.
-            chosen = np.arange(0, len(self._corners), len(self._corners) // _SAMPLE + 1)
-            other, corner = np.divmod(self._incident[self._first[self._corners[chosen]]].ravel(), 4)
-            first, two = self._simplices.metric(np.repeat(chosen, 4), 0), self._simplices.metric(other, corner)
-            root = symmetric(inverse_root(first)[0])
-            low, high = np.maximum(inverse_root(root @ two @ root)[2].T, _ROUNDING)
-            if np.quantile(np.sqrt(high / low).reshape(-1, 4).max(axis=1), 0.9) <= MOST_TURNING:
-                return None
-            count = HALVED_AROUND_IN_BODIES
-        # Shortest paths to the nearest vertices lie in the simplices around these and the sources.
-        beyond = distance.copy()
-        beyond[sources.vertices] = np.inf
-        near = np.argpartition(beyond, min(count, n) - 1)[:count]
-        around = (*near, *sources.vertices[:count])
-        corners = np.concatenate([self._incident[self._first[v] : self._first[v + 1]] for v in around])
-        halved = HopfLaxEngine(self._simplices.halved(np.unique(corners // size)))
-        finer = halved.distance(sources)[near]
-        near, finer = (x[np.isfinite(finer) & (finer > start)] for x in (near, finer))
-        change = 100 * np.append(np.abs(distance[near] - finer) / (finer - start), 0.0)
-        if change.mean() <= MOST_CHANGE and change.max() <= MOST_CHANGE_AT_WORST:
-            return None
-        by = f"{change.mean():.2g} % in the mean, and by {change.max():.2g} % at vertex {near[change.argmax()]}"
-        return f"if edges are halved, distance near the sources changes by {by}"
+    def judged(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, str | None]:
+        """Distance and complaint of `answer`."""
+        return self.answer(sources, cutoff, threads)[::2]
 
     def _lower(
         self,
@@ -88,9 +55,12 @@ class HopfLaxEngine(SimplexEngine):
         distance: FloatArray,
         label: AnyArray,
         fronts: list[tuple[AnyArray, ...]] | None = None,
-    ) -> None:
-        """Lower distance to the least of those of second order from each source alone, and add these to `fronts`."""
-        scheme, limit = self._scheme, np.full(len(distance), np.inf)
+    ) -> FloatArray:
+        """Lower distance to the least of those of second order from each source alone, and add these to `fronts`.
+
+        Returns by how much each may be wrong.
+        """
+        scheme, limit, doubt = self._scheme, np.full(len(distance), np.inf), np.zeros(len(distance))
         if len(vertices) > 1:
             limit = distance.copy()
             self._along_edges(limit, label.copy())
@@ -100,8 +70,10 @@ class HopfLaxEngine(SimplexEngine):
             nearer = far < distance[found]
             distance[found[nearer]], label[found[nearer]] = far[nearer], k
             limit[found] = np.minimum(limit[found], far)
+            doubt[found[nearer]] = scheme.doubts(found[nearer])
             if fronts is not None:
                 fronts.append((np.full(len(found), k), found, far, *scheme.record(found)))
+        return doubt
 
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         self._scheme.shorten(distance, label)

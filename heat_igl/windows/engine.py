@@ -41,9 +41,15 @@ class Engine(ABC):
         found[found >= than] = np.inf
         return found
 
-    def complaint(self, sources: SourceSet, distance: FloatArray) -> str | None:  # noqa: ARG002
-        """The text of a warning about a distance (n,), if one is due; called in the order of the answers."""
-        return None
+    def answer(
+        self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1
+    ) -> tuple[FloatArray, IntArray, str | None]:
+        """What `labelled` returns, and the text of a warning about the distance, if one is due."""
+        return *self.labelled(sources, cutoff, threads), None
+
+    def judged(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, str | None]:
+        """The distance, and the text of a warning about it, if one is due."""
+        return self.distance(sources, cutoff, threads), None
 
 
 class Triangles(ABC):

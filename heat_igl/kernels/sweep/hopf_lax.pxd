@@ -39,7 +39,10 @@ cdef class HopfLax:
     cdef int[::1] roots, order, stack
     cdef unsigned char[::1] state
     cdef double[::1] sum
+    # By how much each distance may be wrong.
+    cdef double[::1] doubt
 
+    cdef bint judge(self, int v) noexcept nogil
     cdef void forget(self, int v) noexcept nogil
     cdef void march(self) noexcept nogil
     cdef void lead_on(self, int v) noexcept nogil
