@@ -212,51 +212,56 @@ def without_noise(tree: PointTree) -> PointTree:
         return tree
     # Evenly over the points, the first and the last among them.
     sample = np.arange(min(n, _SAMPLE)) * (n - 1) // (min(n, _SAMPLE) - 1)
-    if not _is_noisy(tree, sample):
+    near = tree.neighbours_of(sample, K)
+    if not _is_noisy(tree, near):
         return tree
-    for k, stride in _spreads(tree, sample):
+    for k, stride in _spreads(tree, near):
         index = tree.neighbours_of(np.arange(n), k, stride)
         for _ in range(_PASSES):
             tree = PointTree(_onto_quadrics(tree.P, index), tree.order)
     return tree
 
 
-def _is_noisy(tree: PointTree, sample: IntArray) -> bool:
-    """Whether points deviate from quadrics at those of `sample` as noise does: from large as from small, and alone.
+def _is_noisy(tree: PointTree, near: AnyArray) -> bool:
+    """Whether points deviate from quadrics at some of them as noise does: from large as from small, and alone.
 
-    Detail deviates less from small quadrics, and where it is smaller than these, points move as the nearest ones do.
+    Detail deviates less from small quadrics, and where it is smaller than these, points move as the nearest ones do. A
+    row of `near` (b, k + 1) holds a point and its `K` neighbours.
     """
-    way, few = _deviations(tree, sample, K // 2)
+    nearest = near[:, : K // 2 + 1].copy()
+    way, few = _deviations(tree, nearest)
     if few < _NOISE:
         return False
-    share = few / _deviations(tree, sample, K)[1]
+    share = few / _deviations(tree, near)[1]
     if share < _THICK_NOISE_NOT_DETAIL:
         return False
-    if share < _NOISE_NOT_DETAIL and _thickness(tree, tree.neighbours_of(sample, K // 2)) <= _NO_DISC:
+    if share < _NOISE_NOT_DETAIL and _thickness(tree, nearest) <= _NO_DISC:
         return False
-    other = _deviations(tree, tree.neighbours_of(sample, 1)[:, 1], K // 2)[0]
+    other = _deviations(tree, tree.neighbours_of(near[:, 1], K // 2))[0]
     alike = 2 * (way * other).sum(axis=1) / np.maximum((way**2 + other**2).sum(axis=1), _TINY)
-    least = alike.mean() - 4 * alike.std() / np.sqrt(len(sample))
-    is_ball = least > _ALIKE and _thickness(tree, tree.neighbours_of(sample, K)) > _NO_SURFACE
+    least = alike.mean() - 4 * alike.std() / np.sqrt(len(near))
+    is_ball = least > _ALIKE and _thickness(tree, near) > _NO_SURFACE
     return bool(least <= _SHEETS_ALIKE and not is_ball)
 
 
-def _deviations(tree: PointTree, points: IntArray, k: int) -> tuple[FloatArray, float]:
-    """The ways (b, 3) of points to quadrics of k neighbours, and the median noise around these, in spacings."""
-    moved, noise = onto_quadrics(tree.P, tree.neighbours_of(points, k))
-    return moved - tree.P[points], float(np.median(noise)) * np.sqrt(k / np.pi)
+def _deviations(tree: PointTree, index: AnyArray) -> tuple[FloatArray, float]:
+    """The ways (b, 3) of points to quadrics of neighbours, and the median noise around these, in spacings."""
+    moved, noise = onto_quadrics(tree.P, index)
+    return moved - tree.P[index[:, 0]], float(np.median(noise)) * np.sqrt((index.shape[1] - 1) / np.pi)
 
 
-def _spreads(tree: PointTree, sample: IntArray) -> list[tuple[int, int]]:
+def _spreads(tree: PointTree, near: AnyArray) -> list[tuple[int, int]]:
     """How many neighbours, and among every how many-th of the points, in the order in which they are taken.
 
-    As many as are flattest at the points of `sample`: more than `K` where noise thickens these, and fewer where the
-    surface bends. Where as many as are taken show no surface at all, they are taken among fewer points first.
+    As many as are flattest at some points, which rows of `near` (b, k + 1) hold with their `K` neighbours: more than
+    `K` where noise thickens these, and fewer where the surface bends. Where as many as are taken show no surface at
+    all, they are taken among fewer points first.
     """
     n = len(tree.P)
     k, stride, most = K, 1, min(_LARGEST_K, n // 4)
-    found = {k: _thickness(tree, tree.neighbours_of(sample, k)) for k in (K // 2, K)}
-    near = tree.neighbours_of(sample, most if found[K] > _THICKNESS else K)
+    found = {k: _thickness(tree, near[:, : k + 1].copy()) for k in (K // 2, K)}
+    if found[K] > _THICKNESS:
+        near = tree.neighbours_of(near[:, 0], most)
     while found[k] > _THICKNESS and k < most:
         k = min(2 * k, most)
         found[k] = _thickness(tree, near[:, : k + 1].copy())
@@ -272,7 +277,7 @@ def _spreads(tree: PointTree, sample: IntArray) -> list[tuple[int, int]]:
         return [(flattest, 1)]
     while found[k] > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
         stride *= 4
-        found[k] = _thickness(tree, tree.neighbours_of(sample, k, stride))
+        found[k] = _thickness(tree, tree.neighbours_of(near[:, 0], k, stride))
     return [(k, stride), (k, 1)]
 
 
