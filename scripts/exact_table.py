@@ -55,6 +55,13 @@ def ground(n: int, roughness: float, shear: float = 0.0) -> Mesh:
     return Mesh(np.column_stack([P[:, 0] + shear * P[:, 1], P[:, 1], heights]), Delaunay(P).simplices)
 
 
+def drum(n: int) -> Mesh:
+    """Two rings of n vertices, and a fan of n triangles over each: windows enter a fan over all sides of its rim."""
+    wall, rim = shapes.cylinder(n, 1, 1.0), np.arange(n)
+    ends = [np.column_stack([np.roll(rim, turn), np.roll(rim, 1 - turn), np.full(n, 2 * n + turn)]) for turn in (0, 1)]
+    return Mesh(np.vstack([wall.V, [0, 0, 0], [0, 0, 1]]), np.vstack([wall.F, ends[0], ends[1] + [n, n, 0]]))
+
+
 SHAPES: dict[str, Callable[[], Mesh]] = {
     "icosphere 5": lambda: shapes.icosphere(5),
     "icosphere 6": lambda: shapes.icosphere(6),
@@ -72,6 +79,9 @@ SHAPES: dict[str, Callable[[], Mesh]] = {
     "rough ground, largest": lambda: ground(130_000, 0.5),
     "sheared ground": lambda: ground(5000, 0.3, 4.0),
     "sheared ground, large": lambda: ground(50_000, 0.3, 4.0),
+    "drum of 2000": lambda: drum(2000),
+    "drum of 4000": lambda: drum(4000),
+    "drum of 8000": lambda: drum(8000),
 }
 
 

@@ -9,6 +9,7 @@
     python scripts/metrics_table.py smooth [--rows 48]         # tensors that change smoothly in bodies
     python scripts/metrics_table.py several [--rows 24]        # several sources beside single ones
     python scripts/metrics_table.py choice [cow.obj ...]       # windows beside the Hopf-Lax formula
+    python scripts/metrics_table.py warnings [--rows 48]       # of how many answers, right or wrong
     python scripts/metrics_table.py polygons cow.obj --sources 8   # on the duals of these meshes, or their polygons
 
 metrics and bodies: mean of |d - exact| / exact over ``--sources`` in percent, "-" where a method does not apply; "heat"
@@ -27,6 +28,8 @@ vertices, times over those of fim-python, which takes those per simplex.
 several: in the metrics of smooth, at the vertices, the mean and largest difference from the least of the distances from
 single sources, and time over that from one, from 3 and 30 vertices and the 30 vertices nearest to one.
 choice: what `hopf_lax_is_nearer` compares, and mean errors in closed form or against triangles cut into 4 or 16.
+warnings: answers on smooth and ``--count`` random fields, wrong by 5 % in the mean or 20 at a vertex, which of them are
+silent, and right within 2 and 10 %, which of them warn.
 polygons: mean errors of heat on triangles of the polygons and around virtual vertices, from exact distance there.
 """
 
@@ -59,14 +62,14 @@ from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.closed_forms import around_the_edge, by_fermat, straight
 from heat_igl.validation.construction import carved, compact, tetrahedra
 
-from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds, subdivided
+from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds
 
 Random = np.random.Generator
 Cut = Callable[[FloatArray], BoolArray]
 Samples = Iterator[tuple[str, FloatArray]]
 METHODS = {"default": ours(), "heat": ours("heat", magnitude="unit")} | {m: ours(m) for m in ("sweep", "windows")}
 HAS_FIM = find_spec("fimpy") is not None
-Field = tuple[str, Mesh, Callable[[FloatArray], FloatArray], int, FloatArray]
+Field = tuple[str, Mesh, Callable[[FloatArray], FloatArray], int, Query]
 # Cells across layers, and across a mesh with a metric per face.
 ACROSS, FINE = 30, 18
 # A body of more vertices is halved once for its reference.
@@ -262,11 +265,15 @@ WALLS: dict[str, Callable[[Random], Mesh]] = {
 }
 
 
-def finer(mesh: Mesh) -> Query:
-    """Distance at the vertices on tetrahedra halved twice, or once."""
+def halved(mesh: Mesh) -> MetricSimplices:
+    """The simplices, halved twice, or once."""
     simplices = MetricSimplices.in_space(mesh).halved()
-    if mesh.n_vertices <= MANY:
-        simplices = simplices.halved()
+    return simplices.halved() if mesh.n_vertices <= MANY else simplices
+
+
+def finer(mesh: Mesh) -> Query:
+    """Distance at the vertices on tetrahedra that are halved."""
+    simplices = halved(mesh)
     # Of two sources, each vertex first looks for the nearer in space: the other is far away, in no tetrahedron.
     far = mesh.V.max(axis=0) + 10 * np.ptp(mesh.V, axis=0)
     solver = GeodesicSolver(Mesh(np.vstack([simplices.place, far]), simplices.corners))
@@ -543,25 +550,27 @@ def cylinder(rings: int, rng: Random) -> Mesh:
 
 
 def smooth(rows: int, rng: Random) -> Iterator[Field]:
-    """Names, meshes, metrics (k, 3, 3) at places (k, 3), a source, and exact distances."""
+    """Names, meshes, metrics (k, 3, 3) at places (k, 3), a source, and exact distances from any."""
     for k, rings in product((2.0, 4.0), (rows // 12, rows // 6, rows // 4)):
         mesh = cylinder(rings, rng)
         source = int(np.linalg.norm(mesh.V - [0.4, 0.3, 0.5], axis=1).argmin())
         name = f"twisted, 1 : {((k + np.hypot(k, 2)) / 2) ** 2:.2g}"
-        yield name, mesh, lambda x, k=k: twisted_body(x, k)[1], source, straight(twisted_body(mesh.V, k)[0], source)
+        exact = partial(straight, twisted_body(mesh.V, k)[0])
+        yield name, mesh, lambda x, k=k: twisted_body(x, k)[1], source, exact
     for k, (where, place) in product((3.0, 5.0), (("the centre", 0.0), ("beside", 0.4))):
         for rings in (rows // 6, rows // 3, 2 * rows // 3, 4 * rows // 3):
             mesh = shapes.disk(rings)
             source = int(np.linalg.norm(mesh.V - [place, 0.75 * place, 0], axis=1).argmin())
             name = f"disc, 1 : {(k + np.hypot(k, 1)) ** 2:.3g}, from {where}"
-            yield name, mesh, lambda x, k=k: twisted_disk(x, k)[1], source, straight(twisted_disk(mesh.V, k)[0], source)
+            exact = partial(straight, twisted_disk(mesh.V, k)[0])
+            yield name, mesh, lambda x, k=k: twisted_disk(x, k)[1], source, exact
     for c, place in ((3, 0.5), (20, 0.5), (20, 0.0)):
         for cells in (rows // 6, rows // 4, 5 * rows // 12):
             mesh = moved_inside(shapes.box(cells), rng, 0.25 / cells)
             source = int(np.linalg.norm(mesh.V - place, axis=1).argmin())
             metric = isotropic(lambda x, c=c: 1 + (c - 1) * x[:, 2])
             name = f"speeds 1 : {c}, from {'the middle' if place else 'a slow corner'}"
-            yield name, mesh, metric, source, hyperbolic(mesh.V, source, c)
+            yield name, mesh, metric, source, partial(hyperbolic, mesh.V, most=c)
 
 
 def by_fim(mesh: Mesh, g: FloatArray, source: int) -> FloatArray:
@@ -576,12 +585,8 @@ def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     for name, mesh, metric, source, exact in smooth(options.rows, rng):
         centres = metric(mesh.V[mesh.F].mean(axis=1))
         row: Row = {"body": name, "n": mesh.n_vertices, "m": mesh.n_faces}
-        for method, query, g in (
-            ("fim", by_fim, centres),
-            ("face", default, centres),
-            ("vertex", default, metric(mesh.V)),
-        ):
-            row[method] = timed(exact, query, mesh, g, source)
+        asked = {"fim": (by_fim, centres), "face": (default, centres), "vertex": (default, metric(mesh.V))}
+        row |= {method: timed(exact(source), query, mesh, g, source) for method, (query, g) in asked.items()}
         yield row | {m: row[m] | {"s": row[m]["s"] / row["fim"]["s"]} for m in ("fim", "face", "vertex")}
 
 
@@ -596,11 +601,8 @@ def from_several(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         near = np.linalg.norm(mesh.V - mesh.V[source], axis=1).argsort()
         solver.distances([[source]] * 3)  # the first answers are compared with others
         row: Row = {"body": body, "n": mesh.n_vertices}
-        for key, chosen in (
-            ("few", rng.choice(mesh.n_vertices, 3, replace=False)),
-            ("many", rng.choice(mesh.n_vertices, 30, replace=False)),
-            ("region", near[:30]),
-        ):
+        random = [rng.choice(mesh.n_vertices, k, replace=False) for k in (3, 30)]
+        for key, chosen in zip(("few", "many", "region"), (*random, near[:30]), strict=True):
             start = time.process_time()
             least = np.min([solver.distance(vertex) for vertex in chosen], axis=0)
             one = (time.process_time() - start) / len(chosen)
@@ -615,22 +617,46 @@ def choices(options: argparse.Namespace, rng: Random) -> Iterator[Field]:
         mesh, source = plane(cells, rng), (cells // 2) * (cells + 2)
         for c in (1.5, 3.0, 20.0):
             metric = isotropic(lambda x, c=c: 1 + (c - 1) * x[:, 1])
-            yield f"speeds growing linearly, 1 : {c:g}", mesh, metric, source, hyperbolic(mesh.V, source, c)
-        z = 0.1 ** (mesh.V[:, 1] + 1j * mesh.V[:, 0]) / np.log(10)  # unrolled
-        yield (
-            "speeds growing exponentially, 1 : 10",
-            mesh,
-            isotropic(lambda x: 10 ** x[:, 1]),
-            source,
-            np.abs(z - z[source]),
-        )
+            yield f"speeds growing linearly, 1 : {c:g}", mesh, metric, source, partial(hyperbolic, mesh.V, most=c)
+        unrolled = 0.1 ** (mesh.V[:, 1] + 1j * mesh.V[:, 0]) / np.log(10)
+        metric = isotropic(lambda x: 10 ** x[:, 1])
+        yield "speeds growing exponentially, 1 : 10", mesh, metric, source, lambda i, z=unrolled: np.abs(z - z[i])
     surfaces = {"square": plane(24, rng), "sphere": shapes.icosphere(4), "torus": shapes.torus(24, 60, 0.4)}
     for (name, mesh), c in product((surfaces | named(options.meshes)).items(), (0.01, 0.1, 0.5)):
         mesh = Mesh(mesh.V / np.ptp(mesh.V, axis=0).max(), mesh.F)
-        finer = subdivided(mesh if len(mesh.F) > MANY else subdivided(mesh))
         metric = isotropic(lambda x, c=c: 1 + c * np.sin(9 * x[:, 0] + 2) * np.cos(8 * x[:, 1]))
-        exact = GeodesicSolver(metric_operators(finer, metric(finer.V))).distance(7)[: mesh.n_vertices]
-        yield f"{name}, speeds in waves, 1 : {(1 + c) / (1 - c):.3g}", mesh, metric, 7, exact
+        yield f"{name}, speeds in waves, 1 : {(1 + c) / (1 - c):.3g}", mesh, metric, 7, on_finer(mesh, metric)
+
+
+def on_finer(mesh: Mesh, metric: Callable[[FloatArray], FloatArray]) -> Query:
+    """Distance at the vertices on halved simplices, whose vertices have metrics of their own."""
+    simplices = halved(mesh)
+    solver = GeodesicSolver(metric_operators(Mesh(simplices.place, simplices.corners), metric(simplices.place)))
+    return lambda i: solver.distance(i)[: mesh.n_vertices]
+
+
+def rough(count: int, rows: int, rng: Random) -> Iterator[Field]:
+    """Random waves of directions in which lengths are up to 7 times as long, on a disc and in a body."""
+    for name, mesh in [("disc", shapes.disk(rows // 2)), ("body", shapes.box(rows // 6))] * count:
+        waves, phases, most = rng.uniform(-8, 8, (3, 3)), rng.uniform(0, 2 * np.pi, 3), rng.uniform(0, 4)
+        along = lambda x, a=waves, b=phases, c=most: c * np.sin(x @ a + b)  # noqa: E731
+        metric = lambda x, v=along: np.eye(3) + v(x)[..., None] * v(x)[..., None, :]  # noqa: E731
+        yield f"random, {name}", mesh, metric, 0, on_finer(mesh, metric)
+
+
+def on_warnings(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
+    counts: dict[str, FloatArray] = {}
+    for name, mesh, metric, _, exact in [*smooth(options.rows, rng), *rough(options.count, options.rows, rng)]:
+        for source in rng.choice(mesh.n_vertices, options.sources, replace=False).tolist():
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always")
+                found = GeodesicSolver(metric_operators(mesh, metric(mesh.V))).distance(source)
+            error = np.abs(excess(found, exact(source)))
+            wrong, right = error.mean() > 5 or error.max() > 20, error.mean() < 2 and error.max() < 10
+            now = np.array([1, wrong, wrong and not said, right, right and bool(said)], int)
+            counts[name] = counts.get(name, 0) + now
+    for name, found in counts.items():
+        yield {"domain": name} | dict(zip(("n", "wrong", "silent", "right", "said"), found.tolist(), strict=True))
 
 
 def isotropic(speed: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
@@ -646,7 +672,7 @@ def on_choice(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
             simplices = MetricSimplices.in_metric(mesh, g, 0.0, at_vertices=where == "vertex")
             one = GeodesicSolver(domain, method="exact").distance(source)
             other = HopfLaxEngine(simplices).distance(source_set(source, mesh.n_vertices, None))
-            off = [np.abs(excess(d, exact)).mean() for d in (one, other)]
+            off = [np.abs(excess(d, exact(source))).mean() for d in (one, other)]
             row: Row = {"field": f"{name}, per {where}", "n": mesh.n_vertices, "windows": off[0], "hopf": off[1]}
             row |= {"variation": simplices.measured[-1], "curvature": mean_angle_defect(intrinsic_triangulation(mesh))}
             yield row | {"chosen": "windows" if domain.simplices is None else "Hopf-Lax"}
@@ -754,6 +780,7 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
         "metric": "{field}", "vertices": "{n}", "variation": "{variation:.2g}", "curvature": "{curvature:.2g}",
         "windows, %": "{windows:.2g}", "Hopf-Lax, %": "{hopf:.2g}", "chosen": "{chosen}",
     }),
+    "warnings": (on_warnings, {key: key for key in ("domain", "n", "wrong", "silent", "right", "said")}),
     "polygons": (on_polygons, {
         "": "{mesh}", "triangles without virtual vertices, %": "{triangles:.2g}",
         "with virtual vertices (default), %": "{virtual:.2g}",

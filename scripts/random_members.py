@@ -1,7 +1,6 @@
 """Random members of families that once were answered wrongly, each determined by its seed.
 
     python scripts/random_members.py exact --members 2000           # those of the seeds 0 to 1999
-    python scripts/random_members.py many-faced
     python scripts/random_members.py cuts --members 100 --first 500
     python scripts/random_members.py log-maps
     python scripts/random_members.py signed
@@ -14,9 +13,6 @@ exact: distance by windows on nearly flat surfaces (validation/random_shapes.py)
 vertices, on the intrinsic Delaunay triangulation and on the triangles as given. "edges": by how much distance grows
 faster than along an edge, inf where a vertex has none. "triangulations": the difference of both. "straight lines": on
 at most 60 vertices, the difference to `straight_lines`. All as shares of the largest distance.
-
-many-faced: heat on boundaries of random tetrahedra, whose edges have up to a dozen faces. "times exact": the time of
-the slowest of ten queries, over the median one of exact distance from the same vertices.
 
 cuts: small meshes cut along curves across, through and along everything. "area": how far the parts of a face are from
 its area. "length": how far the curves among the edges are from their length. "distance": how far exact distances
@@ -37,7 +33,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from warnings import catch_warnings, simplefilter
 
 import igl
 import numpy as np
@@ -47,7 +42,7 @@ from scipy.spatial import Delaunay
 
 import heat_igl
 from heat_igl import Mesh, SurfaceCurve, curve_on, exp_map, geodesic_distance, isolines, log_map, shapes, tangent_frames
-from heat_igl.errors import AccuracyWarning, MeshError
+from heat_igl.errors import MeshError
 from heat_igl.intrinsic import intrinsic_triangulation, mollify
 from heat_igl.mesh import region_boundary
 from heat_igl.mesh.connectivity import boundary_loops
@@ -60,12 +55,12 @@ from heat_igl.validation.zoo import FAMILIES
 from heat_igl.windows import ExactSurface, exact_distance
 from heat_igl.windows.tables import MARGIN, from_mesh
 
-from harness import Row, Table, on_sphere, parsed, publish, seconds
+from harness import Row, Table, on_sphere, parsed, publish
 
 Random = np.random.Generator
 # Kind, figures, and what of them the rounding of lengths explains.
 Member = tuple[str, dict[str, float], float]
-LARGEST = {"exact": 1e-9, "many-faced": 20.0, "cuts": 1e-12, "log-maps": 1e-8, "signed": 1e-12}
+LARGEST = {"exact": 1e-9, "cuts": 1e-12, "log-maps": 1e-8, "signed": 1e-12}
 _MOST_COMPARED, _COARSE = 60, 30
 
 
@@ -215,25 +210,6 @@ def exact(seed: int) -> Member:
     if mesh.n_vertices <= _MOST_COMPARED:
         off["straight lines"] = float(np.abs(straight_lines(mesh, sources) - found).max())
     return name, {key: max(each / float(found.max()), 0.0) for key, each in off.items()}, rounding(mesh)
-
-
-# Heat at edges of many faces.
-
-
-def many_faced(seed: int) -> Member:
-    rng = np.random.default_rng(seed)
-    P = rng.random((int(rng.integers(100, 800)), 3))
-    T = Delaunay(P).simplices
-    mesh = Mesh(P, igl.boundary_facets(T[rng.random(len(T)) < rng.uniform(0.2, 0.8)])[0])
-    sources = rng.choice(np.unique(mesh.F), 10).tolist()
-    solvers = heat_igl.GeodesicSolver(mesh, method="exact"), heat_igl.HeatMethodSolver(mesh)
-    with catch_warnings():
-        simplefilter("ignore", AccuracyWarning)
-        for solver in solvers:
-            solver.distances(sources[:4])  # the first of heat are compared with another engine
-        exact, heat = ([seconds(lambda i=i, s=s: s.distance(i)) for i in sources] for s in solvers)
-    kind = f"{2 ** int(np.log2(mesh.n_faces))} faces or more"
-    return kind, {"times exact": max(heat) / float(np.median(exact))}, 0.0
 
 
 # Cuts.
@@ -428,7 +404,6 @@ def signed(seed: int) -> Member:
 
 TABLES: dict[str, Callable[[int], Member]] = {
     "exact": exact,
-    "many-faced": many_faced,
     "cuts": cuts,
     "log-maps": log_maps,
     "signed": signed,
