@@ -246,9 +246,8 @@ def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
     for source in (100, 20, 30, 50):  # whatever came before
         with pytest.warns(AccuracyWarning, match="slopes contradict distances, .* wrong by .* % in the mean"):
             coarse.distance(source)
-    box = shapes.box(3)
-    linear = metric_operators(box, np.eye(3) / (1 + 99 * box.V[:, 2:, None]) ** 2)
-    assert np.delete(GeodesicSolver(linear).distance(0), 0) == pytest.approx(halved_twice(box, linear, 0), rel=0.02)
+    box, g, exact = growing_speed(3, 100.0)
+    assert solver(box, g).distance(0) == pytest.approx(exact, rel=0.03)
     fibres = fibre_metric(np.random.default_rng(0).standard_normal((box.n_faces, 3)), 1.0, 10.0)
     for ask in (GeodesicSolver.distance, GeodesicSolver.voronoi, GeodesicSolver.distance_vjp):
         with pytest.warns(AccuracyWarning, match="slopes contradict distances"):
@@ -266,22 +265,15 @@ def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
     GeodesicSolver(speed_operators(mesh, np.where(mesh.V[mesh.F].mean(axis=1)[:, 0] < 0, 1.0, 100.0))).distance(0)
 
 
-@pytest.mark.parametrize(("seed", "most"), [(0, 46), (5, 50)])
-def test_a_fast_layer_far_from_the_source_gives_a_warning(seed, most):
-    """Single vertices beside it are half as far again, in silence while distances near the source were looked at."""
-    body = tetrahedra(np.random.default_rng(seed).random((700, 3)))
-    domain = speed_operators(body, np.where(np.abs(body.V[body.F].mean(axis=1)[:, 0] - 0.6) < 0.1, 10.0, 1.0))
-    with pytest.warns(AccuracyWarning, match="slopes contradict distances"):
-        found = GeodesicSolver(domain).distance(0)
-    assert np.abs(found[1:] / halved_twice(body, domain, 0) - 1).max() == pytest.approx(most / 100, abs=0.02)
-
-
-def test_a_tube_of_five_sides_gives_a_warning_in_two_speeds():
-    """On triangles with angles of 144 degrees, distances were down to .53 of the shortest path at the larger speed."""
-    tube = FAMILIES["nearly flat cylinder"](16)
-    two = GeodesicSolver(speed_operators(tube, np.where(np.arange(tube.n_faces) % 2, 1.3, 1.0)))
-    with pytest.warns(AccuracyWarning, match="slopes contradict distances, which may be wrong by 2"):
-        two.distance(0)
+def test_distances_around_speeds_that_jump_give_a_warning():
+    """Beside a fast layer far from the source single ones are 46 % too long, on a tube of five sides too short."""
+    body, tube = tetrahedra(np.random.default_rng(0).random((700, 3))), FAMILIES["nearly flat cylinder"](16)
+    layer = np.where(np.abs(body.V[body.F].mean(axis=1)[:, 0] - 0.6) < 0.1, 10.0, 1.0)
+    for mesh, speed in ((body, layer), (tube, np.where(np.arange(tube.n_faces) % 2, 1.3, 1.0))):
+        domain = speed_operators(mesh, speed)
+        with pytest.warns(AccuracyWarning, match="slopes contradict distances"):
+            found = GeodesicSolver(domain).distance(0)
+        assert np.abs(found[1:] / halved_twice(mesh, domain, 0) - 1).max() > 0.15
 
 
 def test_no_flip_joins_two_vertices_that_an_edge_joins():

@@ -196,7 +196,7 @@ class PointCloud:
                 "no three points of P are neighbours on a surface: the points are too few or too unevenly spaced"
             )
         F, between = oriented(tree.P, triangles, normals)
-        F, beside, apart, along_one = with_gaps_closed(tree, F, near)
+        F, beside, apart, along_one, is_far = with_gaps_closed(tree, F, near)
         tilted = tilt(tree.P, F, near)
         V = np.empty_like(self.P)
         V[number] = tree.P
@@ -204,8 +204,8 @@ class PointCloud:
         if tree is not given:
             _warn_of_noise(np.linalg.norm(tree.P - given.P, axis=1), normals is None, float(found.measures.sum()))
         doubtful = number[np.union1d(between, beside)]
-        is_long = along_one > _LONG_GAP * np.sqrt(len(self.P))
-        if len(doubtful) > _MOST_DOUBTFUL * len(self.P) or is_long or tilted > _MOST_TILTED:
+        is_wrong = is_far or along_one > _LONG_GAP * np.sqrt(len(self.P))
+        if is_wrong or len(doubtful) > _MOST_DOUBTFUL * len(self.P) or tilted > _MOST_TILTED:
             warn_caller(
                 f"the points do not tell their surface: at {len(doubtful)} of {len(self.P)}, among "
                 "PointCloud.report().doubtful_points, triangles contradict each other's sides, lie on each other, "
