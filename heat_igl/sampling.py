@@ -212,15 +212,15 @@ def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -
 
 
 @names_guessed
-def diameter(solver: Solver | MeshLike, *, start: int = 0, rounds: int = 10) -> tuple[float, int, int]:
+def diameter(solver: Solver | MeshLike, *, start: int | None = None, rounds: int = 10) -> tuple[float, int, int]:
     """Two vertices that are far apart, found by repeatedly moving to the farthest vertex.
 
     Parameters
     ----------
     solver : GeodesicSolver, HeatMethodSolver or mesh
         Of any domain, or whatever `as_mesh` takes, for its `GeodesicSolver`.
-    start : int
-        Vertex whose component is measured.
+    start : int, optional
+        Vertex whose component is measured: the first that a face uses, if not given.
     rounds : int
         Largest number of queries; three or four mostly suffice.
 
@@ -249,6 +249,7 @@ def diameter(solver: Solver | MeshLike, *, start: int = 0, rounds: int = 10) -> 
     solver = as_solver(solver)
     if not isinstance(rounds, int | np.integer) or rounds < 1:
         raise ValueError(f"rounds must be a positive integer, not {rounds!r}")
+    start = int(solver.referenced.argmax()) if start is None else start
     here = int(distinct_vertices(start, solver.n_vertices, "start")[0])
     best = (-1.0, here, here)
     left = TimeLeft("queries at most are done", rounds)

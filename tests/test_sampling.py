@@ -173,6 +173,7 @@ def test_dual_must_be_a_manifold_with_every_site():
 
 def test_diameter_of_a_square_and_a_sphere(square):
     distance, first, second = heat_igl.diameter(square[1], start=130)
+    assert heat_igl.diameter(heat_igl.Mesh([[9, 9, 9], *square[0].V], square[0].F + 1))[0] == pytest.approx(2**0.5)
     assert distance == pytest.approx(np.sqrt(2))
     assert np.linalg.norm(square[0].V[first] - square[0].V[second]) == pytest.approx(np.sqrt(2))
     sphere = shapes.icosphere(4)
