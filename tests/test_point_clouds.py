@@ -401,13 +401,13 @@ def test_slots_that_are_bridged_and_bends_from_point_to_point_are_said(slot, pit
 
 @pytest.mark.parametrize(("n", "said"), [(800, "bridge a gap"), (2000, "")])
 def test_a_triangle_between_the_turns_of_a_roll_is_said(n, said):
-    """Where few points are at the border; distances were 10 to 46 % off in the mean, in silence."""
+    """Where few points are at the border; distances are 8 % off in the mean, of other rolls 46, in silence before."""
     t, y = plane(n, 1)[:, :2].T * [[3 * np.pi], [15]] + [[1.5 * np.pi], [0]]
     with pytest.warns(AccuracyWarning, match=said) if said else nullcontext():
         found = GeodesicSolver(PointCloud(np.stack([t * np.cos(t), y, t * np.sin(t)], axis=1))).distance(0)
     along = (t * np.sqrt(1 + t**2) + np.arcsinh(t)) / 2
     exact = np.hypot(along - along[0], y - y[0])
-    assert (np.abs(found - exact).mean() > 0.1 * exact.mean()) == bool(said)
+    assert (np.abs(found - exact).mean() > 0.05 * exact.mean()) == bool(said)
 
 
 def test_torn_points_are_more_than_four_edges_from_another_of_a_part():
