@@ -13,6 +13,8 @@ from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
+_GOLDEN = 0.618033988749895  # multiples of it, modulo 1, are spread evenly
+
 
 class HopfLaxEngine(SimplexEngine):
     """Distance by the Hopf-Lax formula on each simplex, of second order, until nothing changes.
@@ -64,8 +66,10 @@ class HopfLaxEngine(SimplexEngine):
         if len(vertices) > 1:
             limit = distance.copy()
             self._along_edges(limit, label.copy())
-        # The order of sources, on which rounding depends, is not that of the numbers of vertices.
-        for k in np.lexsort((*self._simplices.place[vertices].T, offset)):
+        # The order of sources, on which rounding depends, is not that of the numbers of vertices. One after the other
+        # they are far apart, so that the first ones limit the others.
+        order = np.lexsort((*self._simplices.place[vertices].T, offset))
+        for k in order[np.argsort(np.arange(len(order)) * _GOLDEN % 1)]:
             found, far = scheme.spread(vertices[k], offset[k], limit)
             nearer = far < distance[found]
             distance[found[nearer]], label[found[nearer]] = far[nearer], k

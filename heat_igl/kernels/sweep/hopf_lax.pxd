@@ -7,7 +7,7 @@ cdef extern from *:
     #define SETTLED 5e-4
     // What a vertex may rise, as a share of its distance, though those it depends on do not: then its second order halves.
     #define RISEN 0.1
-    // By how many longest edges others may be nearer to a vertex from which a source is followed on: 0 to .25 measured.
+    // By how many mean edges others may be nearer to a vertex from which a source is followed on: 0 to .25 measured.
     #define CLOSE 0.1
     """
     double SETTLED, RISEN, CLOSE

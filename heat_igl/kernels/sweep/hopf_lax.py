@@ -214,15 +214,17 @@ class HopfLax:
         """Reach the vertices around v once, unless other sources are clearly nearer to v.
 
         A shortest path runs where its source is the nearest, perhaps between vertices that are nearer to others. Fronts
-        of sources one edge h apart differ in direction by h / R at the distance R, so by up to h^2 / 2 R on both sides
-        of their border.
+        of sources one edge h apart differ in direction by h / R at the distance R, so by h^2 / R one edge beside their
+        border. The longest edge in place of the mean would be that of slivers.
         """
         square: cython.double = 0.0
         excess: cython.double = self.d[v] - self.limit[v]
         if excess > 0.0:
             for k in range(self.first[v], self.first[v + 1]):
-                square = max(square, self.update.widest[self.incident[k] // self.corners.shape[1]])
-        if not self.leads[v] and (excess <= CLOSE * sqrt(square) or 2.0 * excess * (self.d[v] - self.low) <= square):
+                for i in range(self.update.mean.shape[1]):
+                    square += self.update.mean[self.incident[k] // self.corners.shape[1], i]
+            square /= (self.first[v + 1] - self.first[v]) * self.update.mean.shape[1]
+        if not self.leads[v] and (excess <= CLOSE * sqrt(square) or excess * (self.d[v] - self.low) <= square):
             self.leads[v] = 1
             self.reach(v)
 
