@@ -99,6 +99,13 @@ def unique_rows(rows: IntArray, n: int) -> tuple[IntArray, IntArray, IntArray]:
     return ascending[start], inverse, np.diff(start, append=len(rows))
 
 
+def first_copies(V: FloatArray) -> IntArray:
+    """For each row (n,) of V (n, 3), the first that is equal to it."""
+    rank = np.stack([np.unique(column, return_inverse=True)[1].ravel() for column in V.T], axis=1)
+    first, inverse, _ = unique_rows(rank, len(V))
+    return first[inverse]
+
+
 def edges(F: IntArray, n: int) -> IntArray:
     """The distinct edges (k, 2) of triangles or tetrahedra `F`, each ascending, in lexicographic order."""
     pairs = np.concatenate([F[:, pair] for pair in combinations(range(F.shape[1]), 2)])

@@ -12,11 +12,12 @@ import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError, as_array, names_guessed, require_choice
 from heat_igl.mesh.cloud_objects import cloud_of_cells, cloud_of_points, cloud_of_poly_data, refuse_other_cells
+from heat_igl.mesh.connectivity import first_copies
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.mesh.point_cloud import PointCloud
 from heat_igl.mesh.polygons import PolygonMesh
 from heat_igl.mesh.rasters import ImageDomain
-from heat_igl.mesh.seams import copies_apart, place_originals, seam_originals, seam_pairs
+from heat_igl.mesh.seams import copies_apart, seam_originals, seam_pairs
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, ArrayLike, IntArray
 
@@ -130,7 +131,7 @@ def as_mesh(
 
 def _merged(found: Mesh | PolygonMesh, merge: str) -> Mesh | PolygonMesh:
     mesh = found if isinstance(found, Mesh) else found.triangles
-    originals = seam_originals(mesh) if merge == "seams" else place_originals(mesh)
+    originals = seam_originals(mesh) if merge == "seams" else first_copies(mesh.V)
     apart = copies_apart(mesh, originals)
     if apart:
         warn_caller(

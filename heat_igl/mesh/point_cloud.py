@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError, as_array, raise_at_first
+from heat_igl.mesh.connectivity import first_copies
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.mesh.report import CloudReport
 from heat_igl.runtime import warn_caller
@@ -132,16 +133,9 @@ class PointCloud:
         P, original = self.P, np.arange(len(self.P))
         # Copies have the same sum, whatever the factors.
         total = P[:, 0] + np.sqrt(2) * P[:, 1] + np.sqrt(3) * P[:, 2]
-        ascending = np.sort(total)
-        again = ascending[1:][ascending[1:] == ascending[:-1]]
-        if not len(again):
+        if len(np.unique(total)) == len(total):
             return original, original
-        order = np.flatnonzero(np.isin(total, again))
-        # The sort is stable: the first of equal points has the smallest index.
-        order = order[np.lexsort(P[order].T)]
-        is_new = np.append(True, (P[order[1:]] != P[order[:-1]]).any(axis=1))
-        original[order] = order[is_new][np.cumsum(is_new) - 1]
-        return np.unique(original, return_inverse=True)
+        return np.unique(first_copies(P), return_inverse=True)
 
     @property
     def has_copies(self) -> bool:

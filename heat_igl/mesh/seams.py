@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heat_igl.mesh.connectivity import connected_components, unique_rows
+from heat_igl.mesh.connectivity import connected_components, first_copies, unique_rows
 from heat_igl.typing import IntArray
 
 if TYPE_CHECKING:
@@ -48,12 +48,6 @@ def seam_originals(mesh: Mesh) -> IntArray:
     return np.asarray(first[label], np.int64)
 
 
-def place_originals(mesh: Mesh) -> IntArray:
-    """The first vertex (n,) in the place of each."""
-    _, first, place = np.unique(_places(mesh, np.arange(mesh.n_vertices)), return_index=True, return_inverse=True)
-    return np.asarray(first[place.ravel()], np.int64)
-
-
 def copies_apart(mesh: Mesh, originals: IntArray) -> int:
     """The number of places where vertices at the boundary have several `originals`."""
     at_boundary = np.flatnonzero(mesh.boundary)
@@ -64,7 +58,6 @@ def copies_apart(mesh: Mesh, originals: IntArray) -> int:
 
 def _places(mesh: Mesh, vertices: IntArray) -> IntArray:
     """A number (n,) for the position of each of some vertices, the same for equal ones; 0 for all others."""
-    rank = np.stack([np.unique(column, return_inverse=True)[1].ravel() for column in mesh.V[vertices].T], axis=1)
     place = np.zeros(mesh.n_vertices, np.int64)
-    place[vertices] = unique_rows(rank, len(vertices))[1]
+    place[vertices] = first_copies(mesh.V[vertices])
     return place
