@@ -10,6 +10,7 @@ from surfaces import nearest_vertex
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, activation_times, shapes
 from heat_igl.errors import AccuracyWarning, SourceError
 from heat_igl.operators import MetricSimplices, Operators, fibre_metric, metric_operators, speed_operators
+from heat_igl.operators.metric_simplices import inverse_root, symmetric
 from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine
 from heat_igl.typing import FloatArray
@@ -294,6 +295,8 @@ def test_no_distance_contradicts_lines_or_edges(p, most):
     rng = np.random.default_rng(int(10 * most))
     mesh = tetrahedra(rng.random((300, 3))) if p == 3 else flat_perturbed(shapes.grid(16), 0.25)
     g = random_metric(mesh.n_faces, rng, most)
+    root = symmetric(inverse_root(g)[0])
+    assert root @ g @ root == pytest.approx(np.broadcast_to(np.eye(3), g.shape), abs=1e-14 * np.exp(2 * most))
     least = np.sqrt(np.linalg.eigvalsh(g[:, :p, :p])[:, 0].min())
     sources, start = [5, 77, 200], np.array([0.0, 0.01, 0.02])
     distance = solver(mesh, g).distance(OffsetSources(sources, start))

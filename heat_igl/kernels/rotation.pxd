@@ -4,19 +4,23 @@ cdef enum:
     MOST_SWEEPS = 30
 
 
-cdef inline bint rotate(double* work, int p, int q) noexcept nogil:
+cdef inline bint rotate(double* work, int p, int q, double rest) noexcept nogil:
     # One rotation of Jacobi's eigenvalue algorithm on the symmetric matrix in the first three rows of `work` (6, 3);
-    # the other three gather the eigenvectors. False if entry (p, q) is zero already.
+    # the other three gather the eigenvectors. False if entry (p, q) is zero already, or at most `rest` of the smaller of
+    # the two on the diagonal.
     cdef int x, r = 3 - p - q
     cdef double entry = work[3 * p + q]
+    cdef double one = fabs(work[4 * p]), two = fabs(work[4 * q])
     cdef double half, tangent, cosine, sine, along, across
-    if fabs(entry) <= 1e-17 * (fabs(work[4 * p]) + fabs(work[4 * q])):
+    if fabs(entry) <= 1e-17 * (one + two) or fabs(entry) <= rest * min(one, two):
         return False
     half = 0.5 * (work[4 * q] - work[4 * p]) / entry
-    tangent = 1.0 / (fabs(half) + sqrt(half * half + 1.0))
+    across = sqrt(half * half + 1.0)
+    tangent = 1.0 / (fabs(half) + across)
+    # As 1 / sqrt(tangent^2 + 1), without waiting for the tangent.
+    cosine = sqrt(0.5 + 0.5 * fabs(half) / across)
     if half < 0.0:
         tangent = -tangent
-    cosine = 1.0 / sqrt(tangent * tangent + 1.0)
     sine = tangent * cosine
     work[4 * p] -= tangent * entry
     work[4 * q] += tangent * entry
@@ -31,11 +35,19 @@ cdef inline bint rotate(double* work, int p, int q) noexcept nogil:
     return True
 
 
-cdef inline void diagonalize(double* work) noexcept nogil:
+cdef inline void diagonalize(double* work, double rest = 0.0, int n = 1) noexcept nogil:
     # Eigenvalues in the diagonal of the matrix in the first three rows of `work` (6, 3), eigenvectors in the others.
-    cdef int x
-    for x in range(9):
-        work[9 + x] = x % 4 == 0
-    for x in range(MOST_SWEEPS):
-        if not (rotate(work, 0, 1) | rotate(work, 0, 2) | rotate(work, 1, 2)):
+    # Beside the diagonal a `rest` may stay. Of n matrices (n, 6, 3) in turn: each waits long for its roots and quotients.
+    cdef int i, k, p, q
+    cdef bint is_turned
+    for i in range(n):
+        for k in range(9):
+            work[18 * i + 9 + k] = k % 4 == 0
+    for _ in range(MOST_SWEEPS):
+        is_turned = False
+        for k in range(3):
+            p, q = k // 2, 1 + (k + 1) // 2
+            for i in range(n):
+                is_turned |= rotate(work + 18 * i, p, q, rest)
+        if not is_turned:
             break

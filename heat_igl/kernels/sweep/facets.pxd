@@ -15,6 +15,10 @@ cdef inline void multiply(const double* W, const double* e, double* into) noexce
     into[1] = W[1] * e[0] + W[3] * e[1] + W[4] * e[2]
     into[2] = W[2] * e[0] + W[4] * e[1] + W[5] * e[2]
 
+cdef inline int entry(int i, int j) noexcept nogil:
+    # Which of these is in row i and column j.
+    return i * (5 - i) // 2 + j if i < j else j * (5 - j) // 2 + i
+
 cdef inline void invert(const double* W, double* into) noexcept nogil:
     cdef int k
     cdef double per

@@ -74,14 +74,16 @@ class Facet:
         sv: cython.double = self.s[0]
         sx: cython.double = x[0] * self.s[1] + x[1] * self.s[2] + x[2] * self.s[3]
         self.sx = sx
-        root: cython.double = sqrt(sv * sx)
-        self.even = 0.5 * self.near * (sv + sx) / root
+        # Divisions take longer than the rest: one for each root.
+        per: cython.double = 0.5 / sqrt(sv * sx)
+        self.even = self.near * (sv + sx) * per
         half: cython.double = 0.5 * self.growth * self.even
         self.bent = 1.0 / sqrt(1.0 + half * half)
-        self.factor = 0.5 * self.bent * (sv + sx) / root
-        self.factor_1 = 0.25 * self.bent * (sx - sv) / (sx * root)
+        self.factor = self.bent * (sv + sx) * per
+        self.factor_1 = 0.5 * self.bent * (sx - sv) * per / sx
+        per = 1.0 / self.near
         for i in range(3):
-            self.u[i] /= self.near
+            self.u[i] *= per
         for i in range(self.p):
             multiply(cython.address(self.W[i + 1][0]), self.w, e)
             for k in range(3):
@@ -115,16 +117,23 @@ class Facet:
         if not (square > 0.0 and L > 0.0):
             return INFINITY
         self.T = sqrt(square)
+        per: cython.double = 1.0 / self.T
         for i in range(3):
-            self.rise[i] = (mean * self.D[i] - self.rise[i]) / self.T
+            self.rise[i] = (mean * self.D[i] - self.rise[i]) * per
             self.g[i] += self.rise[i]
         return self.start + self.T + L
 
     def curve(self) -> cython.void:
         """Set the second derivatives `H` of the last `value`, once."""
         e: cython.double[3]
+        # The velocity at each corner times u.
+        Wu: cython.double[3][3]
         bend: cython.double = 0.0
+        turn: cython.double = 0.0
+        per_T: cython.double = 1.0 / self.T
+        per_near: cython.double = 1.0 / self.near
         if self.q > 1:
+            turn = 0.25 * self.growth * self.growth * self.even * self.bent
             bend = self.near * self.bent * (3.0 * self.s[0] - self.sx)
             bend /= 8.0 * self.sx * self.sx * sqrt(self.s[0] * self.sx)
         for i in range(self.p):
@@ -132,24 +141,22 @@ class Facet:
                 multiply(cython.address(self.inverse[0]), cython.address(self.a[i][0]), e)
                 for k in range(3):
                     self.a[i][k] = e[k]
+                multiply(cython.address(self.W[i + 1][0]), cython.address(self.u[0]), cython.address(Wu[i][0]))
             for j in range(i + 1):
                 found: cython.double = self.D[i] * self.D[j] - 0.5 * self.sag[i][j] - self.rise[i] * self.rise[j]
-                found /= self.T
+                found *= per_T
                 across: cython.double = -self.own[i] * self.own[j]
                 if self.q == 1:
-                    found += (across + self.product[3 * i + j]) / self.near
+                    found += (across + self.product[3 * i + j]) * per_near
                 else:
+                    mixed: cython.double = 0.0
                     for k in range(3):
                         across += self.a[i][k] * self.a[j][k]
-                    across /= self.near
-                    multiply(cython.address(self.W[i + 1][0]), cython.address(self.a[j][0]), e)
-                    across -= 0.5 * (self.u[0] * e[0] + self.u[1] * e[1] + self.u[2] * e[2])
-                    multiply(cython.address(self.W[j + 1][0]), cython.address(self.a[i][0]), e)
-                    across -= 0.5 * (self.u[0] * e[0] + self.u[1] * e[1] + self.u[2] * e[2])
-                    mixed: cython.double = self.own[i] * self.s[j + 1] + self.own[j] * self.s[i + 1]
+                        mixed += Wu[i][k] * self.a[j][k] + Wu[j][k] * self.a[i][k]
+                    across = across * per_near - 0.5 * mixed
+                    mixed = self.own[i] * self.s[j + 1] + self.own[j] * self.s[i + 1]
                     found += self.factor * across + self.factor_1 * mixed + bend * self.s[i + 1] * self.s[j + 1]
-                    turn: cython.double = self.growth * self.growth * self.even * self.bent
-                    found -= 0.25 * turn * (self.g[i] - self.rise[i]) * (self.g[j] - self.rise[j])
+                    found -= turn * (self.g[i] - self.rise[i]) * (self.g[j] - self.rise[j])
                 self.H[i][j] = self.H[j][i] = found
 
     def newton(self, L: cython.double, limit: cython.double) -> cython.double:

@@ -3,13 +3,24 @@
 import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.rotation import diagonalize
-from cython.cimports.heat_igl.kernels.sweep.facets import gradient, invert, mean_velocity, multiply, pair, squares_of
+from cython.cimports.heat_igl.kernels.sweep.facets import (
+    cross,
+    entry,
+    gradient,
+    invert,
+    mean_velocity,
+    multiply,
+    pair,
+    squares_of,
+)
 from cython.cimports.libc.float import DBL_MIN
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
 # The variance of velocities, and differences between those at one vertex, as a share of them, that are rounding.
 _ROUNDING = cython.declare(cython.double, 1e-9)
 _SAME = cython.declare(cython.double, 1e-14)
+# What eigenvalues leave beside the diagonal, as a share: its square is rounding, and a root takes it to first order.
+_REST = cython.declare(cython.double, 1e-8)
 
 # How often each entry on and above the diagonal occurs in a symmetric matrix.
 _OFTEN = cython.declare(cython.double[6], [1.0, 2.0, 2.0, 1.0, 2.0, 1.0])
@@ -33,7 +44,7 @@ def lengths_in_velocity(
     size: cython.int = corners.shape[1]
     n_pairs: cython.int = size * (size - 1) // 2
     m = corners.shape[0]
-    found = np.zeros_like(velocity), np.zeros((m, n_pairs)), np.zeros(m), np.zeros(m), np.zeros(m)
+    found = np.empty_like(velocity), np.empty((m, n_pairs)), np.zeros(m), np.zeros(m), np.zeros(m)
     inverse: cython.double[:, ::1] = found[0]
     mean: cython.double[:, ::1] = found[1]
     widest: cython.double[::1] = found[2]
@@ -125,66 +136,89 @@ def velocities_at_corners(
     row: cython.int[:, ::1] = number
     row_at: cython.int[::1] = last
     count: cython.int = 0
+    size: cython.int = corners.shape[1]
     in_plane: cython.bint = axes.shape[0] > 0
-    base: cython.double[9]
+    # Of four simplices at once.
+    base: cython.double[36]
+    work: cython.double[288]
     with cython.nogil:
-        for s in range(corners.shape[0]):
-            for k in range(9):
-                base[k] = axes[s, k // 3, k % 3] if in_plane and k < 6 else k % 4 == 0
-            for c in range(corners.shape[1]):
-                v: cython.int = corners[s, c]
-                W = cython.address(velocity[count, 0])
+        for begin in range(0, corners.shape[0], 4):
+            n: cython.int = cython.cast(cython.int, min(4, corners.shape[0] - begin)) * size
+            block = cython.address(velocity[count, 0])
+            for i in range(n):
+                s: cython.Py_ssize_t = begin + i // size
+                W = block + 6 * i
                 for k in range(6):
-                    W[k] = share[s] * at_vertex[v, k]
+                    W[k] = share[s] * at_vertex[corners[s, i % size], k]
                     if share[s] < 1.0:
                         W[k] += (1.0 - share[s]) * own[group[s], k]
-                if in_plane or is_metric:
-                    _transform(W, base, 2 if in_plane else 3, is_metric, cython.address(extremes[v, 0]))
-                size: cython.double = 0.0
+                if in_plane:
+                    axis = base + 9 * (i // size)
+                    for k in range(6):
+                        axis[k] = axes[s, k // 3, k % 3]
+                    cross(axis, axis + 3, axis + 6)
+                    _turn(W, axis, 1, 3)
+                    W[2] = W[4] = W[5] = 0.0
+                for k in range(9 if is_metric else 0):
+                    work[18 * i + k] = W[entry(k // 3, k % 3)]
+            if is_metric:
+                diagonalize(work, _REST, n)
+            for i in range(n):
+                s = begin + i // size
+                v: cython.int = corners[s, i % size]
+                W = block + 6 * i
+                if is_metric:
+                    _root(work + 18 * i, 2 if in_plane else 3, W, cython.address(extremes[v, 0]))
+                if in_plane:
+                    W[5] = 0.5 * (W[0] + W[3])
+                    _turn(W, base + 9 * (i // size), 3, 1)
+                width: cython.double = 0.0
                 change: cython.double = INFINITY if row_at[v] < 0 else 0.0
                 for k in range(6 if row_at[v] >= 0 else 0):
-                    size = max(size, fabs(velocity[row_at[v], k]))
+                    width = max(width, fabs(velocity[row_at[v], k]))
                     change = max(change, fabs(W[k] - velocity[row_at[v], k]))
-                if change > _SAME * size:
+                if change > _SAME * width:
+                    for k in range(6):
+                        velocity[count, k] = W[k]
                     row_at[v] = count
                     count += 1
-                row[s, c] = row_at[v]
+                row[s, i % size] = row_at[v]
     return found[:count], number, sizes
 
 
 @cython.cfunc
 @cython.inline
 @cython.nogil
-def _transform(
-    W: cython.p_double, base: cython.p_double, p: cython.int, is_root: cython.bint, extremes: cython.p_double
-) -> cython.void:
-    """Replace a symmetric matrix by its part in the span of p orthonormal vectors `base`, or the inverse root of that.
+def _root(work: cython.p_double, p: cython.int, W: cython.p_double, extremes: cython.p_double) -> cython.void:
+    """The inverse root, with absolute eigenvalues, of what `diagonalize` did; it has p eigenvalues."""
+    r: cython.double[3]
+    for k in range(3):
+        r[k] = sqrt(max(fabs(work[4 * k]), DBL_MIN))
+        W[entry(k, k)] = 1.0 / r[k]
+        if k < p:
+            extremes[0], extremes[1] = min(extremes[0], work[4 * k]), max(extremes[1], work[4 * k])
+    for i in range(3):
+        for j in range(i):
+            # To first order in what is left beside the diagonal.
+            W[entry(i, j)] = work[3 * i + j]
+            if work[3 * i + j] != 0.0:
+                W[entry(i, j)] /= -r[i] * r[j] * (r[i] + r[j])
+    _turn(W, work + 9, 3, 1)
 
-    Of a root, eigenvalues are absolute. Across a plane it gets the mean in the plane.
-    """
-    w: cython.double[3]
-    U: cython.double[9]
-    work: cython.double[18]
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _turn(W: cython.p_double, U: cython.p_double, a: cython.int, b: cython.int) -> cython.void:
+    """Replace a symmetric matrix W by U^T W U, with entry (i, j) of U at a i + b j."""
+    V: cython.double[9]
     for k in range(9):
-        work[k] = U[k] = 0.0
-    for k in range(p):
-        multiply(W, base + 3 * k, w)
-        for x in range(3 * p):
-            work[3 * k + x // 3] += w[x % 3] * base[x]
-    diagonalize(work)
-    for k in range(p):
-        extremes[0], extremes[1] = min(extremes[0], work[4 * k]), max(extremes[1], work[4 * k])
-        w[k] = 1.0 / sqrt(max(fabs(work[4 * k]), DBL_MIN)) if is_root else work[4 * k]
-        for x in range(3 * p):
-            U[3 * k + x % 3] += work[9 + 3 * k + x // 3] * base[x]
-    for x in range(3 if p == 2 else 0):
-        w[2] = 0.5 * (w[0] + w[1])
-        U[6 + x] = base[(x + 1) % 3] * base[3 + (x + 2) % 3] - base[(x + 2) % 3] * base[3 + (x + 1) % 3]
-    i: cython.int = 0
-    for x in range(3):
-        for y in range(x, 3):
-            W[i] = w[0] * U[x] * U[y] + w[1] * U[3 + x] * U[3 + y] + w[2] * U[6 + x] * U[6 + y]
-            i += 1
+        i: cython.int = k // 3
+        x: cython.int = b * (k % 3)
+        V[k] = W[entry(i, 0)] * U[x] + W[entry(i, 1)] * U[a + x] + W[entry(i, 2)] * U[2 * a + x]
+    for i in range(3):
+        for x in range(i, 3):
+            W[entry(i, x)] = U[b * i] * V[x] + U[a + b * i] * V[3 + x] + U[2 * a + b * i] * V[6 + x]
 
 
 @cython.cfunc
@@ -200,26 +234,26 @@ def _add_misses(
 ) -> cython.void:
     """Add to the velocities `result` (n, 6) at vertices by how much their mean over each simplex misses the given one.
 
-    A vertex gets the mean over its simplices, each times the least `share` at its corners. `at` (n, 6 or more) is
-    working memory.
+    A vertex gets the mean over its simplices, each times the least `share` at its corners; `at` (n, 6) is overwritten.
     """
     size: cython.int = corners.shape[1]
-    known: cython.p_double[4]
-    missed: cython.p_double[4]
-    at[:, :6] = 0.0
+    miss: cython.double[6]
+    at[:, :] = 0.0
     for s in range(corners.shape[0]):
         most: cython.double = 1.0
-        for c in range(size):
-            most = min(most, share[corners[s, c]])
-            known[c] = cython.address(result[corners[s, c], 0])
-            missed[c] = cython.address(at[corners[s, c], 0])
         for k in range(6):
-            miss: cython.double = size * W[group[s], k]
-            for c in range(size):
-                miss -= known[c][k]
-            miss *= most / size
-            for c in range(size):
-                missed[c][k] += miss
+            miss[k] = size * W[group[s], k]
+        for c in range(size):
+            v: cython.int = corners[s, c]
+            most = min(most, share[v])
+            for k in range(6):
+                miss[k] -= result[v, k]
+        for k in range(6):
+            miss[k] *= most / size
+        for c in range(size):
+            to = cython.address(at[corners[s, c], 0])
+            for k in range(6):
+                to[k] += miss[k]
     for v in range(result.shape[0]):
         for k in range(6):
             result[v, k] += at[v, k] / max(first[v + 1] - first[v], 1)
@@ -246,9 +280,11 @@ def fits_around(
     # Products of 1, x, y, z with 1, x, y, z and velocity, each pair once; the square of velocity; and of the normal.
     sums, found, shares = np.zeros((len(X), n_columns)), np.zeros((len(X), 6)), np.zeros(len(X))
     at: cython.double[:, ::1] = sums
+    missed: cython.double[:, ::1] = sums.ravel()[: found.size].reshape(found.shape)
     result: cython.double[:, ::1] = found
     share: cython.double[::1] = shares
     met: cython.int[::1] = np.zeros(len(X), np.int32)
+    near: cython.int[::1] = np.empty(len(X) + 1, np.int32)
     level: cython.double[::1] = np.bincount(group) @ W / len(group)
     row: cython.double[10]
     normal: cython.double[3]
@@ -286,18 +322,23 @@ def fits_around(
             others: cython.double = -1.0
             for k in range(41):
                 mean[k] = 0.0
+            n_met: cython.int = 0
             for i in range(first[v], first[v + 1]):
+                t: cython.int = incident[i] // size
                 for c in range(size):
-                    met[corners[incident[i] // size, c]] += 1
-            for i in range(first[v], first[v + 1]):
-                for c in range(size):
-                    u: cython.int = corners[incident[i] // size, c]
-                    if met[u] > 0:
-                        others += cython.cast(cython.double, first[u + 1] - first[u]) / size
-                        of = cython.address(at[u, 0])
-                        for k in range(n_columns):
-                            mean[k] += met[u] * of[k]
-                        met[u] = 0
+                    u: cython.int = corners[t, c]
+                    # Overwritten by the next one, if it was met before.
+                    near[n_met] = u
+                    n_met += met[u] == 0
+                    met[u] += 1
+            for i in range(n_met):
+                u = near[i]
+                others += cython.cast(cython.double, first[u + 1] - first[u]) / size
+                times: cython.double = met[u]
+                of = cython.address(at[u, 0])
+                for k in range(n_columns):
+                    mean[k] += times * of[k]
+                met[u] = 0
             total: cython.double = max(mean[0], 1.0)
             for k in range(n_columns):
                 mean[k] /= total
@@ -342,5 +383,5 @@ def fits_around(
                 share[v] = min(max(1.0 - 4.0 * (1.0 - explained / variance) * others / free, 0.0), 1.0)
         # A mean over neighbours flattens curves: until the means over the corners are the given velocities.
         for _ in range(3):
-            _add_misses(corners, W, group, first, share, result, at)
+            _add_misses(corners, W, group, first, share, result, missed)
     return found, shares

@@ -6,8 +6,14 @@ cdef extern from *:
     """
     // Difference of values, as a share of them, that is rounding.
     #define EQUAL 1e-12
+    #ifdef __GNUC__
+    #define FETCH(place) __builtin_prefetch(place)
+    #else
+    #define FETCH(place)
+    #endif
     """
     double EQUAL
+    void FETCH(const void* place) noexcept nogil
 
 
 cdef class SimplexUpdate(Facet):
@@ -51,4 +57,5 @@ cdef inline double edge_length(SimplexUpdate of, int s, int i, int j) noexcept n
         e[k] = of.V[of.corners[s, i], k] - of.V[of.corners[s, j], k]
     squares_of(&of.inverses[of.rows[s, i], 0], e, 1, &one)
     squares_of(&of.inverses[of.rows[s, j], 0], e, 1, &two)
-    return (sqrt(one) + 4.0 * sqrt(sqrt(one * two)) + sqrt(two)) / 6.0
+    one, two = sqrt(one), sqrt(two)
+    return (one + 4.0 * sqrt(one * two) + two) / 6.0

@@ -4,7 +4,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.sweep import facets
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, gradient, mean_velocity, pair, squares_of
-from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, edge_length
+from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, FETCH, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
 
 
@@ -175,6 +175,9 @@ class SimplexUpdate(Facet):
         if above >= near or above * (2.0 * near - above) >= most or farther == INFINITY:
             return INFINITY
         room: cython.double = (near - sqrt(max(near * near - most, 0.0)) - above) / self.slack[s]
+        for i in range(self.q if self.q > 1 else 0):
+            FETCH(cython.address(self.velocity[self.rows[s, i], 0]))
+            FETCH(cython.address(self.inverses[self.rows[s, i], 0]))
         rise: cython.double = self.linear(s, c, room) - nearest
         return self.curved(s, c, best, nearest + self.slack[s] * rise) if rise < room else INFINITY
 
