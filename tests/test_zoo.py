@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from conftest import mean_error, zoo
 
+import heat_igl
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
 from heat_igl.errors import FactorizationError
 from heat_igl.heat.source_terms import SourceAssembler, drop_overtaken
@@ -14,6 +15,7 @@ from heat_igl.intrinsic import mollify
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
 from heat_igl.validation.closed_forms import around_the_wall, by_fermat
+from heat_igl.validation.construction import delaunay
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 
 
@@ -84,6 +86,9 @@ def test_where_heat_has_no_digits_a_face_is_named():
         HeatMethodSolver(point)
     with pytest.raises(FactorizationError, match=r"nan at vertex 1; .* F\[\d+\] = .* laplacian at 'auto'"):
         HeatMethodSolver(Mesh(ball.V * [1e12, 1, 1], ball.F), laplacian="cotan").distance(0)
+    P = np.random.default_rng(10).standard_normal((10, 3))
+    with pytest.raises(FactorizationError, match=r"; the thinnest face is F\[13\] = \[7, 0, 5\]: repair it"):
+        heat_igl.VectorHeatSolver(Mesh(P * [0.1, 1e-3, 1], delaunay(P[:, :2])))
 
 
 def test_a_small_component_is_not_mollified():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -299,6 +301,15 @@ class Checker:
             return places, offsets
         used = np.append(self._referenced[sources.vertices], np.ones(len(sources.points.faces), bool))
         return (places[used], offsets[used]) if used.any() else None
+
+
+@contextmanager
+def naming_thinnest(surface: Surface | None) -> Iterator[None]:
+    """Let a `FactorizationError` name the thinnest face."""
+    try:
+        yield
+    except FactorizationError as error:
+        raise FactorizationError(f"{error}{thinnest(surface)}") from None
 
 
 def thinnest(surface: Surface | None) -> str:

@@ -13,8 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl import plan
-from heat_igl.errors import AccuracyWarning, FactorizationError, positive, require_choice
-from heat_igl.heat.checking import AnswerCheck, Checker, Comparison, Comparisons, thinnest
+from heat_igl.errors import AccuracyWarning, positive, require_choice
+from heat_igl.heat.checking import AnswerCheck, Checker, Comparison, Comparisons, naming_thinnest
 from heat_igl.heat.source_terms import SourceAssembler
 from heat_igl.heat.steps import (
     Boundary,
@@ -327,10 +327,8 @@ def prepare(
     ]
     # scipy's SuperLU keeps the memory of a factor that is made on one thread and dropped on another, as a solver is.
     threads = 1 if found.backend == "scipy" else min(2, n_threads())
-    try:
+    with naming_thinnest(domain.source_surface):
         poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
-    except FactorizationError as error:
-        raise FactorizationError(f"{error}{thinnest(domain.source_surface)}") from None
     factored = time.perf_counter()
     assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped)
     triangulation = None if domain.surface is None else domain.surface.triangulation

@@ -13,6 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, require_choice
+from heat_igl.heat.checking import naming_thinnest
 from heat_igl.heat.curve_sides import (
     closing_of_gaps,
     has_gaps,
@@ -313,7 +314,8 @@ class NormalIntegration:
         domain, backend = parts.operators, parts.options.backend
         self._V, self._F = mesh.V, mesh.F
         self._faces, self._triangulation = faces, triangulation
-        self._vector_flow = VectorHeatFlow(domain, edge_rotations(domain), parts.heat_flow.t, backend, parts.fitted)
+        with naming_thinnest(domain.source_surface):
+            self._vector_flow = VectorHeatFlow(domain, edge_rotations(domain), parts.heat_flow.t, backend, parts.fitted)
         self._to_faces, self._to_triangles = face_rotations(domain)
         gradient = TriangleElements(triangulation).matrix().tocsr()
         self._D = divergence_matrix(gradient, triangulation.areas)

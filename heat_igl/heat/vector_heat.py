@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guessed, real_numbers, require_choice
+from heat_igl.heat.checking import naming_thinnest
 from heat_igl.heat.parts import SolverOptions, prepare
 from heat_igl.heat.solver import HeatMethodSolver
 from heat_igl.heat.steps import VectorHeatFlow
@@ -332,7 +333,8 @@ class HeatTransport:
         parts = solver._parts
         t = parts.diagnostics.t * (_VECTOR_STEP if parts.options.default_time_step else 1.0)
         self._solver, self._outward, self._heat_flow = solver, outward, parts.heat_flow
-        self._vector_flow = VectorHeatFlow(solver.operators, rotations, t, parts.options.backend, mass=mass)
+        with naming_thinnest(solver.operators.source_surface):
+            self._vector_flow = VectorHeatFlow(solver.operators, rotations, t, parts.options.backend, mass=mass)
         self._pattern = abs(rotations).tocsr()
 
     def extend(self, vertices: IntArray, values: FloatArray) -> FloatArray:
