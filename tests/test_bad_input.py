@@ -729,20 +729,17 @@ def whole_file_cases() -> Iterator[Case]:
     tets = TEMPLATES["msh"].replace("1 2 2 0 0 {i} 2 3\n2 2 2 0 0 1 2 4\n", "1 4 2 0 0 1 2 3 4\n").encode()
     tets = tets.replace(b"{n}", b"4").replace(b"{x}", b"0").replace(b"{m}", b"1")
     yield file_case("tetrahedra, neighbour", "tet.msh", tets)
-    yield file_case("hexahedra", "tet.msh", tets.replace(b"1 4 2", b"1 5 2"), "meshio cannot read")
-    points = tets.replace(b"1 4 2 0 0 1 2 3 4", b"1 15 2 0 0 1")
-    yield file_case("a point only", "tet.msh", points, "neither triangles nor tetrahedra")
-    order_2 = tets.replace(b"1 4 2 0 0 1 2 3 4", b"1 9 2 0 0 1 2 3 4 1 2")
-    yield file_case("second order", "tet.msh", order_2, "triangle6")
-    yield file_case(
-        "node twice", "tet.msh", tets.replace(b"\n3 0 1 0", b"\n2 0 1 0"), "tetrahedron 1 .*: there is no vertex"
-    )
-    yield file_case(
-        "unlisted node", "tet.msh", tets.replace(b"2 3 4\n$End", b"2 3 0\n$End"), "line 13 .*: node number 0"
-    )
-    giant = tets.replace(b"\n4 0 0 1", b"\n2000000000 0 0 1")
-    yield file_case("giant node number", "tet.msh", giant, "line 9 .*: node number 2000000000")
-    yield file_case("version 4.0", "tet.msh", tets.replace(b"2.2", b"4.0"), "line 5 .*: expected 4 numbers")
+    whole = b"1 4 2 0 0 1 2 3 4"
+    for name, old, new, says in (
+        ("hexahedra", b"1 4 2", b"1 5 2", "meshio cannot read"),
+        ("a point only", whole, b"1 15 2 0 0 1", "neither triangles nor tetrahedra"),
+        ("second order", whole, b"1 9 2 0 0 1 2 3 4 1 2", "triangle6"),
+        ("node twice", b"\n3 0 1 0", b"\n2 0 1 0", "tetrahedron 1 .*: there is no vertex"),
+        ("unlisted node", b"2 3 4\n$End", b"2 3 0\n$End", "line 13 .*: node number 0"),
+        ("giant node number", b"\n4 0 0 1", b"\n2000000000 0 0 1", "line 9 .*: node number 2000000000"),
+        ("version 4.0", b"2.2", b"4.0", "line 5 .*: expected 4 numbers"),
+    ):
+        yield file_case(name, "tet.msh", tets.replace(old, new), says)
     yield file_case("a line more", "a.off", filled("off") + b"3 0 1 2\n", "longer than announced")
     yield file_case("BINARY", "a.off", b"OFF BINARY\n\0\0\0\4", "line 1|BINARY|binary")
     yield file_case("1e300", "a.off", filled("off", x="1e300"), "V spans .*rescale V")
@@ -787,12 +784,8 @@ def whole_file_cases() -> Iterator[Case]:
     yield file_case("NaN", "a.stl", stl[:96] + struct.pack("<f", np.nan) + stl[100:], "vertex 0 .*not finite")
     yield file_case("one point", "a.stl", stl[:84] + bytes(100), "none is left")
     yield file_case("no triangles", "a.stl", stl[:80] + bytes(4), "holds neither triangles")
-    yield file_case(
-        "quadrilateral",
-        "a.stl",
-        filled("stl").replace(b" endloop", b" vertex 1 1 1\n endloop"),
-        "line 2 .*this facet is damaged",
-    )
+    four_corners = filled("stl").replace(b" endloop", b" vertex 1 1 1\n endloop")
+    yield file_case("quadrilateral", "a.stl", four_corners, "line 2 .*this facet is damaged")
     vtu = filled("vtu")
     piece = vtu[vtu.index(b"<Piece") : vtu.index(b"</Piece>") + 8]
     yield file_case("two pieces", "a.vtu", vtu.replace(piece, piece + piece), "2 pieces")

@@ -692,35 +692,26 @@ def test_fans_that_meet_in_a_point_are_joined(seed):
 # Neighbours.
 
 
-def test_points_come_before_their_nearest():
-    """Even if squares of distances underflow, so that others are as near as the point itself."""
-    P = np.random.default_rng(0).standard_normal((300, 3))
-    P[1:40] = P[0] * (1 + 1e-15 * np.arange(1, 40)[:, None])
-    P[40:80] = 1e-170 * np.random.default_rng(1).standard_normal((40, 3))
-    tree = point_tree(P)
-    np.testing.assert_array_equal(tree.P, P[tree.order])
-    index = tree.neighbours_of(np.arange(300), 19)
-    np.testing.assert_array_equal(index[:, 0], np.arange(300))
-    assert (np.diff(np.sort(index, axis=1), axis=1) > 0).all()
-    far = np.square(tree.P[:, None] - tree.P).sum(axis=2)
-    near = np.take_along_axis(far, index, axis=1)
-    np.testing.assert_allclose(near, np.sort(far, axis=1)[:, :20], rtol=1e-12)
-
-
 @pytest.mark.parametrize("stride", [1, 3])
-def test_neighbours_at_equal_distances_come_in_the_order_of_their_numbers(stride):
-    """Of points with integer coordinates; on the farthest ring of a neighbourhood, any of those are taken."""
-    tree = point_tree(np.stack(np.mgrid[:9, :9, :2], axis=-1).reshape(-1, 3).astype(float))
-    points = np.arange(5, 160, 4)
-    index = tree.neighbours_of(points, 12, stride)
+@pytest.mark.parametrize("kind", ["underflow", "grid"])
+def test_neighbours_come_after_the_point_by_distance_and_number(kind, stride):
+    """Also where squares of distances underflow; at the largest distance, any of the points there are taken."""
+    P = np.stack(np.mgrid[:9, :9, :4], axis=-1).reshape(-1, 3).astype(float)
+    if kind == "underflow":
+        P = np.random.default_rng(0).standard_normal((300, 3))
+        P[1:40] = P[0] * (1 + 1e-15 * np.arange(1, 40)[:, None])
+        P[40:80] = 1e-170 * np.random.default_rng(1).standard_normal((40, 3))
+    tree, points, others = point_tree(P), np.arange(0, 300, 2), np.arange(0, len(P), stride)
+    np.testing.assert_array_equal(tree.P, P[tree.order])
+    index = tree.neighbours_of(points, 19, stride)
     np.testing.assert_array_equal(index[:, 0], points)
-    others = np.arange(0, 162, stride)
-    far = np.square(tree.P[points][:, None] - tree.P[others]).sum(axis=2) + 1e9 * (points[:, None] == others)
-    found = np.square(tree.P[index] - tree.P[points][:, None]).sum(axis=2)[:, 1:]
-    np.testing.assert_array_equal(found, np.sort(far, axis=1)[:, :12])
-    assert (index[:, 1:] % stride == 0).all()
-    # The squares are integers, so that the numbers decide between equal ones alone.
-    assert (np.diff(found + index[:, 1:] / 1000, axis=1) > 0).all()
+    far = np.square(tree.P[points][:, None] - tree.P[others]).sum(axis=2)
+    far[points[:, None] == others] = np.inf
+    found = np.square(tree.P[index[:, 1:]] - tree.P[points][:, None]).sum(axis=2)
+    np.testing.assert_allclose(found, np.sort(far, axis=1)[:, :19], rtol=1e-12)
+    assert np.isin(index[:, 1:], others).all()
+    assert (np.diff(np.sort(index, axis=1), axis=1) > 0).all()
+    assert (np.diff(index[:, 1:], axis=1)[np.diff(found, axis=1) == 0] > 0).all()
 
 
 def test_principal_axes():
