@@ -506,10 +506,8 @@ def fan_of_five(halvings: int) -> Mesh:
     angle = 2 * np.pi * np.arange(5) / 5
     apex = np.stack([np.cos(angle), np.sin(angle), np.full(5, 1 / np.sqrt(3))], axis=1) * np.sqrt(3) / 2
     mesh = Mesh(np.concatenate([[[0, 0, 0], [0, 0, 1]], apex]), [[0, 1, k] for k in range(2, 7)])
-    for _ in range(halvings):  # igl.upsample is for two faces at an edge
-        (a, b, c), (bc, ca, ab) = mesh.F.T, (mesh.n_vertices + mesh.facets.of_face).T
-        F = np.concatenate([np.stack(part, axis=1) for part in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
-        mesh = Mesh(np.concatenate([mesh.V, mesh.V[mesh.edges].mean(axis=1)]), F)
+    for _ in range(halvings):
+        mesh = mesh.halved()
     return mesh
 
 

@@ -43,16 +43,15 @@ def sheared(x: FloatArray, a: float) -> tuple[FloatArray, FloatArray]:
 def test_metrics_of_bent_bars_converge(a):
     """The largest ratio of lengths in one place is 1:2.6 and 1:5.8; tensors per tetrahedron are samples of a field."""
     per_face, per_vertex = [], []
-    for n in (5, 10):
+    for bar in (shapes.box(5), shapes.box(5).halved()):
         # `sheared` maps the mesh back to the bar, on which distance is that along straight lines.
-        bar = shapes.box(n)
         mesh, exact = Mesh(sheared(bar.V, -a)[0], bar.F), straight(bar.V, 0)
         for errors, places in ((per_face, mesh.V[mesh.F].mean(axis=1)), (per_vertex, mesh.V)):
             distance = solver(mesh, sheared(places, a)[1]).distance(0)
-            errors.append(np.abs(distance - exact).mean() / exact.mean())
+            errors.append(np.abs(distance - exact)[:216].mean() / exact[:216].mean())
     assert per_face[1] < 0.4 * per_face[0]
     assert per_face[1] < 0.01
-    assert per_vertex[1] < 0.4 * per_vertex[0]
+    assert 0.2 * per_vertex[0] < per_vertex[1] < 0.4 * per_vertex[0]
     assert per_vertex[1] < 0.01
 
 
@@ -320,26 +319,15 @@ def test_several_sources_give_the_least_of_single_ones(kind):
     x = mesh.V[mesh.F].mean(axis=1)[:, 0] if kind == "two speeds" else mesh.V[:, 0]
     found = solver(mesh, np.eye(3) / (np.where(x > 0, 2, 1) if kind == "two speeds" else 1 + 2 * x)[:, None, None] ** 2)
     near = np.linalg.norm(mesh.V - mesh.V[mesh.n_vertices // 3], axis=1).argsort()[:20]
-    for sources in (rng.choice(mesh.n_vertices, 30, replace=False), near):
-        starts = 0.1 * rng.random(len(sources))
+    for sources in (rng.choice(mesh.n_vertices, 30, replace=False), near, np.flatnonzero(mesh.V[:, 0] < 0.03)[:169]):
+        starts = 0.1 * rng.random(len(sources)) * (len(sources) < 100)
         least = np.min([t + found.distance(v) for v, t in zip(sources, starts, strict=True)], axis=0)
         # To 1e-3 both: changes below are not handed on.
         assert found.distance(OffsetSources(sources, starts)) == pytest.approx(least, rel=2e-3)
-
-
-def test_a_wall_of_sources_in_a_speed_that_grows():
-    """Arcs of circles from each of 121 vertices; followed less far, they are 2e-3 too long."""
-    rng = np.random.default_rng(2)
-    mesh = shapes.box(10)
-    mesh = mesh.with_vertices(mesh.V + 0.025 * rng.uniform(-1, 1, mesh.V.shape) * ~mesh.boundary[:, None])
-    speed, wall = 1 + 2 * mesh.V[:, 0], np.flatnonzero(mesh.V[:, 0] == 0)
-    square = ((mesh.V[:, None] - mesh.V[wall]) ** 2).sum(axis=2)
-    exact = np.arccosh(1 + 2 * square / (speed[:, None] * speed[wall])).min(axis=1) / 2
-    found = solver(mesh, np.eye(3) / speed[:, None, None] ** 2)
-    distance = found.distance(wall)
-    assert distance == pytest.approx(exact, rel=0.02, abs=1e-12)
-    assert np.abs(distance - exact).mean() < 2e-3 * exact.mean()
-    assert distance == pytest.approx(np.min([found.distance(v) for v in wall], axis=0), rel=5e-4)
+    if kind == "smooth speeds":  # from a wall along circles
+        square = ((mesh.V[:, None] - mesh.V[sources]) ** 2).sum(axis=2)
+        exact = np.arccosh(1 + 2 * square / (1 + 2 * mesh.V[:, :1])).min(axis=1) / 2
+        assert np.abs(found.distance(sources) - exact).mean() < 1e-3 * exact.mean()
 
 
 def test_activation_of_a_twisted_block():

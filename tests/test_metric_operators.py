@@ -143,3 +143,20 @@ def test_flips_that_would_join_a_vertex_with_itself():
     mesh = FAMILIES["random tetrahedra"](9)
     domain = heat_igl.speed_operators(mesh, np.where(mesh.V[mesh.F].mean(axis=1)[:, 0] > 0.5, 50.0, 1.0))
     assert (heat_igl.GeodesicSolver(domain).distance(0) <= edge_paths(mesh, 0) * (1 + 1e-9)).all()
+
+
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
+def test_smooth_fibres_on_triangles_that_are_thin_in_the_metric():
+    """On the coarse grid lengths along edges make some triangles flat. That raised a TypeError, or added vertices."""
+
+    def fibres(mesh):
+        angle = np.pi / 4 + 0.1 * (mesh.V[:, 0] + mesh.V[:, 1] ** 2)
+        return metric_operators(
+            mesh, fibre_metric(np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), 1.0, 10.0)
+        )
+
+    coarse = fibres(shapes.grid(4))
+    fine = distance(fibres(shapes.grid(4).halved().halved().halved()), method="auto")[: coarse.n]
+    assert coarse.n == 25
+    assert distance(coarse, method="auto") == pytest.approx(fine, rel=0.01)
+    assert coarse.M.sum() == pytest.approx(10, rel=0.05)  # the area

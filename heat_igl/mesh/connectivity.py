@@ -12,7 +12,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.kernels.mesh import incidence
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
+
+# Corners of the parts of a simplex: its own, then the middles of its edges. The last four are of an octahedron.
+PARTS = {
+    3: [[0, 3, 4], [3, 1, 5], [4, 5, 2], [5, 4, 3]],
+    4: [[0, 4, 5, 7], [4, 1, 6, 8], [5, 6, 2, 9], [7, 8, 9, 3], [5, 8, 4, 7], [5, 8, 7, 9], [5, 8, 9, 6], [5, 8, 6, 4]],
+}
 
 
 class Groups(NamedTuple):
@@ -111,6 +117,12 @@ def edges(F: IntArray, n: int) -> IntArray:
     pairs = np.concatenate([F[:, pair] for pair in combinations(range(F.shape[1]), 2)])
     pairs.sort(axis=1)
     return pairs[unique_rows(pairs, n)[0]]
+
+
+def edge_middles(corners: AnyArray) -> tuple[IntArray, IntArray]:
+    """The ends (e, 2) of each edge, and the edge of each side of the simplices."""
+    pairs = np.stack(np.tril_indices(corners.shape[1], -1), axis=1)
+    return np.unique(np.sort(corners[:, pairs].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
 
 
 def facets(F: IntArray, n: int) -> Facets:

@@ -320,10 +320,12 @@ def _of_smooth_metric(mesh: Mesh, g: Any, least: float, root: Any, laplacian: La
     sides = simplices.edges[1].reshape(-1, 3)[:, ::-1]  # opposite each corner
     if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1])):
         return _unfolded(mesh, sides, simplices, laplacian, None)
-    # For heat: what each face says alone.
+    # For heat: what each face says alone. Without a surface, no vertices can be told from those that were added.
     at_corners = (simplices.metric(np.arange(mesh.n_faces), corner) for corner in range(3))
-    domain = operators_in_metric(mesh, np.asarray(sum(at_corners)) / 3, least, laplacian=laplacian)
-    return replace(domain, surface=None, simplices=simplices)
+    fitted: Laplacian = "cotan" if laplacian == "cotan" else "intrinsic-delaunay"
+    domain = operators_in_metric(mesh, np.asarray(sum(at_corners)) / 3, least, laplacian=fitted)
+    made = domain._made if isinstance(domain, _LaterOperators) else domain
+    return replace(made, surface=None, simplices=simplices)
 
 
 def _common_lengths(mesh: Mesh, own: FloatArray) -> FloatArray | None:

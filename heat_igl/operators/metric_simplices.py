@@ -13,6 +13,7 @@ from heat_igl.kernels.mesh import incidence
 from heat_igl.kernels.sweep.simplex_metrics import fits_around, lengths_in_velocity, velocities_at_corners
 from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
 from heat_igl.mesh import Mesh
+from heat_igl.mesh.connectivity import PARTS, edge_middles
 from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -20,11 +21,6 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 _ROUNDING = 1e-9
 # Rows and columns of the entries of a symmetric matrix on and above the diagonal.
 _ABOVE = np.triu_indices(3)
-# Corners of the parts of a simplex: its own, then the middles of its edges. The last four are of an octahedron.
-_PARTS = {
-    3: [[0, 3, 4], [3, 1, 5], [4, 5, 2], [5, 4, 3]],
-    4: [[0, 4, 5, 7], [4, 1, 6, 8], [5, 6, 2, 9], [7, 8, 9, 3], [5, 8, 4, 7], [5, 8, 7, 9], [5, 8, 9, 6], [5, 8, 6, 4]],
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,12 +162,12 @@ class MetricSimplices:
         """The simplices in their metric with all edges halved; the vertices keep their numbers."""
         corners, size, velocity = self.corners, self.corners.shape[1], None
         lengths, group, rows = self.lengths, self.group, self.rows
-        cut: Any = lambda x: np.concatenate([x.take(part, axis=1) for part in _PARTS[size]])  # noqa: E731
-        ends, middle = _middles(corners)
+        cut: Any = lambda x: np.concatenate([x.take(part, axis=1) for part in PARTS[size]])  # noqa: E731
+        ends, middle = edge_middles(corners)
         place = np.concatenate([self.place, self.place[ends].mean(axis=1)])
         corners = cut(np.concatenate([corners, self.n + middle.reshape(len(corners), -1)], axis=1))
-        lengths = None if lengths is None else np.tile(lengths / 2, (len(_PARTS[size]), 1))
-        group = None if group is None else np.tile(group, len(_PARTS[size]))
+        lengths = None if lengths is None else np.tile(lengths / 2, (len(PARTS[size]), 1))
+        group = None if group is None else np.tile(group, len(PARTS[size]))
         if self.velocity is not None and rows is not None:
             one, other = np.tril_indices(size, -1)
             here = self.velocity[rows]
@@ -181,16 +177,10 @@ class MetricSimplices:
 
     def halfway(self) -> sp.csr_array:
         """The weights (n + e, n) of the vertices in those of `halved`."""
-        ends, _ = _middles(self.corners)
+        ends, _ = edge_middles(self.corners)
         e, column = len(ends), np.concatenate([np.arange(self.n), ends.ravel()])
         row = np.concatenate([np.arange(self.n), self.n + np.repeat(np.arange(e), 2)])
         return sp.csr_array((np.repeat([1, 0.5], [self.n, 2 * e]), (row, column)), shape=(self.n + e, self.n))
-
-
-def _middles(corners: AnyArray) -> tuple[IntArray, IntArray]:
-    """The ends (e, 2) of each edge, and the edge of each side of the simplices."""
-    pairs = np.stack(np.tril_indices(corners.shape[1], -1), axis=1)
-    return np.unique(np.sort(corners[:, pairs].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
 
 
 def inverse_root(
