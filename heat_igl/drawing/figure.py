@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import igl
 import numpy as np
 
 from heat_igl.drawing.raster import Pixels, rasterize, to_pixels, visible, visible_runs
@@ -249,14 +250,8 @@ def mark_dots(axes: Any, dots: FloatArray, depth: FloatArray) -> BoolArray:
 
 def screen_gradient(points: FloatArray, F: IntArray, values: FloatArray) -> FloatArray:
     """Norm (m,) of the gradient per pixel of the linear function with `values` (n,); ``inf`` for faces seen edge on."""
-    corners, f = points[F, :2], values[F]
-    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    df1, df2 = f[:, 1] - f[:, 0], f[:, 2] - f[:, 0]
-    doubled = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
-    gx, gy = df1 * e2[:, 1] - df2 * e1[:, 1], df2 * e1[:, 0] - df1 * e2[:, 0]
-    result = np.full(len(F), np.inf)
-    np.divide(np.hypot(gx, gy), np.abs(doubled), out=result, where=doubled != 0)
-    return result
+    slope = igl.grad(points[:, :2], F) @ values
+    return np.asarray(np.nan_to_num(np.hypot(*slope.reshape(2, -1)), nan=np.inf, posinf=np.inf))
 
 
 def isoline_coverage(
