@@ -24,7 +24,7 @@ grids: images and blocks with so many ``--pixels`` and ``--voxels`` a side, at t
 scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and largest error in
 percent, seconds of one query with its preparation, and memory; of ``--fields`` 0 to 3 alone, in their order.
 smooth: a twisted cylinder and discs, and a cube with a speed that grows linearly, with tensors per simplex and at the
-vertices, times over those of fim-python, which takes those per simplex.
+vertices, times over those of fim-python, which takes those per simplex; errors and time on halved edges over the last.
 several: in the metrics of smooth, at the vertices, the mean and largest difference from the least of the distances from
 single sources, and time over that from one, from 3 and 30 vertices and the 30 vertices nearest to one.
 choice: what `hopf_lax_is_nearer` compares, and mean errors in closed form or against triangles cut into 4 or 16.
@@ -587,6 +587,10 @@ def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         row: Row = {"body": name, "n": mesh.n_vertices, "m": mesh.n_faces}
         asked = {"fim": (by_fim, centres), "face": (default, centres), "vertex": (default, metric(mesh.V))}
         row |= {method: timed(exact(source), query, mesh, g, source) for method, (query, g) in asked.items()}
+        finer = mesh.halved()
+        on_finer = lambda *of, n=mesh.n_vertices: default(*of)[:n]  # noqa: E731
+        halved = timed(exact(source), on_finer, finer, metric(finer.V), source)
+        row["halved"] = {key: halved[key] / row["vertex"][key] for key in halved}
         yield row | {m: row[m] | {"s": row[m]["s"] / row["fim"]["s"]} for m in ("fim", "face", "vertex")}
 
 
@@ -773,6 +777,7 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
     "smooth": (on_smooth, {"domain": "{body}", "vertices": "{n}", "simplices": "{m}",
         "fim-python, %": "{fim[mean]:.2g} and {fim[largest]:.2g}",
         **errors_and("time", face="per simplex", vertex="at the vertices"),
+        "with halved edges over that": "{halved[mean]:.2g} and {halved[largest]:.2g}, {halved[s]:.2g}",
     }),
     "several": (from_several, {"domain": "{body}", "vertices": "{n}"}
         | errors_and("time", few="3 sources", many="30 sources", region="30 beside each other")),
