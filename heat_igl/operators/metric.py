@@ -167,10 +167,10 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
     first, group = equal_runs(s) if mesh.is_tetrahedral else (slice(None), None)
     each = s[first, None, None]
-    root = each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None
     make: Callable[..., Operators] = _of_groups if mesh.is_tetrahedral else operators_in_metric
-    # A metric without a name here does not outlive its use there.
-    return make(mesh, np.eye(3) / each**2, 1 / float(s.max()), root, s if group is None else group)
+    # A metric and a velocity without names here do not outlive their use there.
+    given, above = s if group is None else group, np.eye(3)[np.triu_indices(3)]
+    return make(mesh, np.eye(3) / each**2, 1 / float(s.max()), (each[:, 0] * above, None, None), given)
 
 
 def fibre_metric(
@@ -285,22 +285,22 @@ def operators_in_metric(
         return _refracting(mesh, own, g, least, laplacian)
     del own, squares
     # Triangles without area know no metric in their plane.
-    has_area = bool((mesh.measures > 0).all())
-    root = inverse_root(g, mesh) if root is None and has_area else root
+    if not (mesh.measures > 0).all():
+        return _of_triangles(mesh, sides, None, laplacian, given)
+    # Before there are velocities, as both take much memory.
+    defect = mean_angle_defect(intrinsic_triangulation(mesh), True)
+    root = inverse_root(g, mesh) if root is None else root
     del g
-    simplices = MetricSimplices.in_metric(mesh, None, least, root=root) if has_area else None
-    return _unfolded(mesh, sides, simplices, laplacian, given)
+    simplices = MetricSimplices.in_metric(mesh, None, least, root=root)
+    del root
+    return _unfolded(defect, mesh, sides, simplices, laplacian, given)
 
 
-def _unfolded(
-    mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian, given: FloatArray | None
-) -> Operators:
+def _unfolded(defect: float, mesh: Mesh, sides: FloatArray, simplices: MetricSimplices, *of: Any) -> Operators:
     """The operators of triangles with the lengths `sides` (m, 3), and with `simplices` where these are nearer."""
-    if simplices is not None and hopf_lax_is_nearer(
-        simplices.measured[-1], mean_angle_defect(intrinsic_triangulation(mesh), True)
-    ):
-        return _LaterOperators(mesh, simplices, _of_triangles, mesh, sides, simplices, laplacian, given)
-    return _of_triangles(mesh, sides, None, laplacian, given)
+    if hopf_lax_is_nearer(simplices.measured[-1], defect):
+        return _LaterOperators(mesh, simplices, _of_triangles, mesh, sides, simplices, *of)
+    return _of_triangles(mesh, sides, None, *of)
 
 
 def _of_triangles(
@@ -319,7 +319,8 @@ def _of_smooth_metric(mesh: Mesh, g: Any, least: float, root: Any, laplacian: La
     simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
     sides = simplices.edges[1].reshape(-1, 3)[:, ::-1]  # opposite each corner
     if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1])):
-        return _unfolded(mesh, sides, simplices, laplacian, None)
+        defect = mean_angle_defect(intrinsic_triangulation(mesh), True)
+        return _unfolded(defect, mesh, sides, simplices, laplacian, None)
     # For heat: what each face says alone. Without a surface, no vertices can be told from those that were added.
     at_corners = (simplices.metric(np.arange(mesh.n_faces), corner) for corner in range(3))
     fitted: Laplacian = "cotan" if laplacian == "cotan" else "intrinsic-delaunay"

@@ -85,13 +85,12 @@ class MetricSimplices:
         if at_vertices:
             rows = corners if p == 3 else rows
             return cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows, True)
-        axes = plane_axes(mesh) if p == 2 else np.empty((0, 2, 3))
         # The velocities are taken for samples of a smooth field. Those at the corners of a simplex are fitted if at
         # each this explains all of the variance and is positive definite, and are those of the simplex if it leaves a
         # quarter or more at one, as it leaves of a step: jumps stay where they are.
         group = np.arange(len(corners), dtype=np.int32) if group is None else group
         incident = incidence.corners_by_vertex(corners, mesh.n_vertices)
-        at_vertex, share = fits_around(corners, mesh.V - mesh.V.mean(axis=0), velocity, group, axes, *incident)
+        at_vertex, share = fits_around(corners, mesh.V - mesh.V.mean(axis=0), velocity, group, *incident)
         if not (share > _ROUNDING).any():
             g = np.linalg.matrix_power(symmetric(velocity), -2) if g is None else g
             return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3)
@@ -99,6 +98,7 @@ class MetricSimplices:
         share[smallest <= 0] = 0
         share[share >= 1 - _ROUNDING] = 1
         share = reduce(np.minimum, (share[corner] for corner in corners.T))
+        axes = plane_axes(mesh) if p == 2 else np.empty((0, 2, 3))
         velocity, rows, _ = velocities_at_corners(corners, at_vertex, velocity, group, share, axes, False)
         least = min(least, float(1 / largest.max()))
         made = cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows)
@@ -130,8 +130,12 @@ class MetricSimplices:
         lengths = self.lengths
         if lengths is None:
             one, other = np.tril_indices(self.corners.shape[1], -1)
-            e = self.place[self.corners[:, one]] - self.place[self.corners[:, other]]
-            lengths = np.sqrt(((e if self.tensors is None else e @ self.tensors[self.group]) * e).sum(axis=2))
+            lengths = np.empty((len(self.corners), len(one)))
+            for begin in range(0, len(lengths), 2**14):  # tensors take several times the memory of lengths
+                some = slice(begin, begin + 2**14)
+                e = self.place[self.corners[some][:, one]] - self.place[self.corners[some][:, other]]
+                by = e if self.tensors is None or self.group is None else e @ self.tensors[self.group[some]]
+                lengths[some] = np.sqrt((by * e).sum(axis=2))
         mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths))
         return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0.0
 

@@ -264,7 +264,6 @@ def fits_around(
     X: cython.const[cython.double][:, ::1],
     W: cython.const[cython.double][:, ::1],
     group: cython.const[cython.int][::1],
-    axes: cython.const[cython.double][:, :, ::1],
     first: cython.const[cython.int][::1],
     incident: cython.const[cython.int][::1],
 ):
@@ -272,11 +271,10 @@ def fits_around(
 
     Simplices (m,) have the velocity W (k, 6) of their `group` at their centres. Those that meet a simplex of the vertex
     count, once for each corner that they share with one. Functions hold, up to 1, by how much they explain more than
-    3/4 of the variance there. Of triangles, with `axes` (m, 2, 3) in their planes, else (0, 2, 3), what varies since
-    projections on their normals do, counts as not explained.
+    3/4 of the variance there. Of triangles, what varies since projections on their normals do, counts as not explained.
     """
     size: cython.int = corners.shape[1]
-    n_columns: cython.int = 35 if axes.shape[0] == 0 else 41
+    n_columns: cython.int = 35 if size == 4 else 41
     # Products of 1, x, y, z with 1, x, y, z and velocity, each pair once; the square of velocity; and of the normal.
     sums, found, shares = np.zeros((len(X), n_columns)), np.zeros((len(X), 6)), np.zeros(len(X))
     at: cython.double[:, ::1] = sums
@@ -287,6 +285,7 @@ def fits_around(
     near: cython.int[::1] = np.empty(len(X) + 1, np.int32)
     level: cython.double[::1] = np.bincount(group) @ W / len(group)
     row: cython.double[10]
+    side: cython.double[6]
     normal: cython.double[3]
     mean: cython.double[41]
     work: cython.double[18]
@@ -298,9 +297,13 @@ def fits_around(
                 row[1 + k] = W[group[s], k - 3] - level[k - 3] if k > 2 else 0.0
             for k in range(3 * size):
                 row[1 + k % 3] += X[corners[s, k // 3], k % 3] / size
-            for k in range(3 if n_columns == 41 else 0):
-                normal[k] = axes[s, 0, (k + 1) % 3] * axes[s, 1, (k + 2) % 3]
-                normal[k] -= axes[s, 0, (k + 2) % 3] * axes[s, 1, (k + 1) % 3]
+            if n_columns == 41:
+                for k in range(6):
+                    side[k] = X[corners[s, 1 + k // 3], k % 3] - X[corners[s, 0], k % 3]
+                cross(side, side + 3, normal)
+                area: cython.double = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+                for k in range(3):
+                    normal[k] /= max(area, DBL_MIN)
             i: cython.int = 0
             for j in range(4):
                 for k in range(j, 10):
