@@ -39,10 +39,11 @@ cdef class HopfLax:
     cdef int[::1] roots, order, stack
     cdef unsigned char[::1] state
     cdef double[::1] sum
-    # By how much each distance may be wrong.
-    cdef double[::1] doubt
+    # By how much each distance may be wrong, and by how much of that at its last step.
+    cdef double[::1] doubt, own
 
-    cdef bint judge(self, int v) noexcept nogil
+    cdef bint add_up(self, int v) noexcept nogil
+    cdef double contradiction(self, int v) noexcept nogil
     cdef void forget(self, int v) noexcept nogil
     cdef void march(self) noexcept nogil
     cdef void lead_on(self, int v) noexcept nogil

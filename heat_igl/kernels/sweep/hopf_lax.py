@@ -134,53 +134,97 @@ class HopfLax:
     def doubts(self, v):
         """By how much the distances (k,) of visited vertices v (k,) from the last source may be wrong, to first order.
 
-        Along an edge of a facet, the square of T rises by what its values say, and by what the slopes at both ends say.
-        Both agree if it is quadratic. Else it is off in between by their difference times both shares, and by what the
-        weight takes of its second difference; at most by that of the square of the edge. Over the vertices that a
-        distance comes from, this adds up.
+        What `contradiction` finds adds up over the vertices that a distance comes from.
         """
-        self.doubt = np.full(len(self.d), -1.0)
+        self.doubt, self.own = np.full(len(self.d), -1.0), np.zeros(len(self.d))
         is_early: cython.bint = False
         with cython.nogil:
             self.update.d = cython.address(self.d[0])
             for at in range(self.n_reached):
-                is_early |= self.judge(self.order[at])
+                if self.facet[self.order[at]] >= 0:
+                    self.own[self.order[at]] = self.contradiction(self.order[at])
+                is_early |= self.add_up(self.order[at])
             # Where metrics turn far, the order has cycles and precedes the last visits: 5 rounds find nearly all.
             for at in range(4 * self.n_reached if is_early else 0):
-                self.judge(self.order[at % self.n_reached])
+                self.add_up(self.order[at % self.n_reached])
         return np.asarray(self.doubt)[v]
 
-    def judge(self, v: cython.int) -> cython.bint:
-        """By how much the distance of v may be wrong; whether it comes from a vertex that was not judged yet."""
+    def add_up(self, v: cython.int) -> cython.bint:
+        """Add the doubts of what v comes from to its own; whether one of these was not known yet."""
         is_early: cython.bint = False
-        s: cython.int = self.facet[v] // self.corners.shape[1]
-        if self.facet[v] < 0:
-            self.doubt[v] = 0.0
-            return False
+        so_far: cython.double = self.own[v]
+        k: cython.int = 0
+        for c in range(self.corners.shape[1] if self.facet[v] >= 0 else 0):
+            if c == self.facet[v] % self.corners.shape[1]:
+                continue
+            u: cython.int = self.corners[self.facet[v] // self.corners.shape[1], c]
+            is_early |= self.place[v, k] > 0.0 and self.doubt[u] < 0.0
+            so_far += self.place[v, k] * max(self.doubt[u], 0.0)
+            k += 1
+        self.doubt[v] = so_far
+        return is_early
+
+    def contradiction(self, v: cython.int) -> cython.double:
+        """By how much T may be wrong at the place that v has its distance from.
+
+        Along an edge of a facet, the square of T rises by what its values say, and by what the slopes at both ends say.
+        Both agree if it is quadratic. Else it is off in between by their difference times both shares, and by what the
+        weight takes of its second difference; at most by that of the square of the edge. With one metric each,
+        T is not above the distance of the corner beyond the facet by more than the length from it.
+        """
+        size: cython.int = self.corners.shape[1]
+        s: cython.int = self.facet[v] // size
+        c: cython.int = self.facet[v] % size
         T: cython.double = -self.low
         own: cython.double = 0.0
-        so_far: cython.double = 0.0
-        self.update.face(s, self.facet[v] % self.corners.shape[1])
+        square: cython.double = 0.0
+        kept: cython.int[3]
+        where: cython.int[3]
+        x: cython.double[3]
+        self.update.face(s, c)
         for i in range(self.update.p):
             a: cython.int = self.corners[s, self.update.side[i]]
+            kept[i], x[i] = a, self.place[v, i]
             one: cython.double = self.update.level[i] - self.low
-            T += self.place[v, i] * self.update.level[i]
-            is_early |= self.place[v, i] > 0.0 and self.doubt[a] < 0.0
-            so_far += self.place[v, i] * max(self.doubt[a], 0.0)
+            T += x[i] * self.update.level[i]
             for j in range(i):
-                b: cython.int = self.corners[s, self.update.side[j]]
                 two: cython.double = self.update.level[j] - self.low
                 at_a: cython.double = 0.0
                 at_b: cython.double = 0.0
                 for k in range(3):
-                    at_a += one * self.update.slope[a, k] * (self.update.V[b, k] - self.update.V[a, k])
-                    at_b += two * self.update.slope[b, k] * (self.update.V[b, k] - self.update.V[a, k])
+                    e: cython.double = self.update.V[kept[j], k] - self.update.V[a, k]
+                    at_a += one * self.update.slope[a, k] * e
+                    at_b += two * self.update.slope[kept[j], k] * e
                 gap: cython.double = fabs(two * two - one * one - at_a - at_b)
                 gap += (1.0 - self.weight[v]) * fabs(at_b - at_a - (two - one) * (two - one))
-                gap = min(gap, self.update.mean[s, pair(self.update.side[i], self.update.side[j])])
-                own += self.place[v, i] * self.place[v, j] * gap
-        self.doubt[v] = so_far + (0.5 * own / T if T > 0.0 else 0.0)
-        return is_early
+                between: cython.double = self.update.mean[s, pair(self.update.side[i], self.update.side[j])]
+                own += x[i] * x[j] * min(gap, between)
+                square -= x[i] * x[j] * between
+            square += x[i] * self.update.mean[s, pair(c, self.update.side[i])]
+        if not (T > 0.0 and own >= 0.0):
+            return 0.0
+        own = 0.5 * own / T
+        T = self.d[v] - sqrt(max(square, 0.0))
+        # Lengths in a metric that varies within simplices are not known as well.
+        for at in range(self.first[kept[0]], self.first[kept[0] + 1] if self.update.q == 1 else 0):
+            other: cython.int = self.incident[at] // size
+            far: cython.int = size * (size - 1) // 2
+            n_common: cython.int = 0
+            for i in range(size):
+                for j in range(self.update.p if n_common >= i - 1 else 0):
+                    if self.corners[other, i] == kept[j]:
+                        where[j] = i
+                        far -= i
+                        n_common += 1
+            if n_common < self.update.p or other == s:
+                continue
+            square = 0.0
+            for i in range(self.update.p):
+                square += self.place[v, i] * self.update.mean[other, pair(far, where[i])]
+                for j in range(i):
+                    square -= self.place[v, i] * self.place[v, j] * self.update.mean[other, pair(where[i], where[j])]
+            own = max(own, T - self.d[self.corners[other, far]] - sqrt(max(square, 0.0)))
+        return own
 
     def forget(self, v: cython.int) -> cython.void:
         """Make v a vertex that no source has reached."""
