@@ -6,13 +6,13 @@ cdef enum:
 
 cdef inline bint rotate(double* work, int p, int q, double rest) noexcept nogil:
     # One rotation of Jacobi's eigenvalue algorithm on the symmetric matrix in the first three rows of `work` (6, 3);
-    # the other three gather the eigenvectors. False if entry (p, q) is zero already, or at most `rest` of the smaller of
-    # the two on the diagonal.
+    # the other three gather the eigenvectors. False if entry (p, q) is zero already, or at most `rest` of the two on the
+    # diagonal, and of their difference: then it changes them by the square of that.
     cdef int x, r = 3 - p - q
     cdef double entry = work[3 * p + q]
     cdef double one = fabs(work[4 * p]), two = fabs(work[4 * q])
     cdef double half, tangent, cosine, sine, along, across
-    if fabs(entry) <= 1e-17 * (one + two) or fabs(entry) <= rest * min(one, two):
+    if fabs(entry) <= 1e-17 * (one + two) or fabs(entry) <= rest * min(one, two, fabs(work[4 * p] - work[4 * q])):
         return False
     half = 0.5 * (work[4 * q] - work[4 * p]) / entry
     across = sqrt(half * half + 1.0)
