@@ -390,7 +390,7 @@ class GeodesicSolver(BatchedSolver):
         # The formula interpolates tensors per face before it uses them: it has no derivatives by those given.
         if isinstance(asked := self._asked(chosen), SimplexEngine) and not getattr(domain, "metric", None):
             asked = HopfLaxEngine(same) if (same := getattr(domain, "in_tensors", None)) else asked
-            distance, complaint = asked.judged(chosen)
+            distance, _, complaint = asked.answer(chosen)
             warn_of(complaint)
             return distance, asked.derivative(chosen)
         from heat_igl.operators import SideLengths
@@ -434,7 +434,7 @@ class GeodesicSolver(BatchedSolver):
             return self._engine.to_targets(chosen, places)
         if isinstance(places, SurfacePoints):
             raise ValueError("targets inside faces need windows: leave method away, or name vertices")
-        distance, complaint = self._engine.judged(chosen)
+        distance, _, complaint = self._engine.answer(chosen)
         warn_of(complaint)
         return distance[places]
 
@@ -457,8 +457,11 @@ class GeodesicSolver(BatchedSolver):
     def _answers(
         self, source_sets: list[SourceSet], cutoff: float = np.inf, threads: int = 1
     ) -> tuple[FloatArray, Sequence[str | None]]:
-        rows, complaints = zip(*(self._asked(each).judged(each, cutoff, threads) for each in source_sets), strict=True)
-        return self._with_copies(np.stack(rows)), complaints
+        if self._plan.engine != "hopf-lax":
+            rows = [self._engine.distance(each, cutoff, threads) for each in source_sets]
+            return self._with_copies(np.stack(rows)), [None] * len(rows)
+        answers = [self._asked(each).answer(each, cutoff, threads) for each in source_sets]
+        return self._with_copies(np.stack([answer[0] for answer in answers])), [answer[2] for answer in answers]
 
 
 def _sweep_engine(triangles: Triangles) -> SweepEngine:

@@ -46,10 +46,6 @@ class HopfLaxEngine(SimplexEngine):
             )
         return distance, np.concatenate([sources.vertex_label, [-1]])[label], complaint
 
-    def judged(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, str | None]:
-        """Distance and complaint of `answer`."""
-        return self.answer(sources, cutoff, threads)[::2]
-
     def _lower(
         self,
         vertices: AnyArray,

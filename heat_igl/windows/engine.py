@@ -47,10 +47,6 @@ class Engine(ABC):
         """What `labelled` returns, and the text of a warning about the distance, if one is due."""
         return *self.labelled(sources, cutoff, threads), None
 
-    def judged(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, str | None]:
-        """The distance, and the text of a warning about it, if one is due."""
-        return self.distance(sources, cutoff, threads), None
-
 
 class Triangles(ABC):
     """A surface of triangles, with its components."""

@@ -132,17 +132,12 @@ class HopfLax:
         return *at, np.asarray(update.slope)[v], np.asarray(update.is_sloped)[v], np.asarray(self.weight)[v]
 
     def doubts(self, v):
-        """By how much the distances (k,) of visited vertices v (k,) from the last source may be wrong, to first order.
-
-        What `contradiction` finds adds up over the vertices that a distance comes from.
-        """
-        self.doubt, self.own = np.full(len(self.d), -1.0), np.zeros(len(self.d))
+        """By how much distances (k,) may be wrong: what `contradiction` finds adds up over what they come from."""
+        self.doubt, self.own = np.where(np.asarray(self.facet) < 0, 0.0, -1.0), np.zeros(len(self.d))
         is_early: cython.bint = False
         with cython.nogil:
             self.update.d = cython.address(self.d[0])
             for at in range(self.n_reached):
-                if self.facet[self.order[at]] >= 0:
-                    self.own[self.order[at]] = self.contradiction(self.order[at])
                 is_early |= self.add_up(self.order[at])
             # Where metrics turn far, the order has cycles and precedes the last visits: 5 rounds find nearly all.
             for at in range(4 * self.n_reached if is_early else 0):
@@ -152,15 +147,16 @@ class HopfLax:
     def add_up(self, v: cython.int) -> cython.bint:
         """Add the doubts of what v comes from to its own; whether one of these was not known yet."""
         is_early: cython.bint = False
+        if self.facet[v] < 0:
+            return False
+        if self.doubt[v] < 0.0:
+            self.own[v] = self.contradiction(v)
         so_far: cython.double = self.own[v]
-        k: cython.int = 0
-        for c in range(self.corners.shape[1] if self.facet[v] >= 0 else 0):
-            if c == self.facet[v] % self.corners.shape[1]:
-                continue
-            u: cython.int = self.corners[self.facet[v] // self.corners.shape[1], c]
-            is_early |= self.place[v, k] > 0.0 and self.doubt[u] < 0.0
-            so_far += self.place[v, k] * max(self.doubt[u], 0.0)
-            k += 1
+        self.update.face(self.facet[v] // self.corners.shape[1], self.facet[v] % self.corners.shape[1])
+        for i in range(self.update.p):
+            u: cython.int = self.corners[self.facet[v] // self.corners.shape[1], self.update.side[i]]
+            is_early |= self.place[v, i] > 0.0 and self.doubt[u] < 0.0
+            so_far += self.place[v, i] * max(self.doubt[u], 0.0)
         self.doubt[v] = so_far
         return is_early
 
@@ -180,30 +176,26 @@ class HopfLax:
         square: cython.double = 0.0
         kept: cython.int[3]
         where: cython.int[3]
-        x: cython.double[3]
         self.update.face(s, c)
         for i in range(self.update.p):
-            a: cython.int = self.corners[s, self.update.side[i]]
-            kept[i], x[i] = a, self.place[v, i]
+            kept[i] = self.corners[s, self.update.side[i]]
             one: cython.double = self.update.level[i] - self.low
-            T += x[i] * self.update.level[i]
+            T += self.place[v, i] * self.update.level[i]
             for j in range(i):
                 two: cython.double = self.update.level[j] - self.low
                 at_a: cython.double = 0.0
                 at_b: cython.double = 0.0
                 for k in range(3):
-                    e: cython.double = self.update.V[kept[j], k] - self.update.V[a, k]
-                    at_a += one * self.update.slope[a, k] * e
+                    e: cython.double = self.update.V[kept[j], k] - self.update.V[kept[i], k]
+                    at_a += one * self.update.slope[kept[i], k] * e
                     at_b += two * self.update.slope[kept[j], k] * e
                 gap: cython.double = fabs(two * two - one * one - at_a - at_b)
                 gap += (1.0 - self.weight[v]) * fabs(at_b - at_a - (two - one) * (two - one))
                 between: cython.double = self.update.mean[s, pair(self.update.side[i], self.update.side[j])]
-                own += x[i] * x[j] * min(gap, between)
-                square -= x[i] * x[j] * between
-            square += x[i] * self.update.mean[s, pair(c, self.update.side[i])]
-        if not (T > 0.0 and own >= 0.0):
-            return 0.0
-        own = 0.5 * own / T
+                own += self.place[v, i] * self.place[v, j] * min(gap, between)
+                square -= self.place[v, i] * self.place[v, j] * between
+            square += self.place[v, i] * self.update.mean[s, pair(c, self.update.side[i])]
+        own = 0.5 * own / T if T > 0.0 and own >= 0.0 else 0.0
         T = self.d[v] - sqrt(max(square, 0.0))
         # Lengths in a metric that varies within simplices are not known as well.
         for at in range(self.first[kept[0]], self.first[kept[0] + 1] if self.update.q == 1 else 0):
