@@ -15,7 +15,7 @@ from heat_igl.sources import source_set
 from heat_igl.sweep.lines import LineEngine
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 from heat_igl.validation.closed_forms import around_the_edge
-from heat_igl.validation.construction import carved, tetrahedra
+from heat_igl.validation.construction import carved, compact, tetrahedra
 
 
 def scattered(n: int, seed: int = 0) -> Mesh:
@@ -283,19 +283,23 @@ def test_halved_tetrahedra():
     assert (fine.facets.n_faces == 1).sum() == 4 * (mesh.facets.n_faces == 1).sum()
 
 
-def test_coarse_bodies_with_many_bends():
-    """Against twice halved tetrahedra: single vertices were up to 27 % too far; then a path along an edge."""
+@pytest.mark.parametrize("seed", range(5))
+def test_against_halved_tetrahedra(seed):
+    """Behind walls between the ends of an edge, up to 22 % too near; with many bends up to 27 % too far."""
     body, _ = caves(1, 4)
-    fine = GeodesicSolver(body.halved().halved())
-    for source in (3, 40):
+    if seed < 4:
+        cube = tetrahedra(shapes.box(6).V + np.random.default_rng(seed).uniform(-0.07, 0.07, (343, 3)))
+        middle, size = [([0.5, 1, 0.5], [0.2, 0.7, 2]), ([0.5, 0.5, 0.5], [0.25, 0.25, 0.25])][seed % 2]
+        body = compact(cube.V, cube.F[(np.abs(cube.V[cube.F].mean(axis=1) - middle) > size).any(axis=1)])
+    solver, fine = GeodesicSolver(body), GeodesicSolver(body.halved().halved())
+    for source in range(3, body.n_vertices, 37):
         exact = fine.distance(source)[: body.n_vertices]
-        solver = GeodesicSolver(body)
         error = np.delete(solver.distance(source) / np.where(exact > 0, exact, 1) - 1, source)
         assert np.abs(error).mean() < 5e-4
-        assert error.max() < 0.04
-        labelled = solver.voronoi([source, 11])
-        np.testing.assert_array_equal(labelled.distance, solver.distance([source, 11]))
-        assert set(labelled.labels.tolist()) == {0, 1} or set(labelled.labels.tolist()) == {source, 11}
+        assert -0.01 < error.min() <= error.max() < 0.02
+    labelled = solver.voronoi([3, 11])
+    np.testing.assert_array_equal(labelled.distance, solver.distance([3, 11]))
+    assert set(labelled.labels.tolist()) in ({0, 1}, {3, 11})
     assert GeodesicSolver(caves(1, 5)[0]).distance(3)[180] == pytest.approx((10**0.5 + 1 + 2**0.5) / 5)
 
 

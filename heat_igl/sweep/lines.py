@@ -22,8 +22,6 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Of the places nearest in space so many are compared by their offsets; so many vertices at a time.
 _MOST_NEAR, _ROWS = 64, 16384
-# How far the search for ways that bend goes beside what an edge hides, in longest edges of a vertex.
-_BESIDE = 1.0
 # What the kernel of bends knows of the way to a vertex.
 _STRAIGHT, _UNKNOWN = -1, -2
 # Sine of the angle by which a body must exceed half a turn at an edge.
@@ -164,7 +162,7 @@ class LineEngine(SimplexEngine):
         before = distance.copy()
         look_around(order, self._body, vertices, offset, edges, nearest, distance, label)
         way[distance < before] = _STRAIGHT
-        bend_around(edges, outward, wall, self._body, _BESIDE, vertices, offset, distance, label, way)
+        bend_around(edges, outward, wall, self._body, vertices, offset, distance, label, way)
         distance += least
         return edges, way
 

@@ -9,6 +9,6 @@ ends have distances.
   shortest line that stays inside. Then neighbours that do not see this source look again, until nothing changes. A
   vertex that sees no source stays at infinity.
 - `bends`: each edge, from near to far, whose ends have got shorter distances is fitted, and vertices around it take the
-  ways around it as far as they see it; until no end gets shorter. Distance along an edge is that from one point beside
-  it, if this agrees at the middle and the quarters, else the values there.
+  ways around it as far as they see it; until no end gets shorter. Points of an edge take ways as vertices do.
+  Distance along it is that from one point beside it, if this agrees at the middle and the quarters, else interpolated.
 """

@@ -42,6 +42,8 @@ _Edge = cython.struct(
     wall=cython.double,
     has_before=cython.double,
     before=cython.double[2],
+    slope=cython.double[4],
+    lean=cython.double[4],
 )
 
 
@@ -50,7 +52,6 @@ def bend_around(
     outward: cython.const[cython.double][:, ::1],
     wall: cython.const[cython.double][::1],
     body: Body,
-    beside: cython.double,
     sources: cython.const[cython.int][::1],
     offset: cython.const[cython.double][::1],
     d: cython.double[::1],
@@ -70,9 +71,8 @@ def bend_around(
 
     The edges (e, 2) int32 are those of the `body` around which ways bend. `outward` (e, 3) is the direction out of the
     body at each, halfway between the two walls, zero where more than two meet, and `wall` (e,) the cosine of the angle
-    between that direction and the walls. A vertex may lie `beside` the part of the body that an edge hides, by this
-    share of its longest edge, and the edge still is a candidate. `way` (n,) int32 is the edge around which the way to
-    each vertex bends last, -1 on straight ways, -2 where it is not known. The other arguments are those of
+    between that direction and the walls. `way` (n,) int32 is the edge around which the way to each vertex bends last,
+     -1 on straight ways, -2 where it is not known. The other arguments are those of
     `sight.look_around`; `d`, `label` and `way` are changed.
     """
     n, e = body.positions.shape[0], edges.shape[0]
@@ -82,21 +82,23 @@ def bend_around(
     tangent = (ends[:, 1] - ends[:, 0]) / lengths
     beyond, across = np.full((e, 5), np.inf), np.cross(tangent, outward)
     known = [tangent, ends[:, 0], lengths, np.zeros((e, 4)), beyond, outward, across, np.asarray(wall)[:, None]]
-    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 3))], axis=1)
+    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 11))], axis=1)
     one = _Bends(body, sources, offset, d, label)
-    one.edges, one.beside, one.way = edges, beside, way
+    one.edges, one.way = edges, way
     if e > 0:
         one.edge = cython.cast(cython.pointer[_Edge], cython.address(table[0, 0]))
     one.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
     one.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
     one.fit_of = np.arange(e, dtype=np.int32) << _FIT_BITS
     one.newest, one.met = np.full((2, n), _NONE, np.int32)
-    one.met_by, one.waiting, one.bound = np.full(e, _NONE, np.int32), PriorityQueue(n), np.array(d)
+    one.point_of, one.waiting, one.bound = np.zeros(e, np.int32), PriorityQueue(n), np.array(d)
+    # Ways to the middle of an edge bend around edges that are nearer.
+    order: cython.const[cython.int][::1] = np.argsort(np.asarray(d)[edges].max(axis=1), kind="stable").astype(np.int32)
     n_asked: cython.Py_ssize_t = 0
     while True:
         with cython.nogil:
             for i in range(e):
-                one.begin_around(i)
+                one.begin_around(order[i])
             while one.waiting.count > 0 and not one.failed:
                 n_asked += 1
                 if n_asked % ASK == 0 and is_interrupted():
@@ -120,8 +122,9 @@ class _Bends(Ray):
     """Edges of a body around which ways bend, the ways, and the edges that are candidates for them.
 
     Distance along an edge that `fits` is ``start + |(x - along, height)|``, x along the edge; at its ends, the quarters
-    and the middle it is `at`. The way comes to the middle from `before`, a place along `outward` and `across`, if it
-    `has_before`. No way to a vertex is longer than its `bound` (n,), by a neighbour.
+    and the middle it is `at`. Each quarter of another edge has a `slope`, and lines meet the edge there with a `lean`,
+    their way along it for each unit across, at its beginning if that is huge. The way comes to the middle from
+    `before`, a place along `outward` and `across`, if it `has_before`. No way to a vertex is longer than its `bound`.
 
     Of the way that was last asked for, `bend` (3,) is the point at which it bends last, and `share` the place of this
     point along the edge.
@@ -129,8 +132,9 @@ class _Bends(Ray):
     `fit_of` (e,) is the number of each edge, followed by `_FIT_BITS` that count how often it has been fitted. The edges
     that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has `fit_of` its
     edge when it was made, whether it has been `asked` for, and the value of the way, `INFINITY` once the line has been
-    followed. All edges that were offered to a vertex are in `lists` that begin at `met` (n,); `met_by` (e,) is the
-    vertex whose lists put the last mark on an edge. Edges begin from one end if this `is_lone`.
+    followed. All edges that were offered to a vertex are in `lists` that begin at `met` (n,); `point_of` (e,) is the
+    number of the last `point` of an edge for which an edge was a candidate; `n_near` are `near`, on ways of
+    `near_value`. Edges begin from one end if it `is_lone`.
     The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`, and `sought` is
     the edge that is fitted.
     """
@@ -146,7 +150,7 @@ class _Bends(Ray):
     fit_of: cython.int[::1]
     newest: cython.int[::1]
     met: cython.int[::1]
-    met_by: cython.int[::1]
+    point_of: cython.int[::1]
     offers: cython.pointer[_Offer]
     lists: cython.pointer[_Met]
     n_offers: cython.int
@@ -156,8 +160,11 @@ class _Bends(Ray):
     is_lone: cython.bint
     waiting: PriorityQueue
     bound: cython.double[::1]
-    beside: cython.double
     line: Line
+    point: cython.int
+    n_near: cython.int
+    near: cython.int[258]
+    near_value: cython.double[258]
 
     def __dealloc__(self):
         free(self.offers)
@@ -166,35 +173,38 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def fit(self, i: cython.int) -> cython.void:
-        """Find distance along an edge from the ways to its ends."""
+        """Find distance along an edge, at its ends, quarters and middle."""
         x: cython.double[3]
+        edge: cython.pointer[_Edge] = cython.address(self.edge[i])
         a: cython.int = self.edges[i, 0]
         b: cython.int = self.edges[i, 1]
-        to_a: cython.double = min(self.d[a], self.d[b] + self.edge[i].length)
-        to_b: cython.double = min(self.d[b], self.d[a] + self.edge[i].length)
         for k in range(3):
             x[k] = 0.5 * (self.body.positions[a, k] + self.body.positions[b, k])
-        self.reach(a, x, INFINITY, False)
-        self.reach(b, x, INFINITY, False)
-        # The way to one end continues along the edge unless it is hidden at the other end.
-        a_reaches: cython.bint = self.value(a, cython.address(self.body.positions[b, 0])) >= to_b * (1 - GAIN)
-        b_reaches: cython.bint = self.value(b, cython.address(self.body.positions[a, 0])) >= to_a * (1 - GAIN)
-        self.edge[i].at[0], self.edge[i].at[4] = to_a, to_b
+        edge.has_before = self.way[a] > -2
+        if edge.has_before:
+            self.look_back(self.way[a], a, x)
+            edge.before[0] = edge.before[1] = 0.0
+            for k in range(3):
+                edge.before[0] += (self.line.goal[k] - edge.end[k]) * edge.outward[k]
+                edge.before[1] += (self.line.goal[k] - edge.end[k]) * edge.across[k]
+        edge.at[0], edge.at[4] = min(self.d[a], self.d[b] + edge.length), min(self.d[b], self.d[a] + edge.length)
+        part: cython.double = 0.25 * edge.length
         for j in range(1, 4):
             for k in range(3):
-                x[k] = self.body.positions[a, k] + 0.25 * j * self.edge[i].length * self.edge[i].tangent[k]
-            off: cython.double = 0.25 * j * self.edge[i].length
-            self.edge[i].at[j] = min(to_a + off, to_b + self.edge[i].length - off)
-            self.edge[i].at[j] = self.reach(a, x, self.edge[i].at[j], not a_reaches)
-            self.edge[i].at[j] = self.reach(b, x, self.edge[i].at[j], not b_reaches)
-            self.edge[i].has_before = self.way[a] > -2
-            if j == 2 and self.way[a] > -2:
-                self.look_back(self.way[a], a, x)
-                self.edge[i].before[0] = self.edge[i].before[1] = 0.0
-                for k in range(3):
-                    self.edge[i].before[0] += (self.line.goal[k] - self.edge[i].end[k]) * self.edge[i].outward[k]
-                    self.edge[i].before[1] += (self.line.goal[k] - self.edge[i].end[k]) * self.edge[i].across[k]
+                x[k] = self.body.positions[a, k] + j * part * edge.tangent[k]
+            edge.at[j] = self.shortest_to(i, x, min(edge.at[j - 1] + part, edge.at[4] + (4 - j) * part))
+        for j in range(3, 0, -1):
+            edge.at[j] = min(edge.at[j], edge.at[j + 1] + part)
         self.lay_flat(i, a, b)
+        for j in range(4):
+            edge.slope[j] = max(-1.0, min((edge.at[j + 1] - edge.at[j]) / part, 1.0))
+        for j in range(4):
+            edge.lean[j] = edge.slope[j] / sqrt(max(1 - edge.slope[j] * edge.slope[j], 1e-12))
+            # Where two fronts meet, distance is above the line between the ends of a quarter, at most by a quarter of
+            # the fall of the slope, times a quarter of the edge; before or after it the slope falls.
+            for k in range(max(j - 1, 0), min(j + 1, 3)):
+                if edge.slope[k] > edge.slope[k + 1] + 16 * _MISFIT:
+                    edge.lean[j] = 1e30
 
     @cython.cfunc
     @cython.nogil
@@ -206,26 +216,18 @@ class _Bends(Ray):
         middle: cython.double = edge.at[2] - to_a
         to_b: cython.double = edge.at[4] - to_a
         turn: cython.double = to_b - 2 * middle
-        way_a: cython.int = self.way[a]
-        is_lit: cython.bint = way_a == -1 and self.way[b] == -1 and self.label[a] == self.label[b]
-        if turn > _STRAIGHT_FRONT * size and not is_lit:
-            edge.start = (to_b * to_b - 2 * middle * middle - 0.5 * size * size) / (2 * turn)
-        elif way_a >= 0:
-            edge.start = self.edge[way_a].start - to_a
-        elif way_a == -1:
+        if self.way[a] == -1 and self.way[b] == -1 and self.label[a] == self.label[b]:
             edge.start = self.offset[self.label[a]] - to_a
         else:
-            edge.start = -size / _STRAIGHT_FRONT
-        edge.start = max(edge.start, -size / _STRAIGHT_FRONT)
+            turn = max(turn, _STRAIGHT_FRONT * size)
+            edge.start = (to_b * to_b - 2 * middle * middle - 0.5 * size * size) / (2 * turn)
         radius: cython.double = -edge.start
         other: cython.double = to_b - edge.start
         edge.along = 0.5 * ((radius - other) * (radius + other) / size + size)
         squared: cython.double = radius * radius - edge.along * edge.along
         edge.fits = radius >= 0 and other >= 0 and squared >= 0
         edge.start += to_a
-        if not edge.fits:
-            return
-        edge.height = sqrt(squared)
+        edge.height = sqrt(max(squared, 0.0))
         for j in range(1, 4):
             off: cython.double = 0.25 * j * size - edge.along
             if fabs(edge.start + sqrt(off * off + squared) - edge.at[j]) > _MISFIT * size:
@@ -233,50 +235,65 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def reach(
-        self,
-        v: cython.int,
-        x: cython.pointer[cython.const[cython.double]],
-        most: cython.double,
-        is_followed: cython.bint,
+    def shortest_to(
+        self, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
     ) -> cython.double:
-        """Distance at a point x near v by the ways to v that are equally short since they bend at a vertex, or `most`.
+        """The shortest way to a point of edge i whose last line stays inside, or `most`.
 
-        The shortest one becomes the way to v, or its line `is_followed` from x, which is on the edge `sought`.
+        It bends last around an edge at an end of i, around an edge around which the way to such an end or to one of its
+        neighbours does, or around an edge at a triangle that hides another candidate. Or it is the straight line from
+        the source of an end, if one of them sees a source.
         """
-        way: cython.int = self.way[v]
-        if way < 0:
-            is_there: cython.bint = not is_followed or (
-                way == -1 and self.value(v, x) < most and self.is_lit(way, v, x)
-            )
-            return min(self.value(v, x), most) if is_there else most
-        here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
-        self.around(way, here, True)
-        is_between: cython.bint = 0 < self.share < 1
-        is_chosen: cython.bint = most == INFINITY
-        end: cython.int = self.edges[way, 0 if self.share < 1 else 1]
-        for k in range(self.first_at_end[end], self.first_at_end[end + 1]):
-            i: cython.int = self.at_end[k]
-            value: cython.double = self.around(i, x, False)
-            if value >= most or (i != way and is_between):
-                continue
-            is_equal: cython.bint = fabs(self.around(i, here, False) - self.d[v]) <= GAIN * self.d[v]
-            if i != way and not (is_equal and self.is_hidden_from_before(i, v)):
-                continue
-            if not is_followed or self.is_lit(i, v, x):
-                most = value
-                self.way[v] = i if is_chosen else way
+        self.n_near, self.point = 0, self.point + 1
+        self.point_of[i] = self.point
+        sees: cython.bint = False
+        for c in range(2):
+            v: cython.int = self.edges[i, c]
+            self.add_at(v, x, most)
+            for k in range(self.body.first_neighbour[v] - 1, self.body.first_neighbour[v + 1]):
+                way: cython.int = self.way[v if k < self.body.first_neighbour[v] else self.body.neighbours[k]]
+                sees = sees or way == -1
+                if way >= 0:
+                    self.add(way, x, most)
+        for c in range(2 if sees else 0):
+            label: cython.int = self.label[self.edges[i, c]]
+            if label >= 0 and (c == 0 or label != self.label[self.edges[i, 0]]):
+                self.near[self.n_near] = -1 - c
+                self.near_value[self.n_near] = self.offset[label] + self.body.away(self.sources[label], x)
+                self.n_near += 1
+        while self.n_near > 0:
+            best: cython.int = 0
+            for k in range(self.n_near):
+                if self.near_value[k] < self.near_value[best]:
+                    best = k
+            way = self.near[best]
+            value: cython.double = self.near_value[best]
+            self.n_near -= 1
+            self.near[best], self.near_value[best] = self.near[self.n_near], self.near_value[self.n_near]
+            if value >= most or self.is_lit(max(way, -1), self.edges[i, 1 if way == -2 else 0], x):
+                return min(value, most)
+            for c in range(1, 4):
+                self.add_at(self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
         return most
 
     @cython.cfunc
     @cython.nogil
-    def value(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
-        """Distance at a point near vertex v, by the way to v."""
-        if self.way[v] >= 0:
-            return self.around(self.way[v], x, False)
-        if self.way[v] == -1:
-            return self.offset[self.label[v]] + self.body.away(self.sources[self.label[v]], x)
-        return self.d[v] + self.body.away(v, x)
+    def add_at(self, v: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double) -> cython.void:
+        """Make the edges that end at v candidates for the `point` x."""
+        for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
+            self.add(self.at_end[k], x, most)
+
+    @cython.cfunc
+    @cython.nogil
+    def add(self, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double) -> cython.void:
+        """Make an edge a candidate for the `point` x, if the way around it is shorter and may bend there."""
+        if self.point_of[i] != self.point and self.fit_of[i] & _MOST_FITS:
+            self.point_of[i] = self.point
+            value: cython.double = self.around(i, x, False)
+            is_shorter: cython.bint = value < most * (1 - GAIN) and self.n_near < 256
+            if is_shorter and self.is_hidden_from_before(i, x, self.edge[self.sought].length):
+                self.near[self.n_near], self.near_value[self.n_near] = i, value
+                self.n_near += 1
 
     @cython.cfunc
     @cython.nogil
@@ -306,10 +323,16 @@ class _Bends(Ray):
             for j in range(5):
                 if edge.fits and 0 < j < 4:
                     continue
-                off = along - 0.25 * j * edge.length
-                through: cython.double = edge.at[j] + sqrt(squared + off * off)
+                begin: cython.double = 0.25 * j * edge.length
+                part: cython.double = 0.0
+                through: cython.double = edge.at[j]
+                if not edge.fits and j < 4:
+                    part = max(0.0, min(along - edge.lean[j] * sqrt(squared) - begin, 0.25 * edge.length))
+                    through += edge.slope[j] * part
+                off = along - begin - part
+                through += sqrt(squared + off * off)
                 if through < best:
-                    best, place = through, 0.25 * j * edge.length
+                    best, place = through, begin + part
         if is_placed:
             self.share = place / (both * edge.length)
             for k in range(3):
@@ -340,12 +363,22 @@ class _Bends(Ray):
         a: cython.int = self.edges[self.sought, 0]
         for k in range(self.body.first[a], self.body.first[a + 1]):
             t: cython.int = self.body.incident[k] >> 2
-            corners: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[t, 0])
-            if self.edges[self.sought, 1] in (corners[0], corners[1], corners[2], corners[3]):
-                found: cython.int = self.arrives(line, 4 * t, -1, -1)
+            # A line that touches a wall elsewhere is moved to all sides, one of which may be inside.
+            for toward in range(-1, 4 if self.has_sought(t) else -1):
+                found: cython.int = self.arrives(line, 4 * t, -1, toward)
                 if found > 0 or (found == -1 and self.is_blocked(line, 2 * NUDGE * self.body.reach[a])):
                     return found > 0
+                if found == -1 and self.has_sought(line.t):
+                    break
         return False
+
+    @cython.cfunc
+    @cython.nogil
+    def has_sought(self, t: cython.int) -> cython.bint:
+        """Whether a tetrahedron has both ends of the edge `sought`."""
+        at: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[t, 0])
+        a: cython.int = self.edges[self.sought, 0]
+        return a in (at[0], at[1], at[2], at[3]) and self.edges[self.sought, 1] in (at[0], at[1], at[2], at[3])
 
     @cython.cfunc
     @cython.nogil
@@ -356,11 +389,27 @@ class _Bends(Ray):
         is_new: cython.bint = self.edge[i].at[0] > to_a * (1 + GAIN) or self.edge[i].at[4] > to_b * (1 + GAIN)
         is_known: cython.bint = (min(to_a, to_b) if self.is_lone else max(to_a, to_b)) < INFINITY
         if is_new and is_known and self.fit_of[i] & _MOST_FITS < _MOST_FITS:
-            self.sought, self.met_by[i] = i, _NONE
+            self.sought = i
             self.fit(i)
             self.fit_of[i] += 1
             self.offer_around(i, self.edges[i, 0])
             self.offer_around(i, self.edges[i, 1])
+
+    @cython.cfunc
+    @cython.nogil
+    def begin_at(self, v: cython.int) -> cython.void:
+        """Begin around the edges that end at v, in the order of the other ends: ways lead from edge to edge."""
+        last: cython.double = -1.0
+        while last < INFINITY:
+            nearest: cython.double = INFINITY
+            for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
+                other: cython.double = self.d[self.edges[self.at_end[k], 0] + self.edges[self.at_end[k], 1] - v]
+                if last < other < nearest:
+                    nearest = other
+            for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
+                if self.d[self.edges[self.at_end[k], 0] + self.edges[self.at_end[k], 1] - v] == nearest:
+                    self.begin_around(self.at_end[k])
+            last = nearest
 
     @cython.cfunc
     @cython.nogil
@@ -375,18 +424,18 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def offer_at(self, a: cython.int, v: cython.int) -> cython.void:
-        """Make the edges that end at a candidates for v, whose marks are on those that it has met."""
+        """Make the edges that end at a candidates for v."""
         for k in range(self.first_at_end[a], self.first_at_end[a + 1]):
-            i: cython.int = self.at_end[k]
-            if self.fit_of[i] & _MOST_FITS and self.met_by[i] != v:
-                self.met_by[i] = v
-                self.offer(i, v)
+            fit: cython.int = self.fit_of[self.at_end[k]]
+            if fit & _MOST_FITS and not self.has_met(v, fit):
+                self.offer(self.at_end[k], v)
 
     @cython.cfunc
     @cython.nogil
     def offer(self, i: cython.int, v: cython.int) -> cython.void:
         """Make an edge a candidate for v, which waits, if the way around it would be shorter and v has not met it."""
-        value: cython.double = self.around(i, cython.address(self.body.positions[v, 0]), False)
+        here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
+        value: cython.double = self.around(i, here, False)
         if value >= self.most(v) or self.has_met(v, self.fit_of[i]) or self.lacks_room():
             return
         k: cython.int = self.met[v]
@@ -398,7 +447,7 @@ class _Bends(Ray):
             self.met[v], self.n_lists = k, self.n_lists + 1
         self.lists[k].fits[self.lists[k].count] = self.fit_of[i]
         self.lists[k].count += 1
-        if v == self.edges[i, 0] or v == self.edges[i, 1] or not self.is_hidden_from_before(i, v):
+        if v in (self.edges[i, 0], self.edges[i, 1]) or not self.is_hidden_from_before(i, here, self.body.reach[v]):
             return
         one: cython.pointer[_Offer] = cython.address(self.offers[self.n_offers])
         one.fit, one.next, one.asked, one.value = self.fit_of[i], self.newest[v], False, value
@@ -418,18 +467,6 @@ class _Bends(Ray):
                 return True
             k = self.lists[k].next
         return False
-
-    @cython.cfunc
-    @cython.nogil
-    def mark_met(self, v: cython.int) -> cython.void:
-        """Put marks on the edges that v has met."""
-        k: cython.int = self.met[v]
-        while k >= 0:
-            for m in range(self.lists[k].count):
-                fit: cython.int = self.lists[k].fits[m]
-                if fit == self.fit_of[fit >> _FIT_BITS]:
-                    self.met_by[fit >> _FIT_BITS] = v
-            k = self.lists[k].next
 
     @cython.cfunc
     @cython.nogil
@@ -486,7 +523,6 @@ class _Bends(Ray):
         is_longer: cython.bint = value >= self.d[v] * (1 - GAIN)
         if not is_longer and not self.offers[k].asked:
             self.offers[k].asked = True
-            self.mark_met(v)
             self.offer_at(self.edges[i, 0], v)
             self.offer_at(self.edges[i, 1], v)
             if self.waiting.key[v] * value > 1 + GAIN:
@@ -502,20 +538,20 @@ class _Bends(Ray):
             end: cython.int = self.edges[i, self.share >= 0.5]
             self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, self.share < 0.5]]
             self.offer_around(i, v)
-            for m in range(self.first_at_end[v], self.first_at_end[v + 1]):
-                self.begin_around(self.at_end[m])
+            self.begin_at(v)
         else:
-            self.mark_met(v)
             for c in range(1, 4):
                 self.offer_at(self.body.cells[line.t, (line.out + c) & 3], v)
         self.shortest(v)
 
     @cython.cfunc
     @cython.nogil
-    def is_hidden_from_before(self, i: cython.int, v: cython.int) -> cython.bint:
-        """Whether v lies behind the edge, or beside that at most so far as was allowed.
+    def is_hidden_from_before(
+        self, i: cython.int, x: cython.pointer[cython.const[cython.double]], size: cython.double
+    ) -> cython.bint:
+        """Whether x lies behind the edge, or beside that at most by a size, that of the longest edge at x.
 
-        Seen along the edge, the line from v to the point from which the way comes passes outside, and v is not below
+        Seen along the edge, the line from x to the point from which the way comes passes outside, and x is not below
         the plane of the wall behind the edge. No line to the edge needs those below: each triangle that it passes
         through has a corner on the other side of the plane, and such corners are neighbours from one to the next.
         """
@@ -525,17 +561,16 @@ class _Bends(Ray):
         out: cython.double = 0.0
         side: cython.double = 0.0
         for k in range(3):
-            off: cython.double = self.body.positions[v, k] - edge.end[k]
+            off: cython.double = x[k] - edge.end[k]
             out += off * edge.outward[k]
             side += off * edge.across[k]
-        near: cython.double = self.beside * self.body.reach[v]
         below: cython.double = out - edge.wall * sqrt(out * out + side * side)
-        if below > _LEVEL * self.body.reach[v]:
+        if below > _LEVEL * size:
             return False
         if not edge.has_before:
             return True
         side = side if edge.before[1] >= 0 else -side
         behind: cython.double = out * fabs(edge.before[1]) - side * edge.before[0]
-        return side <= near and behind >= -near * sqrt(
+        return side <= size and behind >= -size * sqrt(
             edge.before[0] * edge.before[0] + edge.before[1] * edge.before[1]
         )
