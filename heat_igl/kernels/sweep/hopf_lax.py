@@ -189,7 +189,8 @@ class HopfLax:
                     e: cython.double = self.update.V[kept[j], k] - self.update.V[kept[i], k]
                     at_a += one * self.update.slope[kept[i], k] * e
                     at_b += two * self.update.slope[kept[j], k] * e
-                gap: cython.double = fabs(two * two - one * one - at_a - at_b)
+                # Both are 0 where simplices are flat and slopes not known.
+                gap: cython.double = fabs(two * two - one * one - at_a - at_b) if at_a != 0.0 or at_b != 0.0 else 0.0
                 gap += (1.0 - self.weight[v]) * fabs(at_b - at_a - (two - one) * (two - one))
                 between: cython.double = self.update.mean[s, pair(self.update.side[i], self.update.side[j])]
                 own += self.place[v, i] * self.place[v, j] * min(gap, between)
