@@ -51,6 +51,7 @@ class HopfLax:
         self.changed = np.zeros(incident.shape[0], np.uint8)
         self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
+        self.doubt, self.own = np.zeros(n), np.zeros(n)
         update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
         update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
         self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
@@ -133,10 +134,11 @@ class HopfLax:
 
     def doubts(self, v):
         """By how much distances (k,) may be wrong: what `contradiction` finds adds up over what they come from."""
-        self.doubt, self.own = np.where(np.asarray(self.facet) < 0, 0.0, -1.0), np.zeros(len(self.d))
         is_early: cython.bint = False
         with cython.nogil:
             self.update.d = cython.address(self.d[0])
+            for at in range(self.n_reached):
+                self.doubt[self.order[at]] = 0.0 if self.facet[self.order[at]] < 0 else -1.0
             for at in range(self.n_reached):
                 is_early |= self.add_up(self.order[at])
             # Where metrics turn far, the order has cycles and precedes the last visits: 5 rounds find nearly all.
