@@ -224,7 +224,7 @@ def test_the_line_behind_an_edge_stays_inside():
         engine = LineEngine(MetricSimplices.in_space(mesh), is_halved=True)
         for source in range(0, mesh.n_vertices, 9):
             sources = source_set([source], mesh.n_vertices, mesh.F)
-            edges, way = engine._lower(np.array([source], np.int32), np.zeros(1), *engine._begun(sources))
+            edges, way = engine._solved(sources)[2]
             bent = np.flatnonzero((way >= 0) & (way[edges[way]] == -1).all(axis=1))
             ends = np.stack([np.full(len(bent), source), bent])
             A, B = mesh.V[edges[way[bent]].T]

@@ -4,15 +4,13 @@ cdef enum:
     MOST_SWEEPS = 30
 
 
-cdef inline bint rotate(double* work, int p, int q, double rest) noexcept nogil:
+cdef inline bint rotate(double* work, int p, int q) noexcept nogil:
     # One rotation of Jacobi's eigenvalue algorithm on the symmetric matrix in the first three rows of `work` (6, 3);
-    # the other three gather the eigenvectors. False if entry (p, q) is zero already, or at most `rest` of the two on the
-    # diagonal, and of their difference: then it changes them by the square of that.
+    # the other three gather the eigenvectors. False if entry (p, q) is zero already.
     cdef int x, r = 3 - p - q
     cdef double entry = work[3 * p + q]
-    cdef double one = fabs(work[4 * p]), two = fabs(work[4 * q])
     cdef double half, tangent, cosine, sine, along, across
-    if fabs(entry) <= 1e-17 * (one + two) or fabs(entry) <= rest * min(one, two, fabs(work[4 * p] - work[4 * q])):
+    if fabs(entry) <= 1e-17 * (fabs(work[4 * p]) + fabs(work[4 * q])):
         return False
     half = 0.5 * (work[4 * q] - work[4 * p]) / entry
     across = sqrt(half * half + 1.0)
@@ -35,9 +33,9 @@ cdef inline bint rotate(double* work, int p, int q, double rest) noexcept nogil:
     return True
 
 
-cdef inline void diagonalize(double* work, double rest = 0.0, int n = 1) noexcept nogil:
+cdef inline void diagonalize(double* work, int n = 1) noexcept nogil:
     # Eigenvalues in the diagonal of the matrix in the first three rows of `work` (6, 3), eigenvectors in the others.
-    # Beside the diagonal a `rest` may stay. Of n matrices (n, 6, 3) in turn: each waits long for its roots and quotients.
+    # Of n matrices (n, 6, 3) in turn: each waits long for its roots and quotients.
     cdef int i, k, p, q
     cdef bint is_turned
     for i in range(n):
@@ -48,6 +46,6 @@ cdef inline void diagonalize(double* work, double rest = 0.0, int n = 1) noexcep
         for k in range(3):
             p, q = k // 2, 1 + (k + 1) // 2
             for i in range(n):
-                is_turned |= rotate(work + 18 * i, p, q, rest)
+                is_turned |= rotate(work + 18 * i, p, q)
         if not is_turned:
             break

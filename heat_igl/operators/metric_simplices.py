@@ -91,6 +91,7 @@ class MetricSimplices:
         group = np.arange(len(corners), dtype=np.int32) if group is None else group
         incident = incidence.corners_by_vertex(corners, mesh.n_vertices)
         at_vertex, share = fits_around(corners, mesh.V - mesh.V.mean(axis=0), velocity, group, *incident)
+        del incident
         if not (share > _ROUNDING).any():
             g = np.linalg.matrix_power(symmetric(velocity), -2) if g is None else g
             return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3)
@@ -101,9 +102,7 @@ class MetricSimplices:
         axes = plane_axes(mesh) if p == 2 else np.empty((0, 2, 3))
         velocity, rows, _ = velocities_at_corners(corners, at_vertex, velocity, group, share, axes, False)
         least = min(least, float(1 / largest.max()))
-        made = cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows)
-        vars(made)["incident"] = incident
-        return made
+        return cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows)
 
     @classmethod
     def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
@@ -114,12 +113,6 @@ class MetricSimplices:
         products = np.stack([c, (b + c - a) / 2, (b + c - a) / 2, b], axis=1).reshape(-1, 2, 2)
         tensors = across @ products @ np.swapaxes(across, 1, 2)
         return cls(F, len(V), V, least, sides[:, ::-1], tensors, np.arange(len(F)))
-
-    @cached_property
-    def incident(self) -> tuple[AnyArray, AnyArray]:
-        """The corners at each vertex, as `corners_by_vertex` returns them."""
-        found: Any = incidence.corners_by_vertex(np.ascontiguousarray(self.corners, np.int32), self.n)
-        return found[0], found[1]
 
     @cached_property
     def measured(self) -> tuple[Any, ...]:

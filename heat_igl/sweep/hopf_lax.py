@@ -32,9 +32,7 @@ class HopfLaxEngine(SimplexEngine):
         threads: int = 1,  # noqa: ARG002
     ) -> tuple[FloatArray, IntArray, str | None]:
         """What `labelled` returns, and how it shows that the mesh does not resolve the metric, if it does."""
-        distance, label = self._begun(sources)
-        doubt = self._lower(sources.vertices.astype(np.int32), sources.vertex_offset, distance, label)
-        self._keep_bounds(sources, distance, label)
+        distance, label, doubt = self._solved(sources)
         far = distance - sources.vertex_offset[label]
         away = np.flatnonzero(np.isfinite(distance) & (far > 0))
         wrong, complaint = 100 * np.append(doubt[away] / far[away], 0.0), None
@@ -86,9 +84,7 @@ class HopfLaxEngine(SimplexEngine):
 
     def derivative(self, sources: SourceSet) -> FixedPointDerivative:
         """The distance from source vertices with its derivative."""
-        distance, label = self._begun(sources)
         fronts: list[tuple[AnyArray, ...]] = []
-        self._lower(sources.vertices.astype(np.int32), sources.vertex_offset, distance, label, fronts)
-        self._keep_bounds(sources, distance, label)
+        distance = self._solved(sources, fronts)[0]
         record = (np.concatenate(part) for part in zip(*fronts, strict=True))
         return FixedPointDerivative(self._simplices, sources, distance, *record)

@@ -125,13 +125,10 @@ class LineEngine(SimplexEngine):
 
     def _differentiated(self, sources: SourceSet) -> tuple[FloatArray, IntArray, FloatArray, sp.csr_array]:
         """Distances and source vertices (n,) by number, lengths of ways (n,), and their slopes (n, 3 n)."""
-        distance, label = self._begun(sources)
-        vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
-        edges, way = self._lower(vertices, offset, distance, label)
-        self._keep_bounds(sources, distance, label)
-        ends = np.where(label >= 0, vertices[label], np.arange(len(label)))
+        distance, label, (edges, way) = self._solved(sources)
+        ends = np.where(label >= 0, sources.vertices[label], np.arange(len(label)))
         length, slopes = line_slopes(self._V, ends, edges, way, distance)
-        length += np.append(offset, 0)[label]
+        length += np.append(sources.vertex_offset, 0)[label]
         if self._finer is not None:
             n = len(distance)
             found, other, finer_length, finer_slopes = self._finer._differentiated(sources)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from heat_igl.kernels.mesh import incidence
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine
@@ -29,10 +30,10 @@ class SimplexEngine(Engine):
     def __init__(self, simplices: MetricSimplices) -> None:
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
-        self._first, self._incident = simplices.incident
+        self._first, self._incident = incidence.corners_by_vertex(self._corners, simplices.n)
 
     @abstractmethod
-    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> object:
+    def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:
         """Lower distance (n,), which begins with the offsets of the vertices and ``inf``; label (n,) counts these."""
 
     @abstractmethod
@@ -41,24 +42,22 @@ class SimplexEngine(Engine):
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:  # noqa: ARG002
         """Distance (n,), and the source (n,) that it is measured from."""
-        distance, label = self._begun(sources)
-        vertices, offset = sources.vertices.astype(np.int32), sources.vertex_offset
-        self._lower(vertices, offset, distance, label)
-        self._keep_bounds(sources, distance, label)
+        distance, label, _ = self._solved(sources)
         return distance, np.concatenate([sources.vertex_label, [-1]])[label]
 
-    def _begun(self, sources: SourceSet) -> tuple[FloatArray, AnyArray]:
-        """Distance (n,), ``inf`` but at the sources, and the number (n,) of the source there, else -1."""
+    def _solved(self, sources: SourceSet, *more: Any) -> tuple[FloatArray, AnyArray, Any]:
+        """Distance (n,), the number (n,) of the source vertex of each, -1 for none, and what `_lower` returns.
+
+        No path is shorter than a straight line, or longer than along edges.
+        """
         distance, label = np.full(self._simplices.n, np.inf), np.full(self._simplices.n, -1, np.int32)
         distance[sources.vertices], label[sources.vertices] = sources.vertex_offset, np.arange(len(sources.vertices))
-        return distance, label
-
-    def _keep_bounds(self, sources: SourceSet, distance: FloatArray, label: AnyArray) -> None:
-        """Raise distance to what no path is shorter than, the straight line; lower it to paths along edges."""
+        found = self._lower(sources.vertices.astype(np.int32), sources.vertex_offset, distance, label, *more)
         # In place of a value that is no number, a path along edges is found.
         distance[np.isnan(distance)] = np.inf
         raise_to_lines(distance, self._simplices.least * self._simplices.place, None, sources)
         self._along_edges(distance, label)
+        return distance, label, found
 
     @abstractmethod
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:

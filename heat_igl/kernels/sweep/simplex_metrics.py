@@ -19,8 +19,6 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 # The variance of velocities, and differences between those at one vertex, as a share of them, that are rounding.
 _ROUNDING = cython.declare(cython.double, 1e-9)
 _SAME = cython.declare(cython.double, 1e-14)
-# What eigenvalues leave beside the diagonal, as a share: its square is rounding, and a root takes it to first order.
-_REST = cython.declare(cython.double, 1e-8)
 
 # How often each entry on and above the diagonal occurs in a symmetric matrix.
 _OFTEN = cython.declare(cython.double[6], [1.0, 2.0, 2.0, 1.0, 2.0, 1.0])
@@ -162,7 +160,7 @@ def velocities_at_corners(
                 for k in range(9 if is_metric else 0):
                     work[18 * i + k] = W[entry(k // 3, k % 3)]
             if is_metric:
-                diagonalize(work, _REST, n)
+                diagonalize(work, n)
             for i in range(n):
                 s = begin + i // size
                 v: cython.int = corners[s, i % size]
@@ -191,18 +189,11 @@ def velocities_at_corners(
 @cython.nogil
 def _root(work: cython.p_double, p: cython.int, W: cython.p_double, extremes: cython.p_double) -> cython.void:
     """The inverse root, with absolute eigenvalues, of what `diagonalize` did; it has p eigenvalues."""
-    r: cython.double[3]
+    W[1] = W[2] = W[4] = 0.0
     for k in range(3):
-        r[k] = sqrt(max(fabs(work[4 * k]), DBL_MIN))
-        W[entry(k, k)] = 1.0 / r[k]
+        W[entry(k, k)] = 1.0 / sqrt(max(fabs(work[4 * k]), DBL_MIN))
         if k < p:
             extremes[0], extremes[1] = min(extremes[0], work[4 * k]), max(extremes[1], work[4 * k])
-    for i in range(3):
-        for j in range(i):
-            # To first order in what is left beside the diagonal.
-            W[entry(i, j)] = work[3 * i + j]
-            if work[3 * i + j] != 0.0:
-                W[entry(i, j)] /= -r[i] * r[j] * (r[i] + r[j])
     _turn(W, work + 9, 3, 1)
 
 
