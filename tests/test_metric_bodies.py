@@ -254,7 +254,7 @@ def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
     large = shapes.box(8)
     x, y = np.cos(2 * large.V[:, 2]), np.sin(2 * large.V[:, 2])
     domain = metric_operators(large, fibre_metric(np.stack([x, y, 0 * x], axis=1), 1.0, 15.0))
-    with pytest.warns(AccuracyWarning, match="by 35 % at vertex 362"):
+    with pytest.warns(AccuracyWarning, match="slopes contradict distances"):
         found = GeodesicSolver(domain).distance(333)
     assert np.delete(found, 333)[361] > 1.3 * halved_twice(large, domain, 333)[361]
     solver(*twisted_disk(24, 6.0)[::2]).distance(0)
@@ -288,10 +288,7 @@ def random_metric(m: int, rng: np.random.Generator, most: float) -> FloatArray:
 @pytest.mark.filterwarnings("ignore:the metric changes farther")
 @pytest.mark.parametrize(("p", "most"), [(2, 1.0), (2, 3.0), (3, 1e-8), (3, 0.1), (3, 1.0), (3, 3.0), (3, 6.0)])
 def test_no_distance_contradicts_lines_or_edges(p, most):
-    """Nor does it depend on the numbers of vertices, or on the order of corners.
-
-    Where lengths in bodies differ 20 times, there are several fixed points, and rounding decides between them.
-    """
+    """Nor does it depend on numbers, unless lengths in bodies differ 20 times, where rounding may decide."""
     rng = np.random.default_rng(int(10 * most))
     mesh = tetrahedra(rng.random((300, 3))) if p == 3 else flat_perturbed(shapes.grid(16), 0.25)
     g = random_metric(mesh.n_faces, rng, most)

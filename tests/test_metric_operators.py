@@ -151,12 +151,10 @@ def test_smooth_fibres_on_triangles_that_are_thin_in_the_metric():
 
     def fibres(mesh):
         angle = np.pi / 4 + 0.1 * (mesh.V[:, 0] + mesh.V[:, 1] ** 2)
-        return metric_operators(
-            mesh, fibre_metric(np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), 1.0, 10.0)
-        )
+        along = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+        return metric_operators(mesh, fibre_metric(along, 1.0, 10.0))
 
     coarse = fibres(shapes.grid(4))
     fine = distance(fibres(shapes.grid(4).halved().halved().halved()), method="auto")[: coarse.n]
-    assert coarse.n == 25
     assert distance(coarse, method="auto") == pytest.approx(fine, rel=0.01)
     assert coarse.M.sum() == pytest.approx(10, rel=0.05)  # the area

@@ -196,11 +196,6 @@ def method(request):
     return request.param
 
 
-def plane(n: int, amount: float = 0.2) -> Mesh:
-    """The unit square, its vertices moved within it."""
-    return flat_perturbed(shapes.grid(n), amount)
-
-
 @pytest.mark.parametrize("name", ["cow", pytest.param("bunny", marks=pytest.mark.slow)])
 def test_a_point_in_a_face_is_as_good_a_source_as_a_vertex(name, method, request):
     """As a vertex in the same place, against the exact distance: the corners straight, the rest no worse."""
@@ -237,7 +232,7 @@ def test_a_line_across_the_square(method, amount):
     """Distance is the coordinate across, on both sides; the error falls with the size of the faces."""
     errors = []
     for n in (15, 30, 60):
-        mesh = plane(n, amount)
+        mesh = flat_perturbed(shapes.grid(n), amount)
         line = curve_on(mesh, [[0.37, 0, 0], [0.37, 1, 0]])
         distance = SolverChoice(method).on(mesh).distance(line)
         errors.append(np.abs(distance - np.abs(mesh.V[:, 0] - 0.37)).mean())
@@ -264,7 +259,7 @@ def test_a_circle_around_the_sphere(method):
 
 
 def test_edges_as_sources_are_nearer_than_their_ends():
-    mesh = plane(16)
+    mesh = flat_perturbed(shapes.grid(16), 0.2)
     path = [nearest_vertex(mesh, [x, 0.5, 0]) for x in np.linspace(0, 1, 17)]
     curve = edge_curve(mesh, path)
     solver = HeatMethodSolver(mesh)
@@ -281,7 +276,7 @@ def test_edges_as_sources_are_nearer_than_their_ends():
 
 def test_offsets_move_the_border_of_two_cells(method):
     """The exact additively weighted Voronoi edge of the plane, a hyperbola, within one edge length."""
-    for mesh in (shapes.grid(40), plane(40)):
+    for mesh in (shapes.grid(40), flat_perturbed(shapes.grid(40), 0.2)):
         solver = SolverChoice(method).on(mesh)
         sources = [nearest_vertex(mesh, [0.25, 0.4, 0]), nearest_vertex(mesh, [0.75, 0.6, 0])]
         each = np.linalg.norm(mesh.V[:, None] - mesh.V[sources], axis=2) + np.array([0, 0.2])
@@ -295,7 +290,7 @@ def test_offsets_move_the_border_of_two_cells(method):
 
 def test_a_vertex_beside_a_point(method):
     """Straight lines from the point end where the vertex is nearer."""
-    mesh = plane(20)
+    mesh = flat_perturbed(shapes.grid(20), 0.2)
     vertex = nearest_vertex(mesh, [0.6, 0.5, 0])
     at = mesh.V[vertex] - [0.17, 0.03, 0]
     distance = SolverChoice(method).on(mesh).distance([closest_points(mesh, at).points, vertex])
@@ -319,7 +314,7 @@ def test_every_vertex_of_a_side_with_an_offset(method, slope):
 
 
 def test_labels_of_several_kinds(method):
-    mesh = plane(30)
+    mesh = flat_perturbed(shapes.grid(30), 0.2)
     line = curve_on(mesh, [[0.9, 0, 0], [0.9, 1, 0]])
     points = closest_points(mesh, [[0.1, 0.2, 0], [0.4, 0.8, 0]]).points
     mask = np.zeros(mesh.n_vertices, bool)
@@ -338,7 +333,7 @@ def test_labels_of_several_kinds(method):
 
 
 def test_solution_of_a_point_holds_the_three_steps():
-    mesh = plane(16)
+    mesh = flat_perturbed(shapes.grid(16), 0.2)
     solver = HeatMethodSolver(mesh)
     point = SurfacePoints([77], [[0.2, 0.3, 0.5]])
     solution = solver.solve(point)
@@ -352,7 +347,7 @@ def test_solution_of_a_point_holds_the_three_steps():
 
 def test_the_dirac_of_a_curve_is_its_length():
     """The integral of hat functions along it: as much heat as length, with the curve's centre of mass."""
-    sheared = plane(16).V @ np.array([[1, 0, 0], [1.7, 1, 0], [0, 0, 1]])
+    sheared = flat_perturbed(shapes.grid(16), 0.2).V @ np.array([[1, 0, 0], [1.7, 1, 0], [0, 0, 1]])
     mesh = Mesh(sheared, shapes.grid(16).F)
     curve = curve_on(mesh, [[0.6, 0.2, 0], [1.0, 0.25, 0], [1.9, 0.8, 0]])
     solver = HeatMethodSolver(mesh)

@@ -87,7 +87,7 @@ def test_where_heat_has_no_digits_a_face_is_named():
     with pytest.raises(FactorizationError, match=r"nan at vertex 1; .* F\[\d+\] = .* laplacian at 'auto'"):
         HeatMethodSolver(Mesh(ball.V * [1e12, 1, 1], ball.F), laplacian="cotan").distance(0)
     P = np.random.default_rng(10).standard_normal((10, 3))
-    with pytest.raises(FactorizationError, match=r"; the thinnest face is F\[13\] = \[7, 0, 5\]: repair it"):
+    with pytest.raises(FactorizationError, match=r"; the thinnest face is F\[\d+\] = .*: repair it"):
         heat_igl.VectorHeatSolver(Mesh(P * [0.1, 1e-3, 1], delaunay(P[:, :2])))
 
 
