@@ -11,7 +11,8 @@ from heat_igl.plan import MOST_DOUBT, MOST_DOUBT_AT_WORST
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray
+from heat_igl.windows.engine import Answer
 
 _GOLDEN = 0.618033988749895  # multiples of it, modulo 1, are spread evenly
 
@@ -25,12 +26,7 @@ class HopfLaxEngine(SimplexEngine):
         Triangles or tetrahedra with `tensors`; `heat_igl.kernels.sweep.hopf_lax` describes the scheme.
     """
 
-    def answer(
-        self,
-        sources: SourceSet,
-        cutoff: float = np.inf,  # noqa: ARG002
-        threads: int = 1,  # noqa: ARG002
-    ) -> tuple[FloatArray, IntArray, str | None]:
+    def answer(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> Answer:  # noqa: ARG002
         """What `labelled` returns, and how it shows that the mesh does not resolve the metric, if it does."""
         distance, label, doubt = self._solved(sources)
         far = distance - sources.vertex_offset[label]

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from heat_igl.operators import Operators, Surface
     from heat_igl.windows.directions import PathAngles, PathDirections
 
+Answer = tuple[FloatArray, IntArray, str | None]
+
 
 class Engine(ABC):
     """Distance from sets of sources, without heat."""
@@ -41,9 +43,7 @@ class Engine(ABC):
         found[found >= than] = np.inf
         return found
 
-    def answer(
-        self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1
-    ) -> tuple[FloatArray, IntArray, str | None]:
+    def answer(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> Answer:
         """What `labelled` returns, and the text of a warning about the distance, if one is due."""
         return *self.labelled(sources, cutoff, threads), None
 
