@@ -309,30 +309,26 @@ class _Bends(Ray):
             away += off * off
             along += off * edge.tangent[k]
         squared: cython.double = max(away - along * along, 0.0)
+        height: cython.double = sqrt(squared)
+        both: cython.double = height + edge.height
+        place: cython.double = edge.along * height + along * edge.height
         best: cython.double = INFINITY
-        place: cython.double = 0.0
-        both: cython.double = 1.0
-        if edge.fits:
-            height: cython.double = sqrt(squared)
-            both = height + edge.height
-            place = edge.along * height + along * edge.height
-            if 0 < place < both * edge.length:
-                best = edge.start + sqrt((along - edge.along) * (along - edge.along) + both * both)
-        if best == INFINITY:
+        if edge.fits and 0 < place < both * edge.length:
+            best = edge.start + sqrt((along - edge.along) * (along - edge.along) + both * both)
+        else:
             both = 1.0
             for j in range(5):
                 if edge.fits and 0 < j < 4:
                     continue
                 begin: cython.double = 0.25 * j * edge.length
-                part: cython.double = 0.0
                 through: cython.double = edge.at[j]
                 if not edge.fits and j < 4:
-                    part = max(0.0, min(along - edge.lean[j] * sqrt(squared) - begin, 0.25 * edge.length))
-                    through += edge.slope[j] * part
-                off = along - begin - part
-                through += sqrt(squared + off * off)
+                    off = max(0.0, min(along - edge.lean[j] * height - begin, 0.25 * edge.length))
+                    through += edge.slope[j] * off
+                    begin += off
+                through += sqrt(squared + (along - begin) * (along - begin))
                 if through < best:
-                    best, place = through, begin + part
+                    best, place = through, begin
         if is_placed:
             self.share = place / (both * edge.length)
             for k in range(3):
