@@ -72,8 +72,8 @@ def bend_around(
     The edges (e, 2) int32 are those of the `body` around which ways bend. `outward` (e, 3) is the direction out of the
     body at each, halfway between the two walls, zero where more than two meet, and `wall` (e,) the cosine of the angle
     between that direction and the walls. `way` (n,) int32 is the edge around which the way to each vertex bends last,
-     -1 on straight ways, -2 where it is not known. The other arguments are those of
-    `sight.look_around`; `d`, `label` and `way` are changed.
+    -1 on straight ways, -2 where it is not known. The other arguments are those of `sight.look_around`; `d`, `label`
+    and `way` are changed.
     """
     n, e = body.positions.shape[0], edges.shape[0]
     ends = np.asarray(body.positions)[np.asarray(edges)]
@@ -286,7 +286,7 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def add(self, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double) -> cython.void:
-        """Make an edge a candidate for the `point` x, if the way around it is shorter and may bend there."""
+        """Make an edge one of 256 candidates for the `point` x if the way around it is shorter and may bend there."""
         if self.point_of[i] != self.point and self.fit_of[i] & _MOST_FITS:
             self.point_of[i] = self.point
             value: cython.double = self.around(i, x, False)
