@@ -12,6 +12,7 @@ from heat_igl.errors import AccuracyWarning, SourceError
 from heat_igl.mesh.rasters import image_domain
 from heat_igl.operators import MetricSimplices, Operators, fibre_metric, metric_operators, speed_operators
 from heat_igl.operators.metric_simplices import inverse_root, symmetric
+from heat_igl.sampling import farthest_points
 from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine
 from heat_igl.typing import FloatArray
@@ -248,7 +249,8 @@ def test_a_metric_that_the_mesh_does_not_resolve_gives_a_warning():
     box, g, exact = growing_speed(3, 100.0)
     assert solver(box, g).distance(0) == pytest.approx(exact, rel=0.03)
     fibres = fibre_metric(np.random.default_rng(0).standard_normal((box.n_faces, 3)), 1.0, 10.0)
-    for ask in (GeodesicSolver.distances, GeodesicSolver.voronoi, GeodesicSolver.distance_vjp):
+    sampled = lambda found, sources: farthest_points(found, 2, start=sources)  # noqa: E731
+    for ask in (GeodesicSolver.distances, GeodesicSolver.voronoi, GeodesicSolver.distance_vjp, sampled):
         with pytest.warns(AccuracyWarning, match="slopes contradict distances"):
             ask(solver(box, fibres), [0])
     large = shapes.box(8)

@@ -296,6 +296,8 @@ class GeodesicSolver(BatchedSolver):
 
     def _nearer(self, vertex: int, than: FloatArray) -> FloatArray:
         """Distance (n,) from a vertex where it is smaller than `than` (n,), the distance from others; else ``inf``."""
+        if not isinstance(self._engine, GuardedEngine):
+            return self.distance(vertex, cutoff=float(than.max()))
         return np.asarray(self._with_copies(self._engine.nearer(self._source_set(vertex), than, n_threads())))
 
     @names_guessed

@@ -37,12 +37,6 @@ class Engine(ABC):
         """The distance of `labelled` alone."""
         return self.labelled(sources, cutoff, threads)[0]
 
-    def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
-        """Distance (n,) where it is smaller than `than` (n,), the distance from other sources; else ``inf``."""
-        found = self.distance(sources, float(than.max()), threads)
-        found[found >= than] = np.inf
-        return found
-
     def answer(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> Answer:
         """What `labelled` returns, and the text of a warning about the distance, if one is due."""
         return *self.labelled(sources, cutoff, threads), None
@@ -220,7 +214,7 @@ class WindowEngine(TriangleEngine):
         return query.with_begin(self._surface(query.sources).distance(query.sources, query.cutoff(cutoff), threads))
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
-        """Distance (n,) where it is smaller than `than`, see `Engine`; the search ends where it is not."""
+        """Distance (n,) where it is smaller than `than` (n,), the distance from others, else ``inf``: it ends there."""
         return self._surface(sources).distance(sources, float(than.max()), threads, than)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:

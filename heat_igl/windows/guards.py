@@ -189,11 +189,12 @@ class GuardedEngine(Engine):
         return found if problem is None else self._replacement(problem, sources, cutoff, threads)[0]
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
-        """Distance (n,) where it is smaller than `than`, see `Engine`."""
+        """Distance (n,) where it is smaller than `than`, see `WindowEngine`."""
         found = self.windows.nearer(sources, than, threads)
-        if self._invariants.contradiction(found, sources, np.inf, than) is None:
-            return found
-        return super().nearer(sources, than, threads)
+        if self._invariants.contradiction(found, sources, np.inf, than) is not None:
+            found = self.distance(sources, float(than.max()), threads)
+            found[found >= than] = np.inf
+        return found
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,) and nearest source (n,)."""
