@@ -36,7 +36,6 @@ from heat_igl.validation import closed_forms
 from heat_igl.validation.construction import hull
 
 from harness import METHODS, Method, Row, Table, collected, drawn, errors, ours, parsed, publish, seconds
-from harness import subdivided as finer
 
 SIZES = [10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000]
 BATCH, LATER = 64, 5
@@ -134,7 +133,7 @@ def by_size(sizes: Sequence[int], paths: Sequence[Path], rng: np.random.Generato
         while mesh.n_vertices < 1.25 * max(sizes):
             if any(0.8 < mesh.n_vertices / n < 1.25 for n in sizes):
                 yield f"{path.stem} {mesh.n_vertices}", mesh, first
-            mesh = finer(mesh)
+            mesh = mesh.halved()
 
 
 def timings(options: Any, paths: Sequence[Path]) -> Iterator[Row]:
@@ -163,7 +162,7 @@ def huge(options: Any) -> Iterator[Row]:
     if options.meshes:
         mesh = first = read_mesh(options.meshes[0])
         while mesh.n_vertices < 0.8 * options.huge:
-            mesh = finer(mesh)
+            mesh = mesh.halved()
         truth = exact(first, 0)
     else:
         mesh = shapes.icosphere(max(0, round(np.log(options.huge / 10) / np.log(4))))

@@ -26,7 +26,7 @@ from heat_igl.cluster.worker import PROCESS_MEMORY, solver_memory
 from heat_igl.geodesic import DistanceMethod
 from heat_igl.runtime.memory import memory_field
 
-from harness import Row, Table, collected, parsed, publish, ratio, subdivided
+from harness import Row, Table, collected, parsed, publish, ratio
 
 SOURCES = 64
 METHODS: tuple[DistanceMethod, ...] = ("heat", "sweep", "windows")
@@ -109,7 +109,7 @@ def rates(count: int, real: Sequence[Path], repeats: int) -> tuple[Table, str]:
 def memory(real: Sequence[Path]) -> Iterator[Row]:
     """Peak memory of a worker beside the bound that the batch states: spheres, the first real mesh subdivided."""
     meshes = {f"sphere {size}": shapes.icosphere(size) for size in MEMORY_SIZES}
-    meshes |= {f"{path.stem}, subdivided": subdivided(read_mesh(path)) for path in real[:1]}
+    meshes |= {f"{path.stem}, subdivided": read_mesh(path).halved() for path in real[:1]}
     for name, mesh in meshes.items():
         for method in METHODS:
             with tempfile.TemporaryDirectory() as scratch, cluster.connected(n_workers=1) as client:

@@ -205,11 +205,6 @@ def on_sphere(n: int, rng: np.random.Generator) -> FloatArray:
     return np.asarray(P / np.linalg.norm(P, axis=1, keepdims=True))
 
 
-def subdivided(mesh: Mesh) -> Mesh:
-    """Four triangles for each of a manifold, on the same surface."""
-    return Mesh(*igl.upsample(mesh.V, mesh.F, 1))
-
-
 def drawn(mesh: Mesh, count: int, seed: int = 0) -> list[int]:
     """Different vertices of faces."""
     usable = np.unique(mesh.F)

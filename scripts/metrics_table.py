@@ -265,19 +265,19 @@ WALLS: dict[str, Callable[[Random], Mesh]] = {
 }
 
 
-def halved(mesh: Mesh) -> MetricSimplices:
-    """The simplices, halved twice, or once."""
-    simplices = MetricSimplices.in_space(mesh).halved()
-    return simplices.halved() if mesh.n_vertices <= MANY else simplices
+def finer(mesh: Mesh) -> Mesh:
+    """The mesh, halved twice, or once."""
+    fine = mesh.halved()
+    return fine.halved() if mesh.n_vertices <= MANY else fine
 
 
-def finer(mesh: Mesh) -> Query:
+def in_finer(mesh: Mesh) -> Query:
     """Distance at the vertices on tetrahedra that are halved."""
-    simplices = halved(mesh)
+    fine = finer(mesh)
     # Of two sources, each vertex first looks for the nearer in space: the other is far away, in no tetrahedron.
     far = mesh.V.max(axis=0) + 10 * np.ptp(mesh.V, axis=0)
-    solver = GeodesicSolver(Mesh(np.vstack([simplices.place, far]), simplices.corners))
-    return lambda i: solver.distance([i, simplices.n])[: mesh.n_vertices]
+    solver = GeodesicSolver(Mesh(np.vstack([fine.V, far]), fine.F))
+    return lambda i: solver.distance([i, fine.n_vertices])[: mesh.n_vertices]
 
 
 def in_walls(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
@@ -291,7 +291,7 @@ def in_walls(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         found = [(ours(i), heat(i))[0] for i in sources]  # the first prepares
         took = [[seconds(lambda i=i, q=q: q(i), time.process_time) for q in (ours, heat)] for i in 5 * sources]
         ratio = np.median([one / other for one, other in took])
-        truth = finer(mesh)
+        truth = in_finer(mesh)
         error = np.concatenate([excess(d, truth(i)) for i, d in zip(sources, found, strict=True)])
         row |= {"mean": np.abs(error).mean(), "longer": max(error.max(), 0), "shorter": max(-error.min(), 0)}
         row |= {"ms": 1e3 * np.median(took, axis=0)[0], "ratio": ratio}
@@ -587,9 +587,9 @@ def on_smooth(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         row: Row = {"body": name, "n": mesh.n_vertices, "m": mesh.n_faces}
         asked = {"fim": (by_fim, centres), "face": (default, centres), "vertex": (default, metric(mesh.V))}
         row |= {method: timed(exact(source), query, mesh, g, source) for method, (query, g) in asked.items()}
-        finer = mesh.halved()
-        on_finer = lambda *of, n=mesh.n_vertices: default(*of)[:n]  # noqa: E731
-        halved = timed(exact(source), on_finer, finer, metric(finer.V), source)
+        fine = mesh.halved()
+        at_given = lambda *of, n=mesh.n_vertices: default(*of)[:n]  # noqa: E731
+        halved = timed(exact(source), at_given, fine, metric(fine.V), source)
         row["halved"] = {key: halved[key] / row["vertex"][key] for key in halved}
         yield row | {m: row[m] | {"s": row[m]["s"] / row["fim"]["s"]} for m in ("fim", "face", "vertex")}
 
@@ -634,8 +634,8 @@ def choices(options: argparse.Namespace, rng: Random) -> Iterator[Field]:
 
 def on_finer(mesh: Mesh, metric: Callable[[FloatArray], FloatArray]) -> Query:
     """Distance at the vertices on halved simplices, whose vertices have metrics of their own."""
-    simplices = halved(mesh)
-    solver = GeodesicSolver(metric_operators(Mesh(simplices.place, simplices.corners), metric(simplices.place)))
+    fine = finer(mesh)
+    solver = GeodesicSolver(metric_operators(fine, metric(fine.V)))
     return lambda i: solver.distance(i)[: mesh.n_vertices]
 
 

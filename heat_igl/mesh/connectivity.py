@@ -119,10 +119,12 @@ def edges(F: IntArray, n: int) -> IntArray:
     return pairs[unique_rows(pairs, n)[0]]
 
 
-def edge_middles(corners: AnyArray) -> tuple[IntArray, IntArray]:
+def edge_middles(corners: AnyArray, n: int) -> tuple[IntArray, IntArray]:
     """The ends (e, 2) of each edge, and the edge of each side of the simplices."""
-    pairs = np.stack(np.tril_indices(corners.shape[1], -1), axis=1)
-    return np.unique(np.sort(corners[:, pairs].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    sides = np.stack(np.tril_indices(corners.shape[1], -1), axis=1)
+    pairs = np.sort(corners[:, sides].reshape(-1, 2).astype(np.int64), axis=1)
+    first, edge, _ = unique_rows(pairs, n)
+    return pairs[first], edge
 
 
 def facets(F: IntArray, n: int) -> Facets:

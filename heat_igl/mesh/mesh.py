@@ -201,7 +201,7 @@ class Mesh:
         >>> heat_igl.shapes.box(1).halved()
         Mesh(27 vertices, 48 tetrahedra)
         """
-        ends, middle = connectivity.edge_middles(self.F)
+        ends, middle = connectivity.edge_middles(self.F, self.n_vertices)
         corners = np.concatenate([self.F, self.n_vertices + middle.reshape(self.n_faces, -1)], axis=1)
         V = np.concatenate([self.V, self.V[ends].mean(axis=1)])
         finer = Mesh(V, np.concatenate([corners[:, part] for part in connectivity.PARTS[self.F.shape[1]]]))

@@ -160,7 +160,7 @@ class MetricSimplices:
         corners, size, velocity = self.corners, self.corners.shape[1], None
         lengths, group, rows = self.lengths, self.group, self.rows
         cut: Any = lambda x: np.concatenate([x.take(part, axis=1) for part in PARTS[size]])  # noqa: E731
-        ends, middle = edge_middles(corners)
+        ends, middle = edge_middles(corners, self.n)
         place = np.concatenate([self.place, self.place[ends].mean(axis=1)])
         corners = cut(np.concatenate([corners, self.n + middle.reshape(len(corners), -1)], axis=1))
         lengths = None if lengths is None else np.tile(lengths / 2, (len(PARTS[size]), 1))
@@ -174,7 +174,7 @@ class MetricSimplices:
 
     def halfway(self) -> sp.csr_array:
         """The weights (n + e, n) of the vertices in those of `halved`."""
-        ends, _ = edge_middles(self.corners)
+        ends, _ = edge_middles(self.corners, self.n)
         e, column = len(ends), np.concatenate([np.arange(self.n), ends.ravel()])
         row = np.concatenate([np.arange(self.n), self.n + np.repeat(np.arange(e), 2)])
         return sp.csr_array((np.repeat([1, 0.5], [self.n, 2 * e]), (row, column)), shape=(self.n + e, self.n))

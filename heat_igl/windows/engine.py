@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from heat_igl.operators import Operators, Surface
     from heat_igl.windows.directions import PathAngles, PathDirections
 
+# Distance (n,), nearest source (n,), and a complaint about them.
 Answer = tuple[FloatArray, IntArray, str | None]
 
 
