@@ -1,43 +1,50 @@
-"""Edges of triangles and connected components, by counting instead of comparing."""
+"""Distinct rows, corners by vertex and connected components, by counting instead of comparing."""
 
 import cython
 import numpy as np
 
 
-def edges_of_triangles(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
-    """The distinct edges of triangles F (m, 3) on n vertices, in lexicographic order.
+def unique_rows(columns: cython.const[cython.int][:, ::1], n: cython.Py_ssize_t):
+    """Distinct rows (r, d) of integers in ``range(n)``: the first copy (k,) of each, the inverse (r,) and counts (k,).
 
-    Returns the ends (k, 2) of each edge, ascending; the edge (m, 3) opposite each corner; and the number (k,) of sides
-    of triangles at each edge.
+    ``rows == rows[first][inverse]``, and rows are in lexicographic order. Linear time, with a temporary array of n
+    integers.
     """
-    size: cython.Py_ssize_t = 3 * F.shape[0]
-    by_upper, by_both, number = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size, np.int64)
-    order: cython.longlong[::1] = by_upper
-    sorted_sides: cython.longlong[::1] = by_both
-    edge: cython.longlong[::1] = number
-    place: cython.longlong[::1] = np.empty(n + 1, np.int64)
-    k: cython.longlong = -1
-    lower: cython.longlong = -1
-    upper: cython.longlong = -1
+    size: cython.Py_ssize_t = columns.shape[1]
+    ascending, sorted_once, inverses = (
+        np.arange(size, dtype=np.int32),
+        np.empty(size, np.int32),
+        np.empty(size, np.int64),
+    )
+    order: cython.int[::1] = ascending
+    spare: cython.int[::1] = sorted_once
+    inverse: cython.longlong[::1] = inverses
+    place: cython.int[::1] = np.empty(n + 1, np.int32)
+    k: cython.int = 0
+    column: cython.Py_ssize_t
     with cython.nogil:
+        # By the last column first: rows that are equal there stay in order.
+        for column in range(columns.shape[0] - 1, -1, -1):
+            place[:] = 0
+            for i in range(size):
+                place[columns[column, i] + 1] += 1
+            for v in range(n):
+                place[v + 1] += place[v]
+            for i in range(size):
+                v = columns[column, order[i]]
+                spare[place[v]] = order[i]
+                place[v] += 1
+            order[:] = spare
         for i in range(size):
-            sorted_sides[i] = i
-        _by_end(F, sorted_sides, order, place, False)
-        _by_end(F, order, sorted_sides, place, True)
-        for i in range(size):
-            h: cython.longlong = sorted_sides[i]
-            if _end(F, h, True) != lower or _end(F, h, False) != upper:
+            is_new: cython.bint = i == 0
+            for column in range(columns.shape[0]):
+                is_new = is_new or columns[column, order[i]] != columns[column, order[i - 1]]
+            if is_new:
+                spare[k] = i
                 k += 1
-                lower, upper = _end(F, h, True), _end(F, h, False)
-            edge[h] = k
-    ends, counts = np.empty((k + 1, 2), np.int64), np.zeros(k + 1, np.int64)
-    vertices: cython.longlong[:, ::1] = ends
-    n_faces: cython.longlong[::1] = counts
-    with cython.nogil:
-        for i in range(size):
-            vertices[edge[i], 0], vertices[edge[i], 1] = _end(F, i, True), _end(F, i, False)
-            n_faces[edge[i]] += 1
-    return ends, number.reshape(-1, 3), counts
+            inverse[order[i]] = k - 1
+    start = sorted_once[:k].astype(np.int64)
+    return ascending[start].astype(np.int64), inverses, np.diff(start, append=size)
 
 
 def corners_by_vertex(corners: cython.const[cython.int][:, ::1], n: cython.Py_ssize_t):
@@ -56,41 +63,6 @@ def corners_by_vertex(corners: cython.const[cython.int][:, ::1], n: cython.Py_ss
             incident[place[corners[i // size, i % size] + 1]] = i
             place[corners[i // size, i % size] + 1] += 1
     return begins[:-1], found
-
-
-@cython.cfunc
-@cython.inline
-@cython.nogil
-def _end(
-    F: cython.const[cython.longlong][:, ::1], half_edge: cython.longlong, is_lower: cython.bint
-) -> cython.longlong:
-    """The lower or the upper end of the side opposite a corner."""
-    f: cython.longlong = half_edge // 3
-    c: cython.longlong = half_edge - 3 * f
-    a: cython.longlong = F[f, 1 if c == 0 else 0]
-    b: cython.longlong = F[f, 1 if c == 2 else 2]
-    return min(a, b) if is_lower else max(a, b)
-
-
-@cython.cfunc
-@cython.nogil
-def _by_end(
-    F: cython.const[cython.longlong][:, ::1],
-    sides: cython.longlong[::1],
-    ordered: cython.longlong[::1],
-    place: cython.longlong[::1],
-    is_lower: cython.bint,
-) -> cython.void:
-    """Sort sides by one of their ends; those with the same end stay in order. `place` (n + 1,) is working space."""
-    place[:] = 0
-    for i in range(sides.shape[0]):
-        place[_end(F, sides[i], is_lower) + 1] += 1
-    for i in range(place.shape[0] - 1):
-        place[i + 1] += place[i]
-    for i in range(sides.shape[0]):
-        v: cython.longlong = _end(F, sides[i], is_lower)
-        ordered[place[v]] = sides[i]
-        place[v] += 1
 
 
 def components(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
