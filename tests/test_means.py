@@ -88,6 +88,14 @@ def test_means_divide_a_shortest_path_and_are_no_worse_than_a_vertex(kind, seed,
     assert (found**2).sum() <= (1 + 1e-9) * (rows**2).sum(axis=0).min()
 
 
+def test_a_median_at_a_point_is_no_worse_than_a_vertex():
+    """The best of the points is better than all places beside it, but on the other side of the torus one is better."""
+    mesh = shapes.torus(16, 10)
+    points = np.random.default_rng(77).choice(mesh.n_vertices, 4, replace=False)
+    least = heat_igl.GeodesicSolver(mesh).distances(points.tolist()).sum(axis=0).min()
+    assert geodesic_distance(mesh, karcher_mean(mesh, points, p=1))[points].sum() <= (1 + 1e-9) * least
+
+
 def test_single_points_are_their_means(sphere):
     point = SurfacePoints([7], [[0.2, 0.3, 0.5]])
     found = karcher_mean(sphere, point)

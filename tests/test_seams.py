@@ -66,6 +66,29 @@ def test_a_split_model_is_measured_as_one(torn):
     assert path.length == pytest.approx(truth, rel=1e-12)
 
 
+def test_copies_are_neighbours_and_are_smoothed_cut_and_stored(torn, tmp_path):
+    whole, joined, was = torn
+    everyone = heat_igl.GeodesicSolver(whole).distances(was)[:, was]
+    indices, distances = heat_igl.nearest_vertices(joined, 9)
+    np.testing.assert_allclose(distances, np.sort(everyone, axis=1)[:, :9], atol=1e-12)
+    np.testing.assert_allclose(np.take_along_axis(everyone, indices, axis=1), distances, atol=1e-12)
+    assert indices[:, 0].tolist() == list(range(len(was)))
+    assert len(np.unique(np.arange(len(was))[:, None] * len(was) + indices)) == indices.size
+
+    values = np.random.default_rng(0).normal(size=whole.n_vertices)
+    smoothed = heat_igl.smooth(whole, values, 0.8)[was]
+    np.testing.assert_allclose(heat_igl.smooth(joined, values[was], 0.8), smoothed, atol=1e-9)
+
+    pieces = heat_igl.cut(joined, heat_igl.isolines(joined, joined.V[:, 2], [0.05])).mesh
+    distance = heat_igl.geodesic_distance(pieces, len(was) - 1)[: len(was)]
+    np.testing.assert_allclose(distance, everyone[-1], atol=1e-12)
+
+    pytest.importorskip("zarr")
+    heat_igl.write_distances_within(tmp_path / "near.zarr", joined, 0.8)
+    stored = heat_igl.read_distances_within(tmp_path / "near.zarr")
+    np.testing.assert_allclose(stored.toarray(), np.where(everyone <= 0.8, everyone, 0), atol=1e-12)
+
+
 def test_heat_takes_a_split_model_as_one(torn):
     whole, joined, was = torn
     source = int(np.argmax(joined.originals != np.arange(len(was))))

@@ -35,6 +35,12 @@ def near(tmp_path_factory):
     return path
 
 
+def test_a_store_of_zeros_alone_can_be_read(tmp_path):
+    """zarr does not write chunks that hold the fill value alone."""
+    write_distances_within(tmp_path / "near.zarr", BALL, 1e-3)
+    assert (read_distances_within(tmp_path / "near.zarr").toarray() == 0).all()
+
+
 MESHES = {"ball": BALL, "strip": shapes.strip(40, 3)}
 
 

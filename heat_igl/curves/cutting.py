@@ -241,8 +241,9 @@ class _Cut:
         places = self._places()
         old_corners = mesh.F[places.faces[mesh.n_vertices :]]
         added = np.einsum("kc,kcx->kx", places.barycentric[mesh.n_vertices :], mesh.V[old_corners])
+        V = np.concatenate([mesh.V, added])
         return CutMesh(
-            Mesh(np.concatenate([mesh.V, added]), F),
+            Mesh(V, F).with_originals(np.append(mesh.originals, np.arange(mesh.n_vertices, len(V)))),
             old_faces[ascending],
             places,
             np.array(self._edges, np.int64).reshape(-1, 2),

@@ -87,8 +87,9 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     of the log maps v_i of the points, weighted by w_i d_i^(p - 2): the Karcher iteration for p = 2 (Karcher 1977) and
     Weiszfeld's for p = 1. The step is halved until the sum falls, so the sum falls in every step. A median can be one
     of the points: it is if the unit vectors to the others, weighted, sum to no more than the weight of this point
-    (Vardi and Zhang 2000). Log maps are the first directions and the lengths of exact shortest paths, which are
-    straightened from step to step; where others are shorter at the end, the search goes on with these.
+    (Vardi and Zhang 2000), and no vertex has a smaller sum. Log maps are the first directions and the lengths of exact
+    shortest paths, which are straightened from step to step; where others are shorter at the end, the search goes on
+    with these.
 
     Examples
     --------
@@ -160,7 +161,7 @@ class _Mean:
             raise SourceError("points lie on different components of the mesh, so none is at a distance from all")
         energy = self._energy(fields)
         if self._power == 1:
-            at_point = self._median_at_a_point(fields)
+            at_point = self._median_at_a_point(fields, float(energy.min()))
             if at_point is not None:
                 return at_point
         if len(self._faces) == 2:
@@ -259,16 +260,17 @@ class _Mean:
         )
         return at
 
-    def _median_at_a_point(self, fields: FloatArray) -> SurfacePoints | None:
-        """The best of the points, if it is their median."""
+    def _median_at_a_point(self, fields: FloatArray, least: float) -> SurfacePoints | None:
+        """The best of the points, if it is their median: no place beside it, and no vertex, has a smaller sum."""
         corners = self._mesh.F[self._faces]
         sums = np.einsum("kc,kc->k", (self._weight @ fields)[corners], self._barycentric)
         best = int(np.argmin(sums))
         at = self._state(int(self._faces[best]), self._barycentric[best])
         # Points in the same place weigh together.
-        here = at.distances <= 10 * _INSIDE * self._mesh.edge_lengths.mean()
+        same = 10 * _INSIDE * float(self._mesh.edge_lengths.mean())
+        here = at.distances <= same
         pull = self._weight[~here] @ (at.vectors[~here] / at.distances[~here, None])
-        if np.hypot(*pull) <= self._weight[here].sum():
+        if np.hypot(*pull) <= self._weight[here].sum() and at.energy <= least + same / self._unit:
             return SurfacePoints(self._faces[[best]], self._barycentric[[best]])
         return None
 

@@ -52,7 +52,7 @@ class MeshPart:
         inside = mask.copy() if of_vertices else np.zeros(n, bool)
         inside[mesh.F[faces]] = True
         part = Mesh(mesh.V, mesh.F[faces])
-        return cls(part.with_originals(mesh.originals), inside, faces, mesh.F)
+        return cls(part.with_originals(mesh.originals), inside[mesh.originals], faces, mesh.F)
 
     def require_vertices(self, vertices: IntArray, name: str = "sources", position: IntArray | None = None) -> None:
         """Raise a `SourceError` that names the first of some vertices (j,) outside, by its position if given."""

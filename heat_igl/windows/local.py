@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from heat_igl.errors import SourceError, as_array, names_guessed, positive, raise_at_first, shown
 from heat_igl.kernels.mesh import checking
 from heat_igl.kernels.windows import windows
-from heat_igl.mesh import Mesh, MeshLike, MeshPart, triangles_inside
+from heat_igl.mesh import Mesh, MeshLike, MeshPart, connectivity, triangles_inside
 from heat_igl.runtime import TimeLeft, available_memory, n_threads, over_rows
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
@@ -84,8 +84,6 @@ def distances_within(
     triangles, part = triangles_inside(mesh, region, _WHAT)
     chosen = _chosen(sources, triangles, part)
     found = _rows_within(triangles, from_mesh(triangles, int(chosen[0])), chosen, limit)
-    if triangles.has_copies:
-        found = found[:, triangles.originals]
     return found if sources is not None or part is None else _with_empty_rows(found, np.flatnonzero(part.inside))
 
 
@@ -125,6 +123,8 @@ def _rows_within(triangles: Mesh, tables: Tables, chosen: IntArray, limit: float
         found = found[at]
     if (np.diff(order) != 1).any():
         found = found[np.argsort(order)]
+    if triangles.has_copies:
+        found = found[:, triangles.originals]
     found.sort_indices()
     return found
 
@@ -182,11 +182,30 @@ def nearest_vertices(
         nearest = np.argsort(rows, axis=1, kind="stable")[:, :wanted]
         distances[wrong, :wanted] = np.take_along_axis(rows, nearest, axis=1)
         indices[wrong, :wanted] = np.where(np.isfinite(distances[wrong, :wanted]), nearest, -1)
+    if triangles.has_copies:
+        everywhere = np.arange(triangles.n_vertices) if part is None else np.flatnonzero(part.inside)
+        named = everywhere if sources is None else named_vertices(sources, triangles.n_vertices)
+        _put_copies(indices, distances, named, triangles.originals)
     if sources is None and part is not None:
         spread = _unfilled(triangles.n_vertices, int(k), triangles.n_vertices)
         spread[0][part.inside], spread[1][part.inside] = indices, distances
         return spread
     return indices, distances
+
+
+def _put_copies(indices: IntArray, distances: FloatArray, sources: IntArray, originals: IntArray) -> None:
+    """Give rows (s, k) of the nearest originals the copies of each, and put the source (s,) of a row first."""
+    counts = np.bincount(originals)
+    first = np.cumsum(counts) - counts
+    found = indices >= 0
+    entry, copy = connectivity.enumerate_runs(counts[indices[found]])
+    vertex = np.argsort(originals, kind="stable")[first[indices[found]][entry] + copy]
+    row, value = np.nonzero(found)[0][entry], distances[found][entry]
+    order = np.lexsort((vertex, vertex != sources[row], value, row))
+    rank = connectivity.enumerate_runs(np.bincount(row))[1]
+    kept = rank < indices.shape[1]
+    row, order = row[order][kept], order[kept]
+    indices[row, rank[kept]], distances[row, rank[kept]] = vertex[order], value[order]
 
 
 def _unfilled(s: int, k: int, n: int) -> tuple[IntArray, FloatArray]:

@@ -81,8 +81,9 @@ def write_distances_within(
     try:
         group = zarr.create_group(partial, zarr_format=3)
         arrays = {
+            # zarr does not write a chunk of fill values alone, and distances may all be 0.
             name: group.create_array(
-                name, shape=(0,), chunks=(_CHUNK,), dtype=dtype, compressors=[zarr.codecs.Crc32cCodec()]
+                name, shape=(0,), chunks=(_CHUNK,), dtype=dtype, fill_value=-1, compressors=[zarr.codecs.Crc32cCodec()]
             )
             for name, dtype in _ARRAYS.items()
         }
