@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property, reduce
+from functools import cached_property, partial
 from operator import attrgetter
 from typing import Any
 
@@ -108,7 +108,7 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
         return _of_smooth_metric(mesh, *checked, laplacian)
     if mesh.is_tetrahedral:
         return _of_groups(mesh, *_checked(g, mesh))
-    return operators_in_metric(mesh, *_checked(g, mesh)[:3], g, laplacian)
+    return operators_in_metric(mesh, *_checked(g, mesh)[:3], None, g, laplacian)
 
 
 def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
@@ -160,17 +160,17 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
         )
     remedy = "remove faces that cannot be crossed"
     raise_at_first(~((s > 0) & np.isfinite(s)), "speed", s, "must be positive and finite", remedy)
-    if mesh.is_tetrahedral or not mesh.edge_lengths.all():
+    if mesh.is_tetrahedral or not igl.edge_lengths(mesh.V, mesh.F).all():
         check_measures(mesh)
     largest = _LARGEST**0.5
     outside = (s < 1 / largest) | (s > largest)
     raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
-    first, group = equal_runs(s) if mesh.is_tetrahedral else (slice(None), None)
+    first, group = equal_runs(s)
     each = s[first, None, None]
-    make: Callable[..., Operators] = _of_groups if mesh.is_tetrahedral else operators_in_metric
-    # A metric and a velocity without names here do not outlive their use there.
-    given, above = s if group is None else group, np.eye(3)[np.triu_indices(3)]
-    return make(mesh, np.eye(3) / each**2, 1 / float(s.max()), (each[:, 0] * above, None, None), given)
+    make: Callable[..., Operators] = _of_groups if mesh.is_tetrahedral else partial(operators_in_metric, given=s)
+    # A metric without a name here does not outlive its use there.
+    root = each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None
+    return make(mesh, np.eye(3) / each**2, 1 / float(s.max()), root, group)
 
 
 def fibre_metric(
@@ -269,46 +269,50 @@ def operators_in_metric(
     mesh: Mesh,
     g: FloatArray,
     least: float,
-    root: Any = None,
-    given: FloatArray | None = None,
+    root: Any,
+    group: Any,
+    given: FloatArray,
     laplacian: Laplacian = "auto",
 ) -> Operators:
-    """`metric_operators` of checked triangles and metrics g (m, 3, 3).
+    """`metric_operators` of checked triangles and metrics g (k, 3, 3) of each `group` (m,), or of each triangle.
 
-    No unit vector is shorter than `least` in it. The inverse root may be given, and that by which lengths are
-    differentiated: a metric, or speeds (m,).
+    No unit vector is shorter than `least` in it. The inverse root may be known. Lengths are differentiated by the
+    metric `given`, or speeds (m,).
     """
-    squares = MetricSimplices(mesh.F, mesh.n_vertices, mesh.V, tensors=g, group=np.arange(mesh.n_faces)).measured[1]
+    group = np.arange(mesh.n_faces, dtype=np.int32) if group is None else group
+    squares = MetricSimplices(mesh.F, mesh.n_vertices, mesh.V, tensors=g, group=group).measured[1]
     own = np.sqrt(squares, out=squares)[:, ::-1]
-    sides = _common_lengths(mesh, own)
-    if sides is None:
-        return _refracting(mesh, own, g, least, laplacian)
+    triangulation = intrinsic_triangulation(mesh)
+    if not _fit_together(mesh, own, triangulation.twin):
+        in_metric = partial(MetricSimplices.in_metric, mesh, g, least, False, root, group)
+        return _refracting(mesh, triangulation, own, least, in_metric, laplacian)
     del own, squares
+    given = g[group] if given is None else given
     # Triangles without area know no metric in their plane.
     if not (mesh.measures > 0).all():
-        return _of_triangles(mesh, sides, None, laplacian, given)
-    # Before there are velocities, as both take much memory.
-    defect = mean_angle_defect(intrinsic_triangulation(mesh), True)
+        return _of_triangles(mesh, None, laplacian, given)
+    defect = mean_angle_defect(triangulation, True)
+    del triangulation
     root = inverse_root(g, mesh) if root is None else root
     del g
-    simplices = MetricSimplices.in_metric(mesh, None, least, root=root)
+    simplices = MetricSimplices.in_metric(mesh, None, least, False, root, group)
     del root
-    return _unfolded(defect, mesh, sides, simplices, laplacian, given)
+    return _unfolded(defect, mesh, simplices, laplacian, given)
 
 
-def _unfolded(defect: float, mesh: Mesh, sides: FloatArray, simplices: MetricSimplices, *of: Any) -> Operators:
-    """The operators of triangles with the lengths `sides` (m, 3), and with `simplices` where these are nearer."""
+def _unfolded(defect: float, mesh: Mesh, simplices: MetricSimplices, *of: Any) -> Operators:
+    """The operators of triangles whose edges have one length each, and with `simplices` where these are nearer."""
     if hopf_lax_is_nearer(simplices.measured[-1], defect):
-        return _LaterOperators(mesh, simplices, _of_triangles, mesh, sides, simplices, *of)
-    return _of_triangles(mesh, sides, None, *of)
+        return _LaterOperators(mesh, simplices, _of_triangles, mesh, simplices, *of)
+    return replace(_of_triangles(mesh, simplices, *of), simplices=None)
 
 
-def _of_triangles(
-    mesh: Mesh, sides: FloatArray, simplices: MetricSimplices | None, laplacian: Laplacian, given: FloatArray | None
-) -> Operators:
-    domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
+def _of_triangles(mesh: Mesh, simplices: Any, laplacian: Laplacian, given: FloatArray | None) -> Operators:
+    """The operators of triangles with the lengths in the metric, or at the speeds, `given`, or in the simplices."""
     given = np.eye(3) / given[:, None, None] ** 2 if given is not None and given.ndim == 1 else given
     metric = None if given is None else MetricSides(mesh, given)
+    sides = simplices.edges[1].reshape(-1, 3)[:, ::-1] if metric is None else metric.lengths
+    domain = edge_length_operators(mesh.F, sides, mesh.n_vertices, laplacian)
     return replace(domain, simplices=simplices, metric=metric, originals=mesh.originals)
 
 
@@ -316,29 +320,35 @@ def _of_smooth_metric(mesh: Mesh, g: Any, least: float, root: Any, laplacian: La
     """The operators of simplices with what `_checked_at_corners` returns."""
     if mesh.is_tetrahedral:
         return _of_groups(mesh, g, least, root)
+    # Before the simplices, as both take much memory.
+    defect = mean_angle_defect(intrinsic_triangulation(mesh), True)
     simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
-    sides = simplices.edges[1].reshape(-1, 3)[:, ::-1]  # opposite each corner
-    if _keeps_shape(sides, np.sqrt(simplices.measured[1][:, ::-1])):
-        defect = mean_angle_defect(intrinsic_triangulation(mesh), True)
-        return _unfolded(defect, mesh, sides, simplices, laplacian, None)
+    if _keeps_shape(simplices.edges[1].reshape(-1, 3), np.sqrt(simplices.measured[1])):
+        return _unfolded(defect, mesh, simplices, laplacian, None)
     # For heat: what each face says alone. Without a surface, no vertices can be told from those that were added.
     at_corners = (simplices.metric(np.arange(mesh.n_faces), corner) for corner in range(3))
+    each = np.asarray(sum(at_corners)) / 3
     fitted: Laplacian = "cotan" if laplacian == "cotan" else "intrinsic-delaunay"
-    domain = operators_in_metric(mesh, np.asarray(sum(at_corners)) / 3, least, laplacian=fitted)
+    domain = operators_in_metric(mesh, each, least, None, None, each, fitted)
     made = domain._made if isinstance(domain, _LaterOperators) else domain
-    return replace(made, surface=None, simplices=simplices)
+    return replace(made, surface=None, simplices=simplices, metric=None)
 
 
-def _common_lengths(mesh: Mesh, own: FloatArray) -> FloatArray | None:
-    """The mean lengths (m, 3) of edges that faces see at lengths `own` (m, 3), if these nearly agree; else None."""
-    of_side = mesh.facets.of_face
-    shortest, longest = np.full(len(mesh.edges), np.inf), np.zeros(len(mesh.edges))
-    np.minimum.at(shortest, of_side, own)
-    np.maximum.at(longest, of_side, own)
-    if (longest - shortest > _ONE_LENGTH * longest).any():
-        return None
-    mean = (np.bincount(of_side.ravel(), own.ravel()) / np.bincount(of_side.ravel()))[of_side]
-    return np.asarray(mean) if _keeps_shape(mean, own) else None
+def _fit_together(mesh: Mesh, own: FloatArray, twin: AnyArray) -> bool:
+    """Whether edges, which faces see at lengths `own` (m, 3), may have the mean of these: they nearly agree."""
+    if (twin == -2).any():  # edges of more than two faces
+        of_side = mesh.facets.of_face
+        shortest, longest = np.full(len(mesh.edges), np.inf), np.zeros(len(mesh.edges))
+        np.minimum.at(shortest, of_side, own)
+        np.maximum.at(longest, of_side, own)
+        mean = (np.bincount(of_side.ravel(), own.ravel()) / np.bincount(of_side.ravel()))[of_side]
+        differ = longest - shortest > _ONE_LENGTH * longest
+    else:
+        other, is_outer = own.ravel()[twin].reshape(-1, 3), (twin < 0).reshape(-1, 3)
+        other[is_outer] = own[is_outer]
+        differ = np.abs(own - other) > _ONE_LENGTH * np.maximum(own, other)
+        mean = np.multiply(np.add(own, other, out=other), 0.5, out=other)
+    return not differ.any() and _keeps_shape(mean, own)
 
 
 def _keeps_shape(sides: FloatArray, was: FloatArray) -> bool:
@@ -347,30 +357,31 @@ def _keeps_shape(sides: FloatArray, was: FloatArray) -> bool:
     return bool((slack >= _SLACK * was_slack).all())
 
 
-def _refracting(mesh: Mesh, sides: FloatArray, g: FloatArray, least: float, laplacian: Laplacian) -> Operators:
+def _refracting(
+    mesh: Mesh, apart: IntrinsicTriangulation, sides: FloatArray, least: float, in_metric: Any, laplacian: Laplacian
+) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
-    glued = _glued_where_equal(mesh, sides + mollify(sides, mesh.F))
+    glued = _glued_where_equal(apart, sides + mollify(sides, mesh.F))
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
     domain = intrinsic_operators(triangulation)
     pairs = np.concatenate([triangulation.F[:, pair] for pair in ([1, 2], [2, 0], [0, 1])])
     domain = _with_shortest_edges(domain, mesh, pairs, triangulation.l.ravel(order="F"))
     # Where most triangles fit together, they are those after flips: even ones, however thin the given ones are in the
     # metric. Triangles without area know no metric in their plane, but have lengths.
-    is_inside = mesh.facets.n_faces[mesh.facets.of_face] == 2
-    fits = 2 * np.count_nonzero(glued.twin.reshape(-1, 3)[is_inside] >= 0) > np.count_nonzero(is_inside)
+    is_inside = apart.twin >= 0
+    fits = 2 * np.count_nonzero(glued.twin[is_inside] >= 0) > np.count_nonzero(is_inside)
     if fits or not (mesh.measures > 0).all():
         # A flip may join a vertex with itself, or two that an edge joins already: no triangles in space.
         ends = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
         used = triangulation if len(ends) == len(mesh.edges) else glued
         simplices = MetricSimplices.of_sides(mesh.V, used.F, used.l, least)
     else:
-        simplices = MetricSimplices.in_metric(mesh, g, least)
+        simplices = in_metric()
     return replace(domain, simplices=simplices)
 
 
-def _glued_where_equal(mesh: Mesh, sides: FloatArray) -> IntrinsicTriangulation:
+def _glued_where_equal(apart: IntrinsicTriangulation, sides: FloatArray) -> IntrinsicTriangulation:
     """The triangles with lengths of their own, cut apart at the edges that they see at two lengths."""
-    apart = intrinsic_triangulation(mesh)
     twin = apart.twin.copy()
     glued = np.flatnonzero(twin >= 0)
     one, other = sides.ravel()[glued], sides.ravel()[twin[glued]]
@@ -510,9 +521,9 @@ def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[Any, float, Any]:
 def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
     """Tensors (k, p, p), after a check that they are finite and symmetric but for rounding."""
     above = np.triu_indices(g.shape[1], 1)
-    size = reduce(np.maximum, np.abs(g).reshape(len(g), -1).T)
+    size = longest_sides(np.abs(g).reshape(len(g), -1))
     raise_at_first(~np.isfinite(size), name, g, "must be finite")
-    apart = np.abs(g[:, *above] - g[:, *above[::-1]]).max(axis=1)
+    apart = longest_sides(np.abs(g[:, *above] - g[:, *above[::-1]]))
     raise_at_first(apart > _ROUNDING * size, name, g, "must be symmetric")
     return np.asarray((g + np.swapaxes(g, 1, 2)) / 2) if apart.any() else g
 
@@ -520,7 +531,7 @@ def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
 def least_eigenvalue(name: str, smallest: FloatArray, g: FloatArray) -> float:
     """The least of the smallest eigenvalues (k,) of tensors g (k, p, p); an error unless doubles hold all of them."""
     raise_at_first(~(smallest > 0), name, g, "must be positive definite")
-    outside = (smallest < 1 / _LARGEST) | (reduce(np.maximum, np.abs(g).reshape(len(g), -1).T) > _LARGEST)
+    outside = (smallest < 1 / _LARGEST) | (longest_sides(np.abs(g).reshape(len(g), -1)) > _LARGEST)
     needed = f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}"
     raise_at_first(outside, name, g, needed, "squares leave the range of doubles, take another unit")
     return float(smallest.min())

@@ -77,6 +77,11 @@ class MetricSides(SideLengths):
         self._n_faces = np.bincount(mesh.facets.of_face.ravel())
 
     @property
+    def lengths(self) -> FloatArray:
+        """Of the sides (m, 3)."""
+        return self._mean(self._own)
+
+    @property
     def _slopes(self) -> FloatArray:
         if self._metric.shape[1] == 2:
             raise ValueError(

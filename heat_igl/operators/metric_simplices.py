@@ -14,7 +14,6 @@ from heat_igl.kernels.sweep.simplex_metrics import fits_around, lengths_in_veloc
 from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
 from heat_igl.mesh import Mesh
 from heat_igl.mesh.connectivity import PARTS, edge_middles
-from heat_igl.operators.metric_derivatives import plane_axes
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Differences between tensors that are taken for rounding.
@@ -99,8 +98,8 @@ class MetricSimplices:
         share[smallest <= 0] = 0
         share[share >= 1 - _ROUNDING] = 1
         share = reduce(np.minimum, (share[corner] for corner in corners.T))
-        axes = plane_axes(mesh) if p == 2 else np.empty((0, 2, 3))
-        velocity, rows, _ = velocities_at_corners(corners, at_vertex, velocity, group, share, axes, False)
+        faces = corners if p == 2 else np.empty((0, 3), np.int32)
+        velocity, rows, _ = velocities_at_corners(corners, at_vertex, velocity, group, share, faces, mesh.V, False)
         least = min(least, float(1 / largest.max()))
         return cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows)
 
@@ -189,11 +188,12 @@ def inverse_root(
     of |g| where g is not positive definite.
     """
     above = np.ascontiguousarray(g[:, *_ABOVE]) if g.ndim == 3 else g
-    corners, axes = np.arange(len(g), dtype=np.int32)[:, None], np.empty((0, 2, 3))
+    corners, faces, V = np.arange(len(g), dtype=np.int32)[:, None], np.empty((0, 3), np.int32), np.empty((0, 3))
     if mesh is not None and not mesh.is_tetrahedral:
-        corners, axes = mesh.F.astype(np.int32) if at_vertices else corners, plane_axes(mesh)
+        faces, V = mesh.F.astype(np.int32), mesh.V
+        corners = faces if at_vertices else corners
     group, share = np.zeros(len(corners), np.int32), np.ones(len(corners))
-    found: Any = velocities_at_corners(corners, above, above, group, share, axes, True)
+    found: Any = velocities_at_corners(corners, above, above, group, share, faces, V, True)
     return tuple(found)
 
 

@@ -116,17 +116,18 @@ def velocities_at_corners(
     own: cython.const[cython.double][:, ::1],
     group: cython.const[cython.int][::1],
     share: cython.const[cython.double][::1],
-    axes: cython.const[cython.double][:, :, ::1],
+    faces: cython.const[cython.int][:, ::1],
+    V: cython.const[cython.double][:, ::1],
     is_metric: cython.bint,
 ):
     """Velocities (r, 6) of simplices at their corners, equal ones at a vertex once, and the row (m, p + 1) of each.
 
     They are a `share` (m,) of what is known `at_vertex` (n, 6), and else that of the `group` (m,) of the simplex, its
-    `own` (k, 6): both are velocities, or metrics. Of triangles with `axes` (m, 2, 3) in their planes, else (0, 2, 3),
-    they are those in the plane, and across it the mean: trust in slopes asks it. Third are the smallest and largest
-    eigenvalue (n, 2) there, if they were asked for.
+    `own` (k, 6): both are velocities, or metrics. Of triangles, whose `faces` (m, 3) on vertices at V (n, 3) are given,
+    else (0, 3), they are those in the plane, and across it the mean: trust in slopes asks it. Third are the smallest
+    and largest eigenvalue (n, 2) there, if they were asked for.
     """
-    # What is not written to of the first array takes no memory.
+    # Of the first array, which has room for all corners, only the rows that are written to are kept.
     found, sizes = np.empty((corners.size, 6)), np.tile([np.inf, 0.0], (len(at_vertex), 1))
     number, last = np.empty_like(corners), np.full(len(at_vertex), -1, np.int32)
     velocity: cython.double[:, ::1] = found
@@ -135,7 +136,7 @@ def velocities_at_corners(
     row_at: cython.int[::1] = last
     count: cython.int = 0
     size: cython.int = corners.shape[1]
-    in_plane: cython.bint = axes.shape[0] > 0
+    in_plane: cython.bint = faces.shape[0] > 0
     # Of four simplices at once.
     base: cython.double[36]
     work: cython.double[288]
@@ -152,9 +153,8 @@ def velocities_at_corners(
                         W[k] += (1.0 - share[s]) * own[group[s], k]
                 if in_plane:
                     axis = base + 9 * (i // size)
-                    for k in range(6):
-                        axis[k] = axes[s, k // 3, k % 3]
-                    cross(axis, axis + 3, axis + 6)
+                    if i % size == 0:
+                        _lay_axes(V, faces, s, axis)
                     _turn(W, axis, 1, 3)
                     W[2] = W[4] = W[5] = 0.0
                 for k in range(9 if is_metric else 0):
@@ -181,7 +181,30 @@ def velocities_at_corners(
                     row_at[v] = count
                     count += 1
                 row[s, i % size] = row_at[v]
-    return found[:count], number, sizes
+    return found[:count].copy(), number, sizes
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _lay_axes(
+    V: cython.const[cython.double][:, ::1],
+    F: cython.const[cython.int][:, ::1],
+    s: cython.Py_ssize_t,
+    axis: cython.p_double,
+) -> cython.void:
+    """The axes of triangle s: from corner 0 to corner 1, in its plane towards corner 2, and across; 0 without area."""
+    for i in range(2):
+        to = axis + 3 * i
+        for k in range(3):
+            to[k] = V[F[s, 1 + i], k] - V[F[s, 0], k]
+        along: cython.double = axis[0] * to[0] + axis[1] * to[1] + axis[2] * to[2] if i == 1 else 0.0
+        for k in range(3):
+            to[k] -= along * axis[k]
+        size: cython.double = max(sqrt(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]), DBL_MIN)
+        for k in range(3):
+            to[k] /= size
+    cross(axis, axis + 3, axis + 6)
 
 
 @cython.cfunc
