@@ -14,13 +14,12 @@ from functools import reduce
 import igl
 import numpy as np
 
-from heat_igl.kernels.cloud.agreeing import agreement
 from heat_igl.kernels.cloud.fitting_triangles import fitting_triangles
 from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles, torn_points
 from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import corners_by_vertex
-from heat_igl.mesh.connectivity import Groups, connected_components, fans
+from heat_igl.mesh.connectivity import Groups, connected_components, fans, unique_rows
 from heat_igl.mesh.neighbourhoods import K, Neighbourhoods, PointTree, by_rows
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -131,23 +130,34 @@ def _triangles_of_stars(
     that have settled corners alone, then others in three stars. Those in fewer stars have no settled corner.
     """
     largest = _LARGEST_RADIUS * _to_full(near) * near.radius
-    corners, sizes, is_closed = by_rows(
+    corners, is_settled = by_rows(
         lambda rows: delaunay_stars(P, near.axes, near.index, largest, least_cosine, rows.start, rows.stop), len(P)
     )
-    first = np.append(0, np.cumsum(sizes, dtype=np.int64))
-    count, radius, is_settled = by_rows(
-        lambda rows: agreement(P, first, corners, is_closed, rows.start, rows.stop), len(P)
-    )
-    is_settled = is_settled.astype(bool)
+    ascending = np.sort(corners, axis=1)
+    first, which, n_stars = unique_rows(ascending, len(P))
+    # Each triangle in the star of its lowest point that has it.
+    count = np.zeros(len(corners), np.int64)
+    count[first] = n_stars
+    is_settled[corners[n_stars[which] < 3, 0]] = False
     agreed = corners.compress(count == 3, axis=0)
     is_done = at_all_corners(is_settled, agreed)
     others = []
     # Those in more stars first, then those with smaller circles.
-    for n_stars in (2, 1):
-        rows = np.flatnonzero(count == n_stars)
+    for fewer in (2, 1):
+        rows = np.flatnonzero(count == fewer)
         rows = rows[at_all_corners(~is_settled, corners.take(rows, axis=0))]
-        others.append(corners.take(rows[np.argsort(radius[rows], kind="stable")], axis=0))
+        radius = _circumradius(P, ascending.take(rows, axis=0))
+        others.append(corners.take(rows[np.argsort(radius, kind="stable")], axis=0))
     return agreed.compress(is_done, axis=0), agreed.compress(~is_done, axis=0), np.concatenate(others)
+
+
+def _circumradius(P: FloatArray, F: IntArray) -> FloatArray:
+    """Radii (m,) of the circles through the corners of F (m, 3): in whatever order a star has them, if F ascends."""
+    a, b, c = (P[corner] for corner in F.T)
+    sides = reduce(np.multiply, (np.linalg.norm(side, axis=1) for side in (b - a, c - b, c - a)))
+    across = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    # The circle through collinear points is larger than any other.
+    return np.asarray(np.divide(0.5 * sides, across, out=np.full(len(F), np.inf), where=across > 0))
 
 
 def _with_small_parts(tree: PointTree, F: IntArray, part: IntArray, size: IntArray) -> IntArray:

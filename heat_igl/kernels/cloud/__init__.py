@@ -11,8 +11,6 @@ memory. Kernels work on a range of rows and share no state.
 `local_delaunay`
     The star of each point: the Delaunay triangles around it in its tangent plane, from the convex hull of the inverted
     neighbours. Neighbours are projected so that they keep their distances.
-`agreeing`
-    Counts the stars of its corners that contain a triangle. Triangles in all three stars never overlap.
 `fitting_triangles`
     Adds the other triangles one by one, if they overlap no triangle at a common corner.
 `joining_groups`

@@ -20,14 +20,13 @@ def delaunay_stars(
     by distance. Triangles with a circumscribed circle of a radius above `largest` (n,) are left out, and neighbours
     whose normals have a product below `least_cosine` (n,).
 
-    Returns the triangles (s, 3) int32, star by star, the point itself first and counterclockwise around it; and for
-    each star the number of its triangles, and whether it goes all the way around its point.
+    Returns the triangles (s, 3) int32, star by star, the point itself first and counterclockwise around it; and whether
+    each star goes all the way around its point.
     """
     n: cython.Py_ssize_t = end - begin
     k: cython.Py_ssize_t = neighbours.shape[1]
-    corners, sizes, closed = np.empty((n * k, 3), np.int32), np.empty(n, np.int32), np.zeros(n, np.uint8)
-    size: cython.int[::1] = sizes
-    is_closed: cython.uchar[::1] = closed
+    corners, closed = np.empty((n * k, 3), np.int32), np.zeros(n, np.bool_)
+    is_closed: cython.uchar[::1] = closed.view(np.uint8)
     found: cython.int[:, ::1] = corners
     star: cython.double[:, ::1] = np.empty((k + 1, 3))
     members: cython.int[::1] = np.empty(k + 1, np.int32)
@@ -41,8 +40,7 @@ def delaunay_stars(
                 top: cython.Py_ssize_t = _visible_hull(count, star, stack)
                 m = _triangles(i, top, star, members, stack, largest[i], found, m)
                 is_closed[i - begin] = m - before == top
-            size[i - begin] = cython.cast(cython.int, m - before)
-    return corners[:m].copy(), sizes, closed
+    return corners[:m].copy(), closed
 
 
 @cython.cfunc

@@ -2,7 +2,6 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.agreeing import circumradius
 from cython.cimports.heat_igl.kernels.cloud.loop_filling import BEYOND, POINT
 from cython.cimports.libc.math import INFINITY, sqrt
 
@@ -299,7 +298,7 @@ class _Gaps:
         square: cython.double = self.square(a, c)
         if self.joints[b] > 0:
             return -1.0 / square if square > 0.0 else -INFINITY
-        radius: cython.double = circumradius(self.P, a, b, c)
+        radius: cython.double = _circumradius(self.P, a, b, c)
         most: cython.double = min(self.largest[a], min(self.largest[b], self.largest[c]))
         longest: cython.double = most
         if max(self.square(a, b), self.square(b, c)) > most * most:
@@ -355,3 +354,31 @@ class _Gaps:
             alike += across_c * across_d
         size: cython.double = sqrt(size_c) * sqrt(size_d)
         return alike / size if size > 0.0 else -1.0
+
+
+@cython.cfunc
+@cython.nogil
+def _circumradius(
+    P: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, b: cython.Py_ssize_t, c: cython.Py_ssize_t
+) -> cython.double:
+    """Radius of the circle through three points: the same number in whatever order they are given."""
+    first: cython.Py_ssize_t = min(a, min(b, c))
+    last: cython.Py_ssize_t = max(a, max(b, c))
+    middle: cython.Py_ssize_t = a + b + c - first - last
+    x: cython.double = P[middle, 0] - P[first, 0]
+    y: cython.double = P[middle, 1] - P[first, 1]
+    z: cython.double = P[middle, 2] - P[first, 2]
+    u: cython.double = P[last, 0] - P[first, 0]
+    v: cython.double = P[last, 1] - P[first, 1]
+    w: cython.double = P[last, 2] - P[first, 2]
+    dx: cython.double = P[last, 0] - P[middle, 0]
+    dy: cython.double = P[last, 1] - P[middle, 1]
+    dz: cython.double = P[last, 2] - P[middle, 2]
+    product: cython.double = sqrt(x * x + y * y + z * z) * sqrt(dx * dx + dy * dy + dz * dz)
+    product *= sqrt(u * u + v * v + w * w)
+    p: cython.double = y * w - z * v
+    q: cython.double = z * u - x * w
+    r: cython.double = x * v - y * u
+    across: cython.double = sqrt(p * p + q * q + r * r)
+    # The circle through collinear points is larger than any other.
+    return 0.5 * product / across if across > 0.0 else 1e300
