@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
-from heat_igl.kernels.cloud.joining_groups import turned_groups
 from heat_igl.kernels.mesh.incidence import components
+from heat_igl.mesh.cloud_orientation import turned_groups
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import AnyArray, BoolArray, FloatArray
 
@@ -57,7 +57,7 @@ def oriented_normals(tree: PointTree, normals: FloatArray | None) -> tuple[Float
     contradicts = (total < _NEARLY_ALL * count) & (ends[begin, 0] != ends[begin, 1])
     joins = ends[begin[contradicts]]
     one = np.ones(int(group.max()) + 1, np.int64)
-    is_turned = turned_groups(joins.astype(np.int32), -count[contradicts].astype(float), one)[group]
+    is_turned = turned_groups(joins, -count[contradicts].astype(float), one)[group]
     part = components(joins, len(one))[group]
     is_turned ^= (np.bincount(part, is_turned) > np.bincount(part) / 2)[part]
     # The opposite neighbours of a single point must lie on one side of it, too. Pairs of which one was turned are no

@@ -5,10 +5,9 @@ from __future__ import annotations
 import igl
 import numpy as np
 
-from heat_igl.kernels.cloud.joining_groups import turned_groups
 from heat_igl.kernels.mesh.incidence import components
 from heat_igl.mesh.cloud_triangles import corner, glued_sides
-from heat_igl.mesh.connectivity import pinched_vertices
+from heat_igl.mesh.connectivity import pinched_vertices, unique_rows
 from heat_igl.mesh.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -75,10 +74,42 @@ def _turned(P: FloatArray, F: IntArray) -> tuple[BoolArray, IntArray, IntArray, 
         group = (np.cumsum(np.bincount(group) > 0) - 1)[group]
         is_turned &= sheet[0] != sheet[1]
         wants_one = runs_alike != (is_turned.take(a) != is_turned.take(b))
-        ends = group.astype(np.int32).take(pairs)
-        is_turned ^= turned_groups(ends, np.where(wants_one, -weight, weight), np.bincount(group))[group]
+        is_turned ^= turned_groups(group.take(pairs), np.where(wants_one, -weight, weight), np.bincount(group))[group]
         contradicts = (is_turned.take(a) != is_turned.take(b)) != runs_alike
     return is_turned, part.min(axis=0), pairs[contradicts], folds[contradicts]
+
+
+def turned_groups(pairs: IntArray, weights: FloatArray, sizes: IntArray) -> BoolArray:
+    """Which (n,) of n groups to turn, for pairs with weights that are negative if just one of both groups should be.
+
+    The weights (k,) of all pairs (k, 2) between two groups add up. In a round each group is joined to the one to which
+    its join is strongest for the sizes (n,) of both, if that one is larger, or of the same size and a lower number,
+    until nothing is joined.
+    """
+    n, size, groups = len(sizes), sizes, np.arange(len(sizes))
+    # The group to which each was joined, itself at first, and whether one of the two is turned.
+    root, turned = groups, np.zeros(n, bool)
+    while True:
+        between = np.sort(root[pairs], axis=1)
+        signed = np.where(turned[pairs[:, 0]] == turned[pairs[:, 1]], weights, -weights)
+        first, which, _ = unique_rows(between, n)
+        pairs, weights = between[first], np.asarray(np.bincount(which, signed, len(first)), np.float64)
+        a, b = pairs.T
+        # Of equal joins an arbitrary one: with the lowest, groups would be joined one after the other.
+        share = (1 + 1e-6 * ((a + b) * 7919 % 1009)) / (size[a] + size[b]) * np.abs(weights) * (a != b)
+        to, wants, strongest = groups.copy(), np.zeros(n, bool), np.zeros(n)
+        for group in (a, b):
+            np.maximum.at(strongest, group, share)
+        for group, other in ((a, b), (b, a)):
+            chosen = (share == strongest[group]) & (share > 0)
+            to[group[chosen]], wants[group[chosen]] = other[chosen], weights[chosen] < 0
+        joins = (size[to] > size) | ((size[to] == size) & (to < groups))
+        if not joins.any():
+            return turned
+        root, turned = np.where(joins, to, root), np.where(joins, wants, turned)
+        while (root[root] != root).any():
+            turned, root = turned ^ turned[root], root[root]
+        size = np.bincount(root, sizes, n)
 
 
 def _parts(pairs: IntArray, runs_alike: BoolArray, m: int) -> tuple[IntArray, BoolArray]:

@@ -13,8 +13,6 @@ memory. Kernels work on a range of rows and share no state.
     neighbours. Neighbours are projected so that they keep their distances.
 `fitting_triangles`
     Adds the other triangles one by one, if they overlap no triangle at a common corner.
-`joining_groups`
-    Turns groups of triangles, or of points with normals, so that few neighbours contradict each other.
 `loop_filling`
     Fills gaps by cutting ears from loops of outer edges in space, first those between the fans of a point; says where
     one of the nearest points is many edges away.
