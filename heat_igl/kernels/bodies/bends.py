@@ -24,7 +24,7 @@ _FIT_BITS = cython.declare(cython.int, 6)
 # No edge, and no way.
 _NONE = cython.declare(cython.int, -3)
 
-_Offer = cython.struct(fit=cython.int, next=cython.int, asked=cython.int, value=cython.double)
+_Offer = cython.struct(fit=cython.int, next=cython.int, is_guess=cython.int, value=cython.double)
 # As large as what a processor reads at once.
 _Met = cython.struct(fits=cython.int[14], count=cython.int, next=cython.int)
 # All that is known of an edge stands together, as it is read.
@@ -66,7 +66,7 @@ def bend_around(
     neighbours of those to which the way around it is the shortest, unless a neighbour leads to them on a shorter way.
     If vertices are left without a way, an edge with one end that knows its distance is a source as well.
 
-    Vertices wait in the order of their first candidates. Before the line to the first edge is followed, edges that
+    Vertices wait in the order of their first candidates. When the line to the first edge has been followed, edges that
     share an end with it become candidates, and if it is hidden, those at the triangle that hides it.
 
     The edges (e, 2) int32 are those of the `body` around which ways bend. `outward` (e, 3) is the direction out of the
@@ -131,10 +131,10 @@ class _Bends(Ray):
 
     `fit_of` (e,) is the number of each edge, followed by `_FIT_BITS` that count how often it has been fitted. The edges
     that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has `fit_of` its
-    edge when it was made, whether it has been `asked` for, and the value of the way, `INFINITY` once the line has been
-    followed. All edges that were offered to a vertex are in `lists` that begin at `met` (n,); `point_of` (e,) is the
-    number of the last `point` of an edge for which an edge was a candidate; `n_near` are `near`, on ways of
-    `near_value`. Edges begin from one end if it `is_lone`.
+    edge when it was made, the value of the way, `INFINITY` once the line has been followed, and whether it is a guess:
+    it shares an end with an edge that was hidden. All edges that were offered to a vertex are in `lists` that begin at
+    `met` (n,); `point_of` (e,) is the number of the last `point` of an edge for which an edge was a candidate; `n_near`
+    are `near`, on ways of `near_value`. Edges begin from one end if it `is_lone`.
     The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`, and `sought` is
     the edge that is fitted.
     """
@@ -163,6 +163,7 @@ class _Bends(Ray):
     line: Line
     point: cython.int
     n_near: cython.int
+    is_guess: cython.bint
     near: cython.int[258]
     near_value: cython.double[258]
 
@@ -415,24 +416,24 @@ class _Bends(Ray):
             v: cython.int = self.body.neighbours[m]
             if self.way[v] != -1 and self.bound[v] > self.d[u]:
                 self.bound[v] = min(self.bound[v], self.d[u] + self.body.apart(v, u))
-            self.offer(i, v)
+            self.offer(i, v, 0.0)
 
     @cython.cfunc
     @cython.nogil
-    def offer_at(self, a: cython.int, v: cython.int) -> cython.void:
-        """Make the edges that end at a candidates for v."""
+    def offer_at(self, a: cython.int, v: cython.int, least: cython.double) -> cython.void:
+        """Make the edges that end at a candidates for v unless the ways around them are shorter than the `least`."""
         for k in range(self.first_at_end[a], self.first_at_end[a + 1]):
             fit: cython.int = self.fit_of[self.at_end[k]]
             if fit & _MOST_FITS and not self.has_met(v, fit):
-                self.offer(self.at_end[k], v)
+                self.offer(self.at_end[k], v, least)
 
     @cython.cfunc
     @cython.nogil
-    def offer(self, i: cython.int, v: cython.int) -> cython.void:
+    def offer(self, i: cython.int, v: cython.int, least: cython.double) -> cython.void:
         """Make an edge a candidate for v, which waits, if the way around it would be shorter and v has not met it."""
         here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
         value: cython.double = self.around(i, here, False)
-        if value >= self.most(v) or self.has_met(v, self.fit_of[i]) or self.lacks_room():
+        if value < least or value >= self.most(v) or self.has_met(v, self.fit_of[i]) or self.lacks_room():
             return
         k: cython.int = self.met[v]
         if k < 0 or self.lists[k].count == 14:
@@ -446,7 +447,7 @@ class _Bends(Ray):
         if v in (self.edges[i, 0], self.edges[i, 1]) or not self.is_hidden_from_before(i, here, self.body.reach[v]):
             return
         one: cython.pointer[_Offer] = cython.address(self.offers[self.n_offers])
-        one.fit, one.next, one.asked, one.value = self.fit_of[i], self.newest[v], False, value
+        one.fit, one.next, one.is_guess, one.value = self.fit_of[i], self.newest[v], self.is_guess, value
         self.newest[v], self.n_offers = self.n_offers, self.n_offers + 1
         self.waiting.set_key(v, max(self.waiting.key[v], 1 / value))
 
@@ -510,34 +511,47 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def ask(self, v: cython.int) -> cython.void:
-        """Give v the way around its first candidate if the line is clear, and offer the edge to the neighbours."""
-        k: cython.int = self.shortest(v)
-        if k < 0:
-            return
-        i: cython.int = self.offers[k].fit >> _FIT_BITS
-        value: cython.double = self.offers[k].value
-        is_longer: cython.bint = value >= self.d[v] * (1 - GAIN)
-        if not is_longer and not self.offers[k].asked:
-            self.offers[k].asked = True
-            self.offer_at(self.edges[i, 0], v)
-            self.offer_at(self.edges[i, 1], v)
-            if self.waiting.key[v] * value > 1 + GAIN:
-                return
-        self.offers[k].value = INFINITY
-        self.look_back(i, v, cython.address(self.body.positions[v, 0]))
+        """Give v the way around its first candidate if the line is clear, and offer the edge to the neighbours.
+
+        If it is clear, edges that share an end with it may give shorter ways, and are asked for at once. If it is
+        hidden, they wait with those at the triangle that hides it; guesses that are hidden do not lead to nearer ones.
+        """
         line: cython.pointer[Line] = cython.address(self.line)
-        if is_longer:
-            self.offer_around(i, v)
-        elif self.follows(line, v):
-            self.d[v], self.way[v] = value, i
-            # A way may bend at an end that is not reached yet, equally short to rounding.
-            end: cython.int = self.edges[i, self.share >= 0.5]
-            self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, self.share < 0.5]]
-            self.offer_around(i, v)
+        is_found: cython.bint = False
+        k: cython.int = self.shortest(v)
+        while k >= 0:
+            i: cython.int = self.offers[k].fit >> _FIT_BITS
+            value: cython.double = self.offers[k].value
+            if value >= self.d[v] * (1 - GAIN):
+                break
+            self.offers[k].value = INFINITY
+            self.look_back(i, v, cython.address(self.body.positions[v, 0]))
+            if self.follows(line, v):
+                is_found = True
+                self.d[v], self.way[v] = value, i
+                # A way may bend at an end that is not reached yet, equally short to rounding.
+                end: cython.int = self.edges[i, self.share >= 0.5]
+                self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, self.share < 0.5]]
+                self.offer_at(self.edges[i, 0], v, 0.0)
+                self.offer_at(self.edges[i, 1], v, 0.0)
+            else:
+                for c in range(1, 4):
+                    self.offer_at(self.body.cells[line.t, (line.out + c) & 3], v, 0.0)
+                least: cython.double = value if self.offers[k].is_guess else 0.0
+                self.is_guess = True
+                self.offer_at(self.edges[i, 0], v, least)
+                self.offer_at(self.edges[i, 1], v, least)
+                self.is_guess = False
+                if not is_found:
+                    self.shortest(v)
+                    return
+            k = self.shortest(v)
+        if is_found:
+            self.offer_around(self.way[v], v)
             self.begin_at(v)
-        else:
-            for c in range(1, 4):
-                self.offer_at(self.body.cells[line.t, (line.out + c) & 3], v)
+        elif k >= 0:
+            self.offers[k].value = INFINITY
+            self.offer_around(self.offers[k].fit >> _FIT_BITS, v)
         self.shortest(v)
 
     @cython.cfunc
