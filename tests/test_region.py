@@ -53,6 +53,10 @@ def test_distances_are_those_on_the_mesh_cut_out(seed):
     )
     np.testing.assert_allclose(near[:, used], alone, rtol=1e-12)
     assert not near[:, outside].any()
+    by_lengths, of_part = np.zeros((mesh.n_faces, 3)), GeodesicSolver(part).distance_vjp(sources)[1]
+    by_lengths[faces] = of_part.by_lengths(np.ones(len(used)))
+    pull_back = GeodesicSolver(mesh, region=region).distance_vjp(used[sources])[1]
+    np.testing.assert_allclose(pull_back.by_lengths(np.ones(mesh.n_vertices)), by_lengths, atol=1e-9)
 
 
 def test_local_queries_in_a_region():

@@ -14,7 +14,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged
 from heat_igl.kernels.windows import paths as kernels
-from heat_igl.mesh import Mesh, PointCloud
+from heat_igl.mesh import Mesh, MeshPart, PointCloud
 from heat_igl.operators import MetricSides, Operators, SideLengths, Surface
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import gradient_rows, velocities
@@ -49,8 +49,9 @@ class DistanceDerivative:
         surface: Surface,
         sides: SideLengths | None,
         windows: ExactSurface,
+        part: MeshPart | None = None,
     ) -> None:
-        self.distance, self._sources, self._sides = distance, sources, sides
+        self.distance, self._sources, self._sides, self._part = distance, sources, sides, part
         if surface.faces is None:
             raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
         self._faces, self._paths = surface.faces, PathLengths(windows, surface.faces, sources)
@@ -87,10 +88,13 @@ class DistanceDerivative:
         """The gradient (m, 3) or (k, m, 3) by the lengths of the sides opposite each corner, for `g` as for a call.
 
         An edge is a side of each of its faces: its derivative is the sum of theirs. Rows are the faces of the mesh. Of
-        two faces with the same vertices, one has the derivative of both, and the other 0.
+        two faces with the same vertices, one has the derivative of both, and the other 0. Outside a region it is 0.
         """
-        result = [self._on_given_faces(self._by_sides(row)[0]) for row in gradient_rows(g, self.distance)]
-        return np.stack(result) if np.ndim(g) == 2 else result[0]
+        result = np.stack([self._on_given_faces(self._by_sides(row)[0]) for row in gradient_rows(g, self.distance)])
+        if self._part is not None:
+            of_part, result = result, np.zeros((len(result), len(self._part.whole), 3))
+            result[:, self._part.faces] = of_part
+        return result if np.ndim(g) == 2 else np.asarray(result[0])
 
     def by_points(self, g: ArrayLike) -> FloatArray:
         """The gradient by the positions of the sources that are points in faces.
@@ -124,7 +128,7 @@ class DistanceDerivative:
 
         Symmetric on each face. Raises a ValueError without a metric, and if g has another shape or is not finite.
         """
-        metric = self._metric("metric_operators(mesh, metric)")
+        metric = self._metric("metric_operators(mesh, metric), with a metric on each face for windows")
         (row,) = gradient_rows(g, self.distance, 1)
         return metric.by_metric(self._on_given_faces(self._by_sides(row)[0]))
 
@@ -198,7 +202,7 @@ class DistanceDerivative:
     def _positions(self) -> SideLengths:
         if self._sides is None:
             raise MeshError(
-                "the solver was made without positions, so there are no vertices to move: use by_lengths for the "
+                "lengths do not follow from positions here, so there are no vertices to move: use by_lengths for the "
                 "derivative by edge lengths"
             )
         return self._sides

@@ -401,7 +401,7 @@ class GeodesicSolver(BatchedSolver):
         surface = cast(Triangles, self._triangles).surface
         sides = domain.metric if isinstance(domain, Operators) else SideLengths(cast(Mesh, domain))
         distance = engine.distance(chosen, np.inf, n_threads())
-        return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_faces)
+        return distance, DistanceDerivative(distance, chosen, surface, sides, engine.windows.on_faces, self._part)
 
     def _asked(self, sources: SourceSet) -> Engine:
         """The engine for these sources: points and curves in a varying metric are those of windows."""
