@@ -132,7 +132,7 @@ def write_matrix(path: Path, suffix: str, found: Any) -> None:
         with path.open("wb") as file:
             sp.save_npz(file, found)
     elif suffix == ".csv":
-        np.savetxt(path, found, delimiter=",", fmt="%.9g")
+        np.savetxt(path, np.array(found), delimiter=",", fmt="%.9g")  # through memory, too
     elif not isinstance(found, np.memmap):
         with path.open("wb") as file:
             np.save(file, found)
