@@ -15,7 +15,7 @@ from conftest import flat_perturbed, perturbed, two_halves
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.transform import Rotation
-from surfaces import arcs, dual_of_sphere, moebius_strip, on_pages
+from surfaces import arcs, dual_of_sphere, moebius_strip, on_pages, points_of_sphere
 
 import heat_igl
 from heat_igl import Mesh, PolygonMesh, fibre_metric, image_domain, metric_operators, shapes, speed_operators
@@ -162,11 +162,6 @@ def _with_metric(mesh: Mesh, metric: np.ndarray) -> Domain:
     )
 
 
-def on_sphere(n: int) -> np.ndarray:
-    P = np.random.default_rng(8).standard_normal((n, 3))
-    return P / np.linalg.norm(P, axis=1, keepdims=True)
-
-
 def _speeds() -> Domain:
     """Two halves of a square at speeds 1 and 2: triangles that see their common sides at different lengths."""
     mesh = two_halves(24)
@@ -181,8 +176,8 @@ _MAKE: dict[str, Callable[[], Domain]] = {
     "one side": lambda: _of_mesh(moebius_strip(150, 8)),
     "non-manifold": lambda: _of_mesh(mesh := shapes.book(3, 18), truth=partial(on_pages, mesh.V)),
     "polygons": lambda: Domain("polygons", (mesh := dual_of_sphere(3)).V, mesh.polygons, truth=partial(arcs, mesh.V)),
-    "points": lambda: Domain("points", P := on_sphere(1500), None, truth=partial(arcs, P)),
-    "points with normals": lambda: Domain("points", P := on_sphere(1500), None, P, partial(arcs, P)),
+    "points": lambda: Domain("points", P := points_of_sphere(1500, 8), None, truth=partial(arcs, P)),
+    "points with normals": lambda: Domain("points", P := points_of_sphere(1500, 8), None, P, partial(arcs, P)),
     "pixels": lambda: _convex(image_domain(np.ones((30, 40), bool), (0.5, 0.7)).mesh),
     "voxels": lambda: _convex(image_domain(np.ones((5, 6, 7), bool), (1.0, 0.8, 0.7)).mesh),
     "tetrahedra": lambda: _convex(tetrahedra(np.random.default_rng(3).random((500, 3)))),

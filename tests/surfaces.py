@@ -46,6 +46,22 @@ def bumpy(subdivisions: int = 3) -> Mesh:
     return perturbed(shapes.icosphere(subdivisions), 0.3, 1)
 
 
+def pressed(height: float) -> Mesh:
+    """An ellipsoid whose triangles are far from Delaunay."""
+    return Mesh(perturbed(shapes.icosphere(3), 0.3).V * [1.0, 0.6, height], shapes.icosphere(3).F)
+
+
+def points_of_sphere(n: int, seed: int = 0) -> np.ndarray:
+    P = np.random.default_rng(seed).standard_normal((n, 3))
+    return P / np.linalg.norm(P, axis=1, keepdims=True)
+
+
+def points_of_moebius_strip(turn: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """At the angle `turn` around the axis, by `side` across."""
+    out = 1 + side * np.cos(turn / 2)
+    return np.stack([out * np.cos(turn), out * np.sin(turn), side * np.sin(turn / 2)], axis=-1)
+
+
 def angle_between(a: np.ndarray, b: np.ndarray | float = 0.0) -> np.ndarray:
     """How far angles are from others, or from 0, up to whole turns."""
     return np.abs(np.angle(np.exp(1j * (a - b))))
@@ -62,11 +78,24 @@ def cube() -> Mesh:
     return Mesh(V, scipy.spatial.ConvexHull(V).simplices)
 
 
+def skin(V: np.ndarray, T: np.ndarray) -> Mesh:
+    """The surface of tetrahedra, counter-clockwise seen from outside if they are."""
+    used, F = np.unique(igl.boundary_facets(T)[0], return_inverse=True)
+    return Mesh(V[used], F.reshape(-1, 3))
+
+
 def box_surface(n: int, size: tuple[float, float, float] = (1, 1, 1)) -> Mesh:
     """The surface of a box, each side a grid of squares, counter-clockwise seen from outside."""
     solid = shapes.box(n, size)
-    used, F = np.unique(igl.boundary_facets(solid.F)[0], return_inverse=True)
-    return Mesh(solid.V[used], F.reshape(-1, 3))
+    return skin(solid.V, solid.F)
+
+
+def quads(n: int, bend: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A sheet of n by n quadrilaterals of side 1, flat or bent so that none of them is planar."""
+    y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    first = np.flatnonzero((x < n) & (y < n))
+    V = np.stack([x, y, bend * np.sin(x * y)], axis=1)
+    return V, np.stack([first, first + 1, first + n + 2, first + n + 1], axis=1)
 
 
 def two_arms(n: int) -> Mesh:
@@ -123,8 +152,7 @@ def moebius_strip(around: int, across: int, half_width: float = 0.4) -> Mesh:
     """A strip that cannot be oriented, of `around` by `across` cells."""
     t = np.linspace(0, 2 * np.pi, around, endpoint=False)
     s = np.linspace(-half_width, half_width, across + 1)
-    T, S = np.meshgrid(t, s, indexing="ij")
-    V = np.stack([(1 + S * np.cos(T / 2)) * np.cos(T), (1 + S * np.cos(T / 2)) * np.sin(T), S * np.sin(T / 2)], axis=-1)
+    V = points_of_moebius_strip(t[:, None], s)
     F, n = shapes.lattice_faces(around + 1, across + 1)[:, ::-1], around * (across + 1)
     return Mesh(V.reshape(-1, 3), np.where(n > F, F, n + across - F))
 

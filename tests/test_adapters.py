@@ -1,17 +1,21 @@
 """Distance as a function of PyTorch and JAX; skipped where they are not installed."""
 
 import importlib.util
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
+from surfaces import bumpy
 
-from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, shapes
+from heat_igl import GeodesicSolver, HeatMethodSolver
 from heat_igl.errors import MissingExtraError
 
 
-def sphere() -> Mesh:
-    mesh = shapes.icosphere(2)
-    return Mesh(mesh.V + 0.02 * np.random.default_rng(0).standard_normal(mesh.V.shape), mesh.F)
+def adapter(name: str) -> tuple[ModuleType, Any]:
+    """A library, and distance as a function of it."""
+    library = pytest.importorskip(name)
+    return library, importlib.import_module(f"heat_igl.applications.{name}").geodesic_distance
 
 
 @pytest.mark.parametrize("name", ["torch", "jax"])
@@ -25,20 +29,16 @@ def test_what_to_install_is_said(name):
 
 class TestTorch:
     def test_gradients_are_those_of_differences(self):
-        torch = pytest.importorskip("torch")
-        from heat_igl.applications.torch import geodesic_distance
-
-        mesh = sphere()
+        torch, geodesic_distance = adapter("torch")
+        mesh = bumpy(2)
         V = torch.tensor(mesh.V, requires_grad=True)
         assert torch.autograd.gradcheck(
             lambda V: geodesic_distance(V, mesh.F, [0, 70], method="exact"), (V,), eps=1e-6, atol=1e-5, rtol=1e-4
         )
 
     def test_types_and_solver(self):
-        torch = pytest.importorskip("torch")
-        from heat_igl.applications.torch import geodesic_distance
-
-        mesh = sphere()
+        torch, geodesic_distance = adapter("torch")
+        mesh = bumpy(2)
         solver = GeodesicSolver(mesh, method="exact")
         expected, pull_back = solver.distance_vjp(3)
         V = torch.tensor(mesh.V, dtype=torch.float32, requires_grad=True)
@@ -49,10 +49,8 @@ class TestTorch:
         np.testing.assert_allclose(V.grad.numpy(), pull_back(np.ones(len(expected))), atol=1e-4)
 
     def test_what_cannot_be_used(self):
-        torch = pytest.importorskip("torch")
-        from heat_igl.applications.torch import geodesic_distance
-
-        mesh = sphere()
+        torch, geodesic_distance = adapter("torch")
+        mesh = bumpy(2)
         V = torch.tensor(mesh.V, requires_grad=True)
         with pytest.raises(
             TypeError, match=r"V must hold floating-point numbers to be differentiated, not torch\.int64"
@@ -76,10 +74,8 @@ class TestTorch:
 
 class TestJax:
     def test_gradients_under_jit(self):
-        jax = pytest.importorskip("jax")
-        from heat_igl.applications.jax import geodesic_distance
-
-        mesh = sphere()
+        jax, geodesic_distance = adapter("jax")
+        mesh = bumpy(2)
         expected, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(3)
 
         def loss(V):
@@ -90,10 +86,8 @@ class TestJax:
         np.testing.assert_allclose(np.asarray(gradient), pull_back(2 * expected), atol=1e-3)
 
     def test_what_cannot_be_used(self):
-        pytest.importorskip("jax")
-        from heat_igl.applications.jax import geodesic_distance
-
-        mesh = sphere()
+        _, geodesic_distance = adapter("jax")
+        mesh = bumpy(2)
         with pytest.raises(TypeError, match="V must hold floating-point numbers to be differentiated, not int"):
             geodesic_distance(mesh.V.astype(int), mesh.F, 0)
         with pytest.raises(ValueError, match=r"V must have shape \(n, 3\)"):

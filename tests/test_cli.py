@@ -50,10 +50,8 @@ def ball(tmp_path):
 
 @pytest.fixture
 def two_spheres(tmp_path):
-    one = shapes.icosphere(1)
-    path = tmp_path / "two.off"
-    io.write_mesh(path, twice(one))
-    return path
+    io.write_mesh(tmp_path / "two.off", twice(shapes.icosphere(1)))
+    return tmp_path / "two.off"
 
 
 def test_distance_writes_what_the_library_returns_and_a_picture(ball, capsys, monkeypatch):

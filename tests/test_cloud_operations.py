@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from surfaces import points_of_moebius_strip, points_of_sphere
 
 import heat_igl
 from heat_igl import GeodesicSolver, Mesh, MeshError, PointCloud, SurfacePoints
@@ -22,10 +23,8 @@ def domain(name: str) -> Mesh | PointCloud:
     rng = np.random.default_rng(0)
     if name == "cloud with one side":
         turn, side = rng.random((2, 1200)) * [[2 * np.pi], [0.8]] - [[0], [0.4]]
-        out = 1 + side * np.cos(turn / 2)
-        return PointCloud(np.stack([out * np.cos(turn), out * np.sin(turn), side * np.sin(turn / 2)], axis=1))
-    P = rng.standard_normal((800, 3))
-    P /= np.linalg.norm(P, axis=1, keepdims=True)
+        return PointCloud(points_of_moebius_strip(turn, side))
+    P = points_of_sphere(800)
     return PointCloud(P, P) if name == "oriented cloud" else PointCloud(P + 0.04 * rng.standard_normal(P.shape))
 
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import perturbed
-from surfaces import moebius_strip, nearest_vertex, twice
+from conftest import flat_perturbed
+from surfaces import moebius_strip, nearest_vertex, twice, two_arms
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, OffsetSources, SurfacePoints, shapes
@@ -40,15 +40,21 @@ def differences(
         return np.where(np.isfinite(here), (ahead - behind) / (2 * step), 0.0), smooth
 
 
+def pulled(solver: GeodesicSolver, sources: Any, rng: np.random.Generator) -> tuple[np.ndarray, Any, np.ndarray]:
+    """The distance, its derivative, and random weights of vertices, 0 where it is not exact."""
+    distance, pull_back = solver.distance_vjp(sources)
+    g = rng.standard_normal(len(distance))
+    g[pull_back.inexact] = 0
+    return distance, pull_back, g
+
+
 @pytest.mark.parametrize("name", MESHES)
 def test_paths_against_central_differences(name):
     mesh, rng = MESHES[name](), np.random.default_rng(1)
     solver, sources = GeodesicSolver(mesh, method="exact"), OffsetSources([5, mesh.n_vertices // 2], [0.0, 0.1])
-    distance, pull_back = solver.distance_vjp(sources)
+    distance, pull_back, g = pulled(solver, sources, rng)
     np.testing.assert_array_equal(distance, solver.distance(sources))
     assert len(pull_back.inexact) <= 0.01 * mesh.n_vertices
-    g = rng.standard_normal(mesh.n_vertices)
-    g[pull_back.inexact] = 0
     for _ in range(20 if mesh.n_vertices < 700 else 4):
         direction = rng.standard_normal(mesh.V.shape)
         step = 1e-7 * mesh.edge_lengths.mean()
@@ -67,9 +73,7 @@ def test_paths_against_central_differences(name):
 @pytest.mark.parametrize("name", ["sphere", "grid", "moebius"])
 def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name):
     mesh, rng = MESHES[name](), np.random.default_rng(4)
-    distance, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(5)
-    g = rng.standard_normal(mesh.n_vertices)
-    g[pull_back.inexact] = 0
+    distance, pull_back, g = pulled(GeodesicSolver(mesh, method="exact"), 5, rng)
     dV = pull_back(g)
     scale = np.abs(g * distance).sum()
     np.testing.assert_allclose(dV.sum(axis=0), 0, atol=1e-10 * np.abs(dV).sum())
@@ -93,16 +97,14 @@ def test_scaling_gives_the_distance_where_faces_have_a_vertex_twice():
         n_folded += (np.diff(corners, axis=1) == 0).any()
         places = rng.dirichlet([1, 1, 1], 2)
         for sources in ([0], SurfacePoints(rng.integers(0, 2 * k, 2), places)):
-            distance, pull_back = GeodesicSolver(mesh).distance_vjp(sources)
+            distance, pull_back, g = pulled(GeodesicSolver(mesh), sources, rng)
             assert not len(pull_back.inexact)
-            g = rng.standard_normal(mesh.n_vertices)
             assert (pull_back(g) * mesh.V).sum() == pytest.approx((g * distance).sum(), rel=1e-9, abs=1e-9)
     assert n_folded > 15
 
 
 def test_on_a_flat_convex_mesh_the_ends_move_along_the_line():
-    flat = perturbed(shapes.grid(20))
-    mesh = Mesh(flat.V * [1, 1, 0], flat.F)
+    mesh = flat_perturbed(shapes.grid(20), 0.15)
     distance, pull_back = GeodesicSolver(mesh, method="exact").distance_vjp(110)
     others = [3, 50, 217, 399]
     assert HeatMethodSolver(mesh).diagnostics.n_flips > 0
@@ -115,10 +117,8 @@ def test_on_a_flat_convex_mesh_the_ends_move_along_the_line():
 
 
 def test_a_bend_moves_with_its_vertex():
-    square = shapes.grid(12)
-    centre = square.V[square.F].mean(axis=1)
-    mesh = Mesh(square.V, square.F[~((centre[:, 0] > 0.5) & (centre[:, 1] > 0.5))])
-    start, end, bend = (nearest_vertex(mesh, place) for place in ([1, 0.25, 0], [0.25, 1, 0], [0.5, 0.5, 0]))
+    mesh = two_arms(6)
+    start, end, bend = (nearest_vertex(mesh, place) for place in ([0.5, -0.25, 0], [-0.25, 0.5, 0], [0, 0, 0]))
     solver = GeodesicSolver(mesh, method="exact")
     _, pull_back = solver.distance_vjp(start)
     dV = pull_back(np.eye(mesh.n_vertices)[end])
@@ -130,13 +130,9 @@ def test_a_bend_moves_with_its_vertex():
 
 def test_by_edge_lengths_without_positions():
     mesh, rng = MESHES["sphere"](), np.random.default_rng(6)
-    corners = mesh.V[mesh.F]
-    lengths = np.stack([np.linalg.norm(corners[:, (c + 1) % 3] - corners[:, (c + 2) % 3], axis=1) for c in range(3)], 1)
+    lengths = mesh.edge_lengths[mesh.facets.of_face]
     made = partial(GeodesicSolver.from_edge_lengths, method="exact")
-    solver = made(mesh.F, lengths)
-    distance, pull_back = solver.distance_vjp(9)
-    g = rng.standard_normal(len(distance))
-    g[pull_back.inexact] = 0
+    _, pull_back, g = pulled(made(mesh.F, lengths), 9, rng)
     by_lengths = pull_back.by_lengths(g)
     edge = np.sort(np.stack([mesh.F[:, [1, 2, 0]], mesh.F[:, [2, 0, 1]]], axis=-1), axis=-1)
     rate = rng.standard_normal(mesh.n_vertices)[edge].prod(axis=-1) * lengths  # the same on both sides of an edge
@@ -150,9 +146,7 @@ def test_points_in_faces_as_sources():
     mesh, rng = moved(shapes.torus(50, 25), 0.3), np.random.default_rng(8)
     faces, barycentric = rng.integers(mesh.n_faces, size=4), rng.dirichlet([2, 2, 2], 4)
     solver, at = GeodesicSolver(mesh, method="exact"), partial(SurfacePoints, faces)
-    _, pull_back = solver.distance_vjp(at(barycentric))
-    g = rng.standard_normal(mesh.n_vertices)
-    g[pull_back.inexact] = 0
+    _, pull_back, g = pulled(solver, at(barycentric), rng)
     direction, step = rng.standard_normal(mesh.V.shape), 1e-6 * mesh.edge_lengths.mean()
     expected, smooth = differences(solver, mesh.V, at(barycentric), direction, step)
     g = np.where(smooth, g, 0.0)
@@ -210,9 +204,7 @@ def solver_in(mesh: Mesh, kind: str, values: np.ndarray) -> GeodesicSolver:
 def test_speeds_and_metrics(kind):
     mesh, rng = MESHES["grid"](), np.random.default_rng(5)
     values = metric_of(mesh, kind)
-    distance, pull_back = solver_in(mesh, kind, values).distance_vjp(150)
-    g = rng.standard_normal(mesh.n_vertices)
-    g[pull_back.inexact] = 0
+    distance, pull_back, g = pulled(solver_in(mesh, kind, values), 150, rng)
     change = 0.1 * rng.standard_normal(values.shape)
     if kind != "speed":
         change += np.swapaxes(change, 1, 2)

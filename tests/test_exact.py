@@ -15,6 +15,7 @@ from surfaces import (
     rough_field,
     rough_star,
     sheared,
+    skin,
     two_arms,
 )
 
@@ -143,11 +144,7 @@ def of_tetrahedra(n: int, share: float, seed: int | np.random.Generator) -> Mesh
     rng = np.random.default_rng(seed)
     P = rng.random((n, 3))
     T = Delaunay(P).simplices
-    T = T[rng.random(len(T)) < share]
-    F = np.concatenate([T[:, corners] for corners in ([1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1])])
-    _, which, count = np.unique(np.sort(F, axis=1), axis=0, return_inverse=True, return_counts=True)
-    used, F = np.unique(F[count[which.ravel()] == 1], return_inverse=True)
-    return Mesh(P[used], F.reshape(-1, 3))
+    return skin(P, T[rng.random(len(T)) < share])
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -84,7 +84,7 @@ def test_tetrahedra_and_edge_lengths_have_edges_too():
     box = shapes.box(4)
     distance = np.linalg.norm(box.V - box.V[0], axis=1)
     sources = source_set(0, box.n_vertices, None)
-    kept = Invariants(box.F, box.components, box.V)
+    kept = invariants(box)
     assert kept.contradiction(distance, sources) is None
     distance[60] += 0.5
     assert "at vertex 60" in str(kept.contradiction(distance, sources))
@@ -127,17 +127,22 @@ def test_another_engine_answers_for_a_broken_one_and_none_is_an_error():
         GuardedEngine(broken, invariants(mesh), (lambda: broken,)).distance(sources)
 
 
+def spoil(monkeypatch, owner: object, name: str, wrong: Callable[..., object]) -> None:
+    """From here on, `wrong` changes what a function finds: its result, or those of its arguments that hold one."""
+    right = getattr(owner, name)
+
+    def spoiled(*arguments, **options):
+        found = right(*arguments, **options)
+        wrong(found, *arguments)
+        return found
+
+    monkeypatch.setattr(owner, name, spoiled)
+
+
 @pytest.mark.parametrize("factor", [0.7, 1.6, np.inf])
 def test_windows_that_are_wrong_do_not_leave_the_solver(monkeypatch, factor):
     mesh, distance = two_squares()
-    solve = WindowEngine.distance
-
-    def wrong(self, sources, cutoff=np.inf, threads=1):
-        found = solve(self, sources, cutoff, threads)
-        found[FAR] *= factor
-        return found
-
-    monkeypatch.setattr(WindowEngine, "distance", wrong)
+    spoil(monkeypatch, WindowEngine, "distance", lambda found, *_: found.__setitem__(FAR, factor * found[FAR]))
     ask = [
         lambda: GeodesicSolver(mesh).distance(SOURCE),
         lambda: GeodesicSolver(mesh, method="exact").distances([SOURCE])[0],
@@ -164,16 +169,9 @@ WRONG: dict[str, Callable[[FloatArray], object]] = {
 }
 
 
-def spoil(monkeypatch, wrong: str) -> None:
+def spoil_local(monkeypatch, wrong: str) -> None:
     """Every local search finds distances that are wrong in the way named."""
-    search = windows.search_each
-
-    def step(*arguments):
-        done = search(*arguments)
-        WRONG[wrong](arguments[8][: arguments[9][0]])
-        return done
-
-    monkeypatch.setattr(windows, "search_each", step)
+    spoil(monkeypatch, windows, "search_each", lambda _, *given: WRONG[wrong](given[8][: given[9][0]]))
 
 
 @pytest.mark.parametrize("wrong", WRONG)
@@ -181,7 +179,7 @@ def spoil(monkeypatch, wrong: str) -> None:
 def test_local_answers_that_are_wrong_are_found_again(monkeypatch, query, wrong):
     mesh, _ = two_squares()
     right = LOCAL[query](mesh)
-    spoil(monkeypatch, wrong)
+    spoil_local(monkeypatch, wrong)
     with pytest.warns(AccuracyWarning, match="contradicted themselves .* found again"):
         found = LOCAL[query](mesh)
     np.testing.assert_allclose(found, right, rtol=1e-6)
@@ -191,8 +189,7 @@ def test_local_answers_that_are_wrong_are_found_again(monkeypatch, query, wrong)
 def test_wrong_distances_of_targets_are_found_again(monkeypatch, factor):
     mesh, distance = two_squares()
     point = SurfacePoints([300], [[0.2, 0.3, 0.5]])
-    to_targets = WindowEngine.to_targets
-    monkeypatch.setattr(WindowEngine, "to_targets", lambda *arguments: to_targets(*arguments) * factor)
+    spoil(monkeypatch, WindowEngine, "to_targets", lambda found, *_: found.__imul__(factor))
     with pytest.warns(AccuracyWarning, match="at target 0.*report"):
         found = heat_igl.geodesic_distance(mesh, SOURCE, targets=[FAR, 3])
     np.testing.assert_allclose(found, distance[[FAR, 3]], rtol=1e-6)
@@ -205,14 +202,9 @@ def test_wrong_distances_of_targets_are_found_again(monkeypatch, factor):
 )
 def test_a_sweep_that_is_wrong_is_named(monkeypatch, wrong, everywhere):
     mesh, solver = shapes.icosphere(4), GeodesicSolver(shapes.icosphere(4), method="sweep")
-    right, sweep = solver.distance(0), sweeping.sweep
-
-    def step(spokes, distance, *arguments):
-        visits = sweep(spokes, distance, *arguments)
-        distance[slice(None) if everywhere else 1000] *= wrong
-        return visits
-
-    monkeypatch.setattr(sweeping, "sweep", step)
+    right = solver.distance(0)
+    at = slice(None) if everywhere else slice(1000, 1001)
+    spoil(monkeypatch, sweeping, "sweep", lambda _, *given: given[1][at].__imul__(wrong))
     with pytest.warns(AccuracyWarning, match="sweep contradicted .* report"):
         distance = solver.distance(0)
     assert invariants(mesh).contradiction(distance, source_set(0, mesh.n_vertices, mesh.F)) is None
@@ -237,14 +229,12 @@ PATHS: dict[str, tuple[type, str, Callable[[Mesh], FloatArray]]] = {
 def test_paths_that_are_wrong_are_found_again_or_an_error(monkeypatch, what, factor):
     mesh = shapes.grid(19)
     engine, name, ask = PATHS[what]
-    right, search = ask(mesh), getattr(engine, name)
+    right = ask(mesh)
 
-    def wrong(*arguments):
-        found = search(*arguments)
+    def wrong(found, *_):
         (found[0] if isinstance(found, tuple) else found)[FAR] *= factor
-        return found
 
-    monkeypatch.setattr(engine, name, wrong)
+    spoil(monkeypatch, engine, name, wrong)
     if name == "directed":
         with pytest.raises(RuntimeError, match=f"{FAR}.*report"):
             ask(mesh)
@@ -256,20 +246,14 @@ def test_paths_that_are_wrong_are_found_again_or_an_error(monkeypatch, what, fac
 
 def test_the_log_map_of_a_vertex_that_is_wrong_is_found_again(monkeypatch):
     mesh = shapes.grid(19)
-    right, searched = heat_igl.log_map(mesh, SOURCE), directions.search
-
-    def wrong(*arguments, **options):
-        found = searched(*arguments, **options)
-        found.found.distance[7] *= 0.5
-        return found
-
-    monkeypatch.setattr(directions, "search", wrong)
+    right = heat_igl.log_map(mesh, SOURCE)
+    spoil(monkeypatch, directions, "search", lambda found, *_: found.found.distance[7:8].__imul__(0.5))
     np.testing.assert_allclose(heat_igl.log_map(mesh, SOURCE), right, atol=1e-9)
 
 
 @pytest.mark.parametrize("wrong", WRONG)
 def test_local_log_maps_that_are_wrong_are_an_error(monkeypatch, wrong):
-    spoil(monkeypatch, wrong)
+    spoil_local(monkeypatch, wrong)
     with pytest.raises(RuntimeError, match=r"from vertex .* report"):
         heat_igl.log_maps_within(shapes.grid(19), 0.3, [SOURCE, 60])
 
@@ -279,23 +263,17 @@ def test_bodies_and_metrics_stay_between_lines_and_edges(monkeypatch, wrong):
     box, grid = shapes.box(5), shapes.grid(9)
     metric = heat_igl.metric_operators(grid, np.eye(3) * np.exp(grid.V[:, 0])[:, None, None] * np.array([4.0, 1, 1]))
     for engine, domain, mesh in ((LineEngine, box, box), (HopfLaxEngine, metric, grid)):
-        lower = engine._lower
-
-        def step(self, vertices, offset, distance, label, lower=lower):
-            doubt = lower(self, vertices, offset, distance, label)
-            distance[distance > 0] *= wrong
-            return doubt
-
         right = GeodesicSolver(domain).distance(0)
-        monkeypatch.setattr(engine, "_lower", step)
+        # Zeros stay zeros, times infinity as well.
+        spoil(
+            monkeypatch, engine, "_lower", lambda _, *given: np.multiply(given[3], wrong, given[3], where=given[3] > 0)
+        )
         found = GeodesicSolver(domain).distance(0)
         line = np.linalg.norm(mesh.V - mesh.V[0], axis=1)
         assert (found >= (1 - 1e-8) * line).all()
         assert np.isfinite(found).all()
         if engine is LineEngine:
-            assert (
-                Invariants(mesh.F, mesh.components, mesh.V).contradiction(found, source_set(0, len(line), None)) is None
-            )
+            assert invariants(mesh).contradiction(found, source_set(0, len(line), None)) is None
         else:
             assert (found <= 1.4 * right + 1e-12).all()
 
@@ -323,8 +301,8 @@ HEATED: dict[str, Callable[[], Any]] = {
 @pytest.mark.parametrize("factor", [0.3, 1.6, np.nan])
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
 def test_heat_that_is_wrong_is_told_on_every_domain(monkeypatch, domain, factor):
-    solver, solve = HeatMethodSolver(HEATED[domain]()), PoissonProblem.solve
-    monkeypatch.setattr(PoissonProblem, "solve", lambda self, b: factor * solve(self, b))
+    solver = HeatMethodSolver(HEATED[domain]())
+    spoil(monkeypatch, PoissonProblem, "solve", lambda phi, *_: phi.__imul__(factor))
     if np.isnan(factor):
         with pytest.raises(RuntimeError, match="nan at vertex"):
             solver.distance(SOURCE)
@@ -376,15 +354,12 @@ def test_vertices_beside_the_source_do_not_count_more_than_others():
 def counted(monkeypatch):
     """The vertices whose answers were compared."""
     asked = []
-    compare = Comparisons.compare
 
-    def counting(self, distance, sources, is_doubtful):
-        found = compare(self, distance, sources, is_doubtful)
+    def count(found, *given):
         if found is not None:
-            asked.append(int(sources.vertices[0]) if len(sources.vertices) else -1)
-        return found
+            asked.append(int(given[2].vertices[0]) if len(given[2].vertices) else -1)
 
-    monkeypatch.setattr(Comparisons, "compare", counting)
+    spoil(monkeypatch, Comparisons, "compare", count)
     return asked
 
 
@@ -444,15 +419,8 @@ def test_components_are_compared_by_themselves():
 def test_a_single_vertex_that_is_far_off_is_told(monkeypatch):
     """Bounds let the distance of a vertex be as wrong as an edge is long."""
     mesh = shapes.grid(2)
-    solve = PoissonProblem.solve
-
-    def wrong(self, b):
-        phi = solve(self, b)
-        phi[8] = 10.0
-        return phi
-
     HeatMethodSolver(mesh).distance(0)
-    monkeypatch.setattr(PoissonProblem, "solve", wrong)
+    spoil(monkeypatch, PoissonProblem, "solve", lambda phi, *_: phi.__setitem__(8, 10.0))
     with pytest.warns(AccuracyWarning, match="at vertex 8,"):
         HeatMethodSolver(mesh).distance(0)
 

@@ -265,35 +265,16 @@ def test_cotan_agrees_with_libigl(name, seed):
 # --- Distance converges to the known one, at the rate the theory gives and no faster, on every kind of domain
 
 
-def on(mesh: Mesh, source: int, closed: Callable[[Mesh, int], np.ndarray]) -> tuple[Operators, int, np.ndarray]:
+def on(
+    mesh: Mesh, place: int | list[float], closed: Callable[[Mesh, int], np.ndarray]
+) -> tuple[Operators, int, np.ndarray]:
+    source = place if isinstance(place, int) else nearest_vertex(mesh, place)
     return operators(mesh), source, closed(mesh, source)
-
-
-def disk(n: int) -> tuple[Operators, int, np.ndarray]:
-    mesh = shapes.disk(n)
-    return on(mesh, nearest_vertex(mesh, [0.5, 0, 0]), closed_forms.plane)
-
-
-def sphere(n: int) -> tuple[Operators, int, np.ndarray]:
-    return on(shapes.icosphere(int(np.log2(n))), 0, closed_forms.sphere)
-
-
-def cylinder(n: int) -> tuple[Operators, int, np.ndarray]:
-    return on(shapes.cylinder(n, n), n // 2 * n, closed_forms.cylinder)
-
-
-def cone(n: int) -> tuple[Operators, int, np.ndarray]:
-    return on(shapes.cone(3 * n, n, np.pi / 6), 1 + n // 2 * 3 * n, closed_forms.cone)
 
 
 def flat_torus(n: int) -> tuple[Operators, int, np.ndarray]:
     coordinates = np.stack(np.divmod(np.arange(n * n), n), axis=1) / n
     return intrinsic_operators(shapes.flat_torus(n)), 0, closed_forms.flat_torus(coordinates, 0)
-
-
-def box(n: int) -> tuple[Operators, int, np.ndarray]:
-    mesh = shapes.box(n)
-    return on(mesh, nearest_vertex(mesh, 0.5), closed_forms.convex_solid)
 
 
 def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float, **options) -> float:
@@ -305,13 +286,14 @@ def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float, **op
 @pytest.mark.parametrize(
     ("shape", "sizes"),
     [
-        (disk, (16, 32, 64)),
-        (sphere, (8, 16, 32)),
-        (cylinder, (32, 64, 128)),
-        (cone, (16, 32, 64)),
+        (lambda n: on(shapes.disk(n), [0.5, 0, 0], closed_forms.plane), (16, 32, 64)),
+        (lambda n: on(shapes.icosphere(int(np.log2(n))), 0, closed_forms.sphere), (8, 16, 32)),
+        (lambda n: on(shapes.cylinder(n, n), n // 2 * n, closed_forms.cylinder), (32, 64, 128)),
+        (lambda n: on(shapes.cone(3 * n, n, np.pi / 6), 1 + n // 2 * 3 * n, closed_forms.cone), (16, 32, 64)),
         (flat_torus, (32, 64, 128)),
-        (box, (6, 12, 24)),
+        (lambda n: on(shapes.box(n), [0.5] * 3, closed_forms.convex_solid), (6, 12, 24)),
     ],
+    ids=["disk", "sphere", "cylinder", "cone", "flat torus", "box"],
 )
 def test_order_and_bound(shape, sizes, magnitude, fastest):
     h, error, bound = [], [], []

@@ -85,6 +85,10 @@ class Browser:
             assert time.monotonic() < end, "the page does not answer"
             time.sleep(0.02)
 
+    def enter(self, identity: str, value: str | float, event: str = "change") -> None:
+        script = "const e = document.getElementById(arguments[0]); e.value = arguments[1];"
+        self.run(f"{script} e.dispatchEvent(new Event(arguments[2]))", identity, value, event)
+
     def text(self, identity: str) -> str:
         return str(self.run("return document.getElementById(arguments[0]).textContent", identity))
 
@@ -137,9 +141,8 @@ def chromium(tmp_path_factory):
     options = webdriver.ChromeOptions()
     options.binary_location = binary
     # WebGL in software, so that no graphics card is needed; no sandbox, which root may not have.
-    for (
-        argument
-    ) in "headless=new no-sandbox use-angle=swiftshader enable-unsafe-swiftshader window-size=560,560".split():
+    given = "headless=new no-sandbox use-angle=swiftshader enable-unsafe-swiftshader window-size=560,560"
+    for argument in given.split():
         options.add_argument(f"--{argument}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     try:
@@ -360,24 +363,13 @@ def test_a_click_on_tetrahedra_reads_only(browser):
     box = shapes.box(3)
     distance = np.linalg.norm(box.V - box.V[0], axis=1)
     browser.open(page(box, distance, sources=0))
-    corner = int(
-        np.argmax(
-            browser.run("return [...Array(arguments[0]).keys()].map((v) => window.heatIgl.onCanvas(v)[2])", len(box.V))
-        )
-    )
+    corner = max(range(len(box.V)), key=lambda vertex: browser.on_canvas(vertex)[2])
     browser.click(browser.on_canvas(corner))
     assert browser.sources() == [0]
     readout = browser.text("readout")
     assert readout.startswith(f"vertex {corner} ")
     assert float(readout.split()[-1]) == pytest.approx(distance[corner], rel=1e-5)
     assert not browser.driver.find_element("id", "pick-label").is_displayed()
-
-
-def choose(browser: Browser, identity: str, value: str) -> None:
-    browser.run(
-        "const e = document.getElementById(arguments[0]); e.value = arguments[1]; e.dispatchEvent(new Event('change'))",
-        identity, value,
-    )  # fmt: skip
 
 
 def set_to(browser: Browser, identity: str, value: bool) -> None:
@@ -400,7 +392,7 @@ def test_two_fields_stand_side_by_side(browser):
     assert browser.run("return [...document.getElementById('beside').options].map((o) => o.value)") == [
         "", "distance", "exact", "half",
     ]  # fmt: skip
-    choose(browser, "beside", "half")
+    browser.enter("beside", "half")
     left, right = halves(browser.image())
     vertex = 10 * 21 + 16
     at = browser.on_canvas(vertex)
@@ -410,7 +402,7 @@ def test_two_fields_stand_side_by_side(browser):
     assert browser.sources() == [vertex]
     assert browser.text("readout").endswith("): 0, exact 0.8, half 0.4")
     assert browser.text("method").endswith("Other fields keep their own source: exact, half.")
-    choose(browser, "beside", "")
+    browser.enter("beside", "")
     assert browser.on_canvas(vertex)[0] > at[0]
 
 
@@ -445,15 +437,11 @@ def test_a_signed_field_is_white_at_0(browser):
         np.testing.assert_allclose(colour_at(right, browser.on_canvas(vertex)), expected, atol=0.02)
     assert browser.text("label2") == "signed"
     # The isoline at 0 is wider than the others.
-    choose(browser, "style", "0")
-    browser.run("const e = document.getElementById('spacing'); e.value = 0.25; e.dispatchEvent(new Event('input'))")
+    browser.enter("style", "0")
+    browser.enter("spacing", 0.25, "input")
     _, lined = halves(browser.image())
-    row, left, end = (
-        int(browser.on_canvas(10 * 21)[1]),
-        browser.on_canvas(10 * 21)[0],
-        browser.on_canvas(11 * 21 - 1)[0],
-    )
-    dark = (right[row] - lined[row]).max(axis=1)
+    (left, row, _), (end, _, _) = browser.on_canvas(10 * 21), browser.on_canvas(11 * 21 - 1)
+    dark = (right - lined)[int(row)].max(axis=1)
 
     def ink(level):
         at = left + (level + 0.25) * (end - left)
@@ -491,10 +479,7 @@ def test_the_log_map_of_a_plane_is_a_checkerboard(browser):
     per_unit = np.linalg.norm(at[1] - at[0]) / np.linalg.norm(mesh.V[source + 1] - mesh.V[source])
     farthest = float(np.linalg.norm(straight, axis=1).max())
     spacing = farthest / 10
-    browser.run(
-        "const e = document.getElementById('spacing'); e.value = arguments[0]; e.dispatchEvent(new Event('input'))",
-        spacing,
-    )
+    browser.enter("spacing", spacing, "input")
     _, right = halves(browser.image())
     axes = np.array([1, 1j]) * turn / abs(turn)
     for u, v in np.ndindex(4, 4):
@@ -558,7 +543,7 @@ def test_a_saved_scene_opens_as_it_was(browser):
     shown = page(mesh, distance, sources=front, fields={"height </script>": mesh.V[:, 1]}, method="as given")
     browser.open(shown)
     source = int(browser.run("window.heatIgl.setSources([77]); return window.heatIgl.sources()[0]"))
-    choose(browser, "beside", "height </script>")
+    browser.enter("beside", "height </script>")
     set_to(browser, "directions", True)
     browser.drag(browser.on_canvas(front), browser.on_canvas(front) + np.array([40, 25, 0]))
     state, image, at = browser.run("return window.heatIgl.state()"), browser.image(), browser.on_canvas(front)

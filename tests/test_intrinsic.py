@@ -4,8 +4,8 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import mean_error, perturbed, zoo
-from surfaces import angle_between, moebius_strip, on_pages
+from conftest import flat_perturbed, mean_error, perturbed, zoo
+from surfaces import angle_between, moebius_strip, on_pages, pressed
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, SurfacePoints, geodesic_distance, shapes, tangent_frames
@@ -343,9 +343,7 @@ def flip(refined: Moved, move: int, faces: IntArray, barycentric: FloatArray) ->
         old = ab if faces[i] == ab // 3 else ba
         at = np.roll(barycentric[i], -(old % 3)) @ [place[corner] for corner in before[old]]
         for new, corners in after.items():
-            found = np.linalg.solve(
-                np.vstack([np.transpose([place[corner] for corner in corners]), np.ones(3)]), [*at, 1]
-            )
+            found = np.linalg.solve([*np.transpose([place[corner] for corner in corners]), np.ones(3)], [*at, 1])
             if found.min() >= -1e-12:
                 faces[i], barycentric[i] = new // 3, np.roll(found, new % 3)
                 break
@@ -415,12 +413,8 @@ def test_sources_in_faces(refined):
 
 @pytest.mark.parametrize("boundary", ["neumann", "dirichlet", "average"])
 def test_a_surface_with_a_boundary(boundary):
-    rng = np.random.default_rng(3)
-    flat = shapes.grid(6)
-    inner = ~flat.boundary
-    V = flat.V.copy()
-    V[inner, :2] += rng.uniform(-0.03, 0.03, (inner.sum(), 2))
-    mesh = Mesh(V * [8, 1, 1], flat.F)
+    flat = flat_perturbed(shapes.grid(6), 0.18, 3)
+    mesh = Mesh(flat.V * [8, 1, 1], flat.F)
     refined = HeatMethodSolver(mesh, boundary=boundary, laplacian="intrinsic-delaunay-refined")
     domain = refined.operators
     assert domain.n > mesh.n_vertices
@@ -428,7 +422,7 @@ def test_a_surface_with_a_boundary(boundary):
     assert not domain.boundary[mesh.n_vertices :].any()
     assert domain.M.sum() == pytest.approx(8, rel=1e-12)
     assert abs(domain.L - domain.D @ domain.G).max() < 1e-12
-    inside = int(np.flatnonzero(inner)[7])
+    inside = int(np.flatnonzero(~mesh.boundary)[7])
     for source in (inside, SurfacePoints([20], [[0.2, 0.3, 0.5]])):
         place = mesh.V[source] if isinstance(source, int) else source.barycentric[0] @ mesh.V[mesh.F[20]]
         truth = np.linalg.norm(mesh.V - place, axis=1)
@@ -524,18 +518,18 @@ def uneven_book(pages: int, n: int, stretch: float) -> Mesh:
 
 
 def doubled_sphere() -> Mesh:
-    """Every face twice, the second time the other way round, on triangles that are far from Delaunay."""
-    sphere = perturbed(shapes.icosphere(3), 0.3)
-    return Mesh(sphere.V * [1.0, 0.6, 0.2], np.concatenate([sphere.F, sphere.F[:, [2, 1, 0]]]))
+    """Every face twice, the second time the other way round."""
+    sphere = pressed(0.2)
+    return Mesh(sphere.V, np.concatenate([sphere.F, sphere.F[:, [2, 1, 0]]]))
 
 
 def finned_sphere() -> Mesh:
     """A sphere with a triangle standing on every tenth edge."""
-    sphere = perturbed(shapes.icosphere(3), 0.3)
+    sphere = pressed(0.3)
     edges = sphere.edges[::10]
     tips = 1.1 * sphere.V[edges].mean(axis=1)
     fins = np.column_stack([edges, sphere.n_vertices + np.arange(len(edges))])
-    return Mesh(np.concatenate([sphere.V, tips]) * [1.0, 0.6, 0.3], np.concatenate([sphere.F, fins]))
+    return Mesh(np.concatenate([sphere.V, tips]), np.concatenate([sphere.F, fins]))
 
 
 NONMANIFOLD = {
@@ -543,9 +537,7 @@ NONMANIFOLD = {
     "stretched book": lambda: uneven_book(3, 8, 6.0),
     "doubled sphere": doubled_sphere,
     "sphere with fins": finned_sphere,
-    "unreferenced vertices": lambda: Mesh(
-        np.vstack([[[9, 9, 9]], finned_sphere().V, [[8, 8, 8]]]), finned_sphere().F + 1
-    ),
+    "unreferenced vertices": lambda: Mesh(np.pad(finned_sphere().V, ((1, 1), (0, 0))), finned_sphere().F + 1),
 }
 
 
@@ -611,8 +603,7 @@ def test_cover_is_used_where_it_is_needed_and_only_there():
 
 def test_closed_manifold_gives_its_own_laplacian():
     """Two copies that meet in the vertices alone: fronts are glued to fronts, and half of both is the mesh."""
-    sphere = perturbed(shapes.icosphere(3), 0.3)
-    sphere = Mesh(sphere.V * [1.0, 0.6, 0.2], sphere.F)
+    sphere = pressed(0.2)
     cover = tufted_cover(sphere)
     side = np.arange(cover.F.size) // (3 * sphere.n_faces)
     assert (side == side[cover.twin]).all()
@@ -672,8 +663,7 @@ def test_each_face_once_keeps_the_first_of_each():
 
 def test_a_face_that_is_there_twice_counts_once():
     """The second copies make every edge one of four faces; without them it is the sphere, to the last bit."""
-    doubled = doubled_sphere()
-    sphere = Mesh(doubled.V, doubled.F[: doubled.n_faces // 2])
+    doubled, sphere = doubled_sphere(), pressed(0.2)
     assert has_nonmanifold_edges(doubled)
     one, other = operators(sphere), operators(doubled)
     assert (one.L != other.L).nnz == 0

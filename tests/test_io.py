@@ -23,13 +23,8 @@ from heat_igl import AccuracyWarning, Mesh, MeshError, PointCloud, cli, read_att
 from heat_igl.io import files, write_point_cloud
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="needs meshio")
-VTU = pytest.param(".vtu", marks=needs_meshio)
-SURFACE_FORMATS = [
-    ".off",
-    ".obj",
-    ".ply",
-    *(pytest.param(each, marks=needs_meshio) for each in (".mesh", ".msh", ".vtu")),
-]
+MESH, MSH, VTU = (pytest.param(each, marks=needs_meshio) for each in (".mesh", ".msh", ".vtu"))
+SURFACE_FORMATS = [".off", ".obj", ".ply", MESH, MSH, VTU]
 
 V4 = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 F4 = np.array([[0, 1, 2], [0, 1, 3]])
@@ -190,16 +185,7 @@ def test_obj_line_numbers_count_comments_and_continuations(tmp_path):
 
 # --- PLY --------------------------------------------------------------------------------------------------------------
 
-PLY_TYPES = {
-    "char": "b",
-    "uchar": "B",
-    "short": "h",
-    "ushort": "H",
-    "int": "i",
-    "uint": "I",
-    "float": "f",
-    "double": "d",
-}
+PLY_TYPES = dict(zip("char uchar short ushort int uint float double".split(), "bBhHiIfd", strict=True))
 
 
 @pytest.mark.parametrize("order", ["<", ">", ""])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from surfaces import assert_connected, twice
+from surfaces import assert_connected, moebius_strip, quads, twice
 
 import heat_igl
 from heat_igl import Mesh, MeshError, SourceError, SurfacePoints, closest_points, curve_on, edge_curve, shapes
@@ -18,21 +18,12 @@ TETRAHEDRON_V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 TETRAHEDRON_F = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
-def sheet(n: int, m: int, *, wrap: str = "") -> Mesh:
-    """An n x m grid of unit squares, each cut in two; `wrap` may join its ends: "cylinder", "torus" or "moebius"."""
-    columns, rows = n + (wrap == ""), m + (wrap != "torus")
-
-    def number(i: int, j: int) -> int:
-        if wrap == "moebius" and i == n:
-            i, j = 0, m - j
-        return (i % columns) * rows + j % rows
-
-    F = []
-    for i, j in itertools.product(range(n), range(m)):
-        a, b, c, d = number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)
-        F += [[a, b, c], [a, c, d]]
-    V = [[i, j, 0.1 * i * j] for i in range(columns) for j in range(rows)]
-    return Mesh(V, F)
+def sheet(n: int, m: int) -> Mesh:
+    """An n x m grid of unit squares, each cut in two."""
+    i, j = np.divmod(np.arange((n + 1) * (m + 1)), m + 1)
+    a = np.flatnonzero((i < n) & (j < m))
+    F = np.stack([a, a + m + 1, a + m + 2, a, a + m + 2, a + 1], axis=1).reshape(-1, 3)
+    return Mesh(np.stack([i, j, 0.1 * i * j], axis=1), F)
 
 
 def two_tetrahedra() -> Mesh:
@@ -97,7 +88,7 @@ def test_edge_lengths_belong_to_edges():
 
 
 def test_components_boundary_and_referenced():
-    a, b = sheet(3, 1), sheet(4, 4, wrap="torus")
+    a, b = sheet(3, 1), shapes.torus(4, 4)
     V = np.concatenate([a.V, [[9, 9, 9]], b.V])
     mesh = Mesh(V, np.concatenate([a.F, b.F + a.n_vertices + 1]))
     label = mesh.components
@@ -130,9 +121,9 @@ def test_longest_distance():
     [
         (Mesh(TETRAHEDRON_V, TETRAHEDRON_F), 2, 0),
         (sheet(3, 4), 1, 1),
-        (sheet(5, 2, wrap="cylinder"), 0, 2),
-        (sheet(5, 3, wrap="moebius"), 0, 1),
-        (sheet(5, 4, wrap="torus"), 0, 0),
+        (shapes.cylinder(5, 2), 0, 2),
+        (moebius_strip(5, 3), 0, 1),
+        (shapes.torus(5, 4), 0, 0),
         (Mesh(TETRAHEDRON_V, [[0, 1, 2, 3]]), 1, 1),
         (two_tetrahedra(), 1, 1),
     ],
@@ -310,14 +301,6 @@ def test_places_within_runs_and_the_next_in_each_run():
 # --- Arrays (m, 4): quadrilaterals are refused where tetrahedra are expected, and no tetrahedra are
 
 
-def quads(bend: float = 0.0, n: int = 6) -> tuple[np.ndarray, np.ndarray]:
-    """A sheet of n by n quadrilaterals, flat or bent so that none of them is planar."""
-    x, y = np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0))
-    V = np.stack([x.ravel(), y.ravel(), bend * np.sin(x * y).ravel()], axis=1)
-    corner = np.arange(n)[:, None] * (n + 1) + np.arange(n)
-    return V, np.stack([corner, corner + 1, corner + n + 2, corner + n + 1], axis=-1).reshape(-1, 4)
-
-
 CUBE = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
 CORNERS = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)], float)
 
@@ -325,7 +308,7 @@ CORNERS = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)], float)
 @pytest.mark.parametrize("bend", [0, 0.1, 0.5, 2])
 @pytest.mark.parametrize("n", [2, 6, 40])
 def test_a_sheet_of_quadrilaterals_is_not_taken_for_tetrahedra(bend, n):
-    V, F = quads(bend, n)
+    V, F = quads(n, bend)
     with pytest.raises(MeshError, match=r"F has 4 columns, which stands for tetrahedra, but F\[\d+\] = .* is a quadri"):
         Mesh(V, F)
     assert heat_igl.PolygonMesh(V, F).triangles.n_faces == 2 * n * n
@@ -375,7 +358,7 @@ def test_a_flat_tetrahedron_beside_others_is_for_the_report():
 
 def test_half_a_million_quadrilaterals_are_told_from_tetrahedra():
     """Half a million quadrilaterals and nearly as many tetrahedra: a quadratic check would not end."""
-    V, F = quads(0.2, 700)
+    V, F = quads(700, 0.2)
     with pytest.raises(MeshError, match="is a quadrilateral"):
         Mesh(V, F)
     assert shapes.box(40).n_faces == 384_000

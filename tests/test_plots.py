@@ -25,6 +25,13 @@ def surface_image(drawn: Picture) -> np.ndarray:
     return np.asarray(drawn.figure.axes[0].get_images()[0].get_array())
 
 
+def middle_row(drawn: Picture) -> np.ndarray:
+    """The colours of the pixels that the surface covers wholly."""
+    image = surface_image(drawn)
+    row = image[image.shape[0] // 2]
+    return row[row[:, 3] > 0.99, :3]
+
+
 def legend_texts(drawn: Picture) -> list[str]:
     return [text.get_text() for text in drawn.figure.legends[0].get_texts()]
 
@@ -63,24 +70,19 @@ def test_rotations_keep_shapes_and_handedness(azimuth, elevation):
 def test_isolines_lie_at_the_levels_and_have_the_width_asked_for():
     """Distance x, on a square seen face on: dark columns at multiples of the spacing and nowhere else."""
     mesh, x = square()
-    image, plain = (surface_image(plot(mesh, x, spacing=spacing)) for spacing in (0.3, 100.0))
-    middle = image.shape[0] // 2
-    columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
-    ratio = image[middle, columns, :3].sum(axis=1) / plain[middle, columns, :3].sum(axis=1)
-    line = LINE
-    expected = columns[0] - 0.5 + len(columns) * np.array([0.3, 0.6, 0.9])
-    away = np.abs(columns[:, None] - expected).min(axis=1)
-    np.testing.assert_allclose(ratio[away > line / 2 + 2], 1, atol=1e-12)
+    lined, plain = (middle_row(plot(mesh, x, spacing=spacing)) for spacing in (0.3, 100.0))
+    ratio = lined.sum(axis=1) / plain.sum(axis=1)
+    expected = len(ratio) * np.array([0.3, 0.6, 0.9]) - 0.5
+    away = np.abs(np.arange(len(ratio))[:, None] - expected).min(axis=1)
+    np.testing.assert_allclose(ratio[away > LINE / 2 + 2], 1, atol=1e-12)
     ink = (1 - ratio).sum() / LINE_INK
-    assert ink == pytest.approx(3 * line, rel=0.3)
+    assert ink == pytest.approx(3 * LINE, rel=0.3)
 
 
 def test_colours_follow_the_colour_bar():
     mesh, x = square()
     drawn = plot(mesh, x, spacing=10.0 / 3)  # no line on the way
-    image = surface_image(drawn)
-    row = image[image.shape[0] // 2]
-    row = row[row[:, 3] > 0.99, :3]
+    row = middle_row(drawn)
     bar = drawn.figure.axes[1].get_images()[0]
     expected = bar.cmap(np.linspace(0, 1, len(row)))[:, :3]
     assert np.abs(row - expected).max() < 0.02
@@ -92,12 +94,10 @@ def test_colours_follow_the_colour_bar():
 
 def test_stripes_are_light_in_every_second_interval():
     mesh, x = square()
-    image, plain = (surface_image(plot(mesh, x, spacing=0.25, style=style)) for style in ("stripes", "plain"))
-    middle = image.shape[0] // 2
-    columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
-    level = (np.arange(len(columns)) + 0.5) / len(columns) / 0.25
-    inside = np.abs(level - np.rint(level)) * 0.25 * len(columns) > 2
-    lighter = (image - plain)[middle, columns, :3] / (1 - plain[middle, columns, :3])
+    striped, plain = (middle_row(plot(mesh, x, spacing=0.25, style=style)) for style in ("stripes", "plain"))
+    level = (np.arange(len(plain)) + 0.5) / len(plain) / 0.25
+    inside = np.abs(level - np.rint(level)) * 0.25 * len(plain) > 2
+    lighter = (striped - plain) / (1 - plain)
     odd = np.floor(level) % 2 == 1
     np.testing.assert_allclose(lighter[inside & ~odd], 0, atol=1e-12)
     np.testing.assert_allclose(lighter[inside & odd], STRIPE_INK, atol=1e-9)
@@ -143,9 +143,7 @@ def test_errors_of_both_signs_are_white_in_the_middle():
     drawn = plot_field(mesh, x - 0.25, label="error, %")
     assert drawn.figure.axes[1].get_ylim() == (-0.75, 0.75)
     assert drawn.figure.axes[1].get_ylabel() == "error, %"
-    image = surface_image(drawn)
-    row = image[image.shape[0] // 2]
-    row = row[row[:, 3] > 0.99, :3]
+    row = middle_row(drawn)
     zero = row[len(row) // 4]
     assert zero.min() > 0.93
     assert row[0, 2] > row[0, 0] + 0.1  # blue where it is too small
@@ -156,15 +154,13 @@ def test_errors_of_both_signs_are_white_in_the_middle():
 
 def test_isolines_of_a_field_are_also_at_zero_and_below():
     mesh, x = square()
-    image, plain = (
-        surface_image(plot_field(mesh, x - 0.5, label="height", spacing=spacing, colormap="viridis"))
+    lined, plain = (
+        middle_row(plot_field(mesh, x - 0.5, label="height", spacing=spacing, colormap="viridis"))
         for spacing in (0.2, None)
     )
-    middle = image.shape[0] // 2
-    columns = np.flatnonzero(plain[middle, :, 3] > 0.99)
-    ratio = image[middle, columns, :3].sum(axis=1) / plain[middle, columns, :3].sum(axis=1)
+    ratio = lined.sum(axis=1) / plain.sum(axis=1)
     found = np.split(np.flatnonzero(ratio < 0.9), np.flatnonzero(np.diff(np.flatnonzero(ratio < 0.9)) > 1) + 1)
-    levels = [(line.mean() + 0.5) / len(columns) - 0.5 for line in found]
+    levels = [(line.mean() + 0.5) / len(ratio) - 0.5 for line in found]
     np.testing.assert_allclose(levels, [-0.4, -0.2, 0, 0.2, 0.4], atol=0.005)
 
 
@@ -172,9 +168,7 @@ def test_fields_of_one_sign_start_at_zero_and_end_where_they_are_told():
     mesh, x = square()
     assert plot_field(mesh, x, label="heat").figure.axes[1].get_ylim() == (0, 1)
     drawn = plot_field(mesh, x, label="heat", limits=(0, 0.5))
-    image = surface_image(drawn)
-    row = image[image.shape[0] // 2]
-    row = row[row[:, 3] > 0.99, :3]
+    row = middle_row(drawn)
     np.testing.assert_allclose(row[-1], row[len(row) * 3 // 5], atol=1e-12)
     assert not drawn.figure.legends
     with pytest.raises(ValueError, match="limits must be two numbers, the lower one first"):

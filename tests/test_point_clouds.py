@@ -12,6 +12,7 @@ from conftest import mean_error, zoo
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from surfaces import arcs
+from surfaces import points_of_sphere as sphere
 
 import heat_igl
 from heat_igl import AccuracyWarning, GeodesicSolver, HeatMethodSolver, MeshError, PointCloud, cli, shapes
@@ -28,11 +29,6 @@ from heat_igl.mesh.neighbourhoods import one_sheet, point_tree, without_noise
 from heat_igl.validation.shapes import lattice_mesh
 
 HEAT = {"magnitude": "damped"}
-
-
-def sphere(n: int, seed: int = 0) -> np.ndarray:
-    P = np.random.default_rng(seed).standard_normal((n, 3))
-    return P / np.linalg.norm(P, axis=1, keepdims=True)
 
 
 def plane(n: int, seed: int = 0) -> np.ndarray:
@@ -907,8 +903,7 @@ def test_vectors_on_both_sides_are_those_on_one(monkeypatch):
 def test_vectors_pass_the_line_along_which_a_surface_with_one_side_changes_orientation():
     """From a point on the line where the triangles of a Moebius strip contradict, as on a piece with two sides."""
     turn, side = np.random.default_rng(0).random((2, 3000)) * [[2 * np.pi], [0.8]] - [[0], [0.4]]
-    out = 1 + side * np.cos(turn / 2)
-    strip = PointCloud(np.stack([out * np.cos(turn), out * np.sin(turn), side * np.sin(turn / 2)], axis=1))
+    strip = PointCloud(surfaces.points_of_moebius_strip(turn, side))
     F = strip.triangles.F
     sides, counts = np.unique(F[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=0, return_counts=True)
     source = int(sides[np.argmax(counts), 0])

@@ -5,7 +5,7 @@ import pickle
 import igl
 import numpy as np
 import pytest
-from surfaces import dual, dual_of_sphere
+from surfaces import dual, dual_of_sphere, quads
 
 import heat_igl
 from heat_igl import shapes
@@ -14,16 +14,13 @@ from heat_igl.mesh.polygons import virtual_vertices
 from heat_igl.validation import relative_error
 
 
-def quads(n: int) -> PolygonMesh:
-    """The unit square with n by n cells, inner vertices moved: no symmetry is left, and no quad planar."""
+def cells(n: int) -> PolygonMesh:
+    """The unit square with n by n cells, inner vertices moved in the plane: no symmetry is left."""
     rng = np.random.default_rng(5)
-    y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
-    V = np.stack([x / n, y / n, np.zeros(len(x))], axis=1)
-    inner = (x % n != 0) & (y % n != 0)
-    V[inner, :2] += rng.uniform(-0.2, 0.2, (inner.sum(), 2)) / n
-    row, column = np.divmod(np.arange(n * n), n)
-    first = row * (n + 1) + column
-    return PolygonMesh(V, np.stack([first, first + 1, first + n + 2, first + n + 1], axis=1))
+    V, F = quads(n)
+    inner = (V[:, :2] % n != 0).all(axis=1)
+    V[inner, :2] += rng.uniform(-0.2, 0.2, (inner.sum(), 2))
+    return PolygonMesh(V / n, F)
 
 
 def zigzags(columns: int, rows: int, rise: float) -> PolygonMesh:
@@ -60,7 +57,7 @@ def test_distance_around_a_vertex_is_that_along_sides():
 
 def test_virtual_vertices_are_those_of_the_paper():
     """libigl has them as affine combinations of the corners."""
-    for mesh in (MIXED, quads(6), dual_of_sphere(1)):
+    for mesh in (MIXED, cells(6), dual_of_sphere(1)):
         _, _, P = igl.cotmatrix(mesh.V, mesh.corners, np.concatenate([[0], np.cumsum(mesh.degree)]))
         expected = (P @ mesh.V)[mesh.n_vertices :]
         np.testing.assert_allclose(virtual_vertices(mesh), expected, atol=1e-9)
@@ -93,7 +90,7 @@ def test_fans_cover_polygons_once(rise):
     assert mixed.mesh.F[8].tolist() == MIXED.polygons[2].tolist()
 
 
-@pytest.mark.parametrize("mesh", [quads(6), zigzags(4, 12, 0.3), zigzags(4, 12, 3.0)], ids=["quads", "bent", "apart"])
+@pytest.mark.parametrize("mesh", [cells(6), zigzags(4, 12, 0.3), zigzags(4, 12, 3.0)], ids=["quads", "bent", "apart"])
 def test_places_are_carried_to_fans(mesh):
     """In planar polygons points stay, and a segment is cut into pieces that follow one another."""
     rng = np.random.default_rng(0)
@@ -143,7 +140,7 @@ def test_points_inside_polygons():
     errors, from_vertices = [], []
     rng = np.random.default_rng(0)
     for n in (16, 64):
-        mesh = quads(n)
+        mesh = cells(n)
         triangles = mesh.triangles
         solver = heat_igl.HeatMethodSolver(mesh)
         faces, shares = rng.integers(triangles.n_faces, size=4), rng.dirichlet([1, 1, 1], 4)
@@ -164,7 +161,7 @@ def test_points_inside_polygons():
 
 
 def test_a_curve_across_polygons():
-    mesh = quads(32)
+    mesh = cells(32)
     ends = np.array([[0.13, 0.21, 0], [0.77, 0.64, 0]])
     curve = heat_igl.geodesic_path(mesh.triangles, heat_igl.closest_points(mesh.triangles, ends).points)
     along = ends[1] - ends[0]

@@ -11,7 +11,7 @@ import igl
 import numpy as np
 import psutil
 import pytest
-from conftest import relative_error, wheel_path, zoo
+from conftest import flat_perturbed, relative_error, wheel_path, zoo
 from scipy.spatial import Delaunay
 from surfaces import folded_torus, graph_distance, twice
 
@@ -23,19 +23,6 @@ from heat_igl.typing import FloatArray
 from heat_igl.validation import closed_forms
 
 SOLVERS = ("windows", *reference.EXACT_SOLVERS)
-
-
-def cow() -> Mesh:
-    return read_mesh(wheel_path("cow.obj"))
-
-
-def rectangle(n_x: int, n_y: int, width: float, height: float, jitter: float = 0.0) -> Mesh:
-    x, y = np.meshgrid(np.linspace(0, width, n_x), np.linspace(0, height, n_y))
-    points = np.stack([x.ravel(), y.ravel()], axis=1)
-    inner = (points > 0).all(axis=1) & (points < [width, height]).all(axis=1)
-    step = np.array([width / (n_x - 1), height / (n_y - 1)])
-    points[inner] += jitter * step * np.random.default_rng(5).uniform(-1, 1, (int(inner.sum()), 2))
-    return Mesh(np.column_stack([points, np.zeros(len(points))]), Delaunay(points).simplices)
 
 
 # --- exact -----------------------------------------------------------------------------------------------------------
@@ -57,11 +44,10 @@ def test_exact_solvers_agree(name):
 
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_exact_from_several_sources_is_the_minimum_over_them(solver):
-    mesh = cow()
+def test_exact_from_several_sources_is_the_minimum_over_them(cow, solver):
     sources = [5, 1200, 2800]
-    alone = np.min([reference.exact(mesh, source, solver=solver) for source in sources], axis=0)
-    together = reference.exact(mesh, [*sources, 5], solver=solver)
+    alone = np.min([reference.exact(cow, source, solver=solver) for source in sources], axis=0)
+    together = reference.exact(cow, [*sources, 5], solver=solver)
     assert relative_error(together, alone).max() < 1e-9
     assert (together[sources] == 0).all()
 
@@ -86,15 +72,14 @@ def test_exact_is_approached_from_above_by_independent_paths():
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("factor", [1e-9, 1e6])
-def test_exact_does_not_depend_on_the_unit(solver, factor):
-    mesh = cow()
-    truth = reference.exact(mesh, 2470, solver=solver) * factor
-    assert relative_error(reference.exact(Mesh(mesh.V * factor, mesh.F), 2470, solver=solver), truth).max() < 1e-9
+def test_exact_does_not_depend_on_the_unit(cow, solver, factor):
+    truth = reference.exact(cow, 2470, solver=solver) * factor
+    assert relative_error(reference.exact(Mesh(cow.V * factor, cow.F), 2470, solver=solver), truth).max() < 1e-9
 
 
 @pytest.mark.usefixtures("in_this_process")
 def test_exact_is_inf_beyond_the_component_and_at_unreferenced_vertices():
-    one = rectangle(6, 6, 1, 1)
+    one = shapes.grid(5)
     n = one.n_vertices
     mesh = Mesh(np.vstack([[[9.0, 9, 9]], one.V, one.V + np.array([3, 0, 0])]), np.vstack([one.F + 1, one.F + 1 + n]))
     for solver in SOLVERS:
@@ -134,14 +119,14 @@ def test_exact_takes_small_examples_of_the_same():
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_exact_accepts_a_good_component_of_a_bad_mesh(solver):
-    good = rectangle(5, 5, 1, 1)
+    good = shapes.grid(4)
     mesh = Mesh(np.concatenate([fin().V + 5, good.V]), np.concatenate([fin().F, good.F + 5]))
     distance = reference.exact(mesh, 5, solver=solver)
     assert np.array_equal(np.isfinite(distance), np.arange(mesh.n_vertices) >= 5)
 
 
 def test_other_exact_solvers_refuse_edges_without_length():
-    mesh = rectangle(5, 5, 1, 1)
+    mesh = shapes.grid(4)
     V = mesh.V.copy()
     V[mesh.F[0, 0]] = V[mesh.F[0, 1]]
     collapsed = Mesh(V, mesh.F)
@@ -153,7 +138,8 @@ def test_other_exact_solvers_refuse_edges_without_length():
 
 
 def test_plane_is_exact():
-    mesh = rectangle(12, 9, 2, 1, jitter=0.4)
+    square = flat_perturbed(shapes.grid(10), 0.4)
+    mesh = Mesh(square.V * [2, 1, 1], square.F)
     for sources in (0, [3, 50, 77]):
         np.testing.assert_allclose(closed_forms.plane(mesh, sources), reference.exact(mesh, sources), atol=1e-9)
     with pytest.raises(ReferenceSolverError, match="does not lie in a plane"):
@@ -230,12 +216,11 @@ def test_paths_along_edges_on_a_square():
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_heat_filter_of_meshlab_survives_an_offset():
-    mesh = cow()
-    near = reference.meshlab_heat(mesh, 5)
-    assert 0 < relative_error(near, reference.exact(mesh, 5)).mean() < 0.1
+def test_heat_filter_of_meshlab_survives_an_offset(cow):
+    near = reference.meshlab_heat(cow, 5)
+    assert 0 < relative_error(near, reference.exact(cow, 5)).mean() < 0.1
     # At 1e6 the coordinates keep ten digits, of which single precision leaves none.
-    far = Mesh(mesh.V + 1e6, mesh.F)
+    far = Mesh(cow.V + 1e6, cow.F)
     assert relative_error(reference.meshlab_heat(far, 5), near).max() < 1e-2
 
 
@@ -249,35 +234,33 @@ INEXACT: dict[str, Callable[..., FloatArray]] = {
 
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("name", INEXACT)
-def test_unreachable_is_inf_in_all(name):
-    mesh, n = cow(), cow().n_vertices
-    pair = Mesh(np.vstack([mesh.V, mesh.V + 5, [[0, 0, 0]]]), np.vstack([mesh.F, mesh.F + n]))
+def test_unreachable_is_inf_in_all(cow, name):
+    n = cow.n_vertices
+    pair = Mesh(np.vstack([twice(cow).V, [[0, 0, 0]]]), twice(cow).F)
     distance = INEXACT[name](pair, [3, 900])
     assert np.isinf(distance[n:]).all()
-    assert relative_error(distance[:n], reference.exact(mesh, [3, 900])).mean() < 0.1
+    assert relative_error(distance[:n], reference.exact(cow, [3, 900])).mean() < 0.1
     both = INEXACT[name](pair, [3, n + 900])
     assert np.isfinite(both[: 2 * n]).all()
     assert np.isinf(both[2 * n])
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_igl_heat_is_what_libigl_computes():
-    mesh = cow()
+def test_igl_heat_is_what_libigl_computes(cow):
     for intrinsic in (False, True):
         data = igl.HeatGeodesicsData()
         data.use_intrinsic_delaunay = intrinsic
-        igl.heat_geodesics_precompute(mesh.V, mesh.F, 1e-3, data)
+        igl.heat_geodesics_precompute(cow.V, cow.F, 1e-3, data)
         direct = igl.heat_geodesics_solve(data, np.array([7]))
-        np.testing.assert_allclose(
-            reference.igl_heat(mesh, 7, t=1e-3, intrinsic_delaunay=intrinsic), direct, atol=1e-12
-        )
+        found = reference.igl_heat(cow, 7, t=1e-3, intrinsic_delaunay=intrinsic)
+        np.testing.assert_allclose(found, direct, atol=1e-12)
 
 
 # --- the guard -------------------------------------------------------------------------------------------------------
 
 
 def test_a_crash_is_an_error_and_the_next_call_works():
-    mesh = rectangle(5, 5, 1, 1)
+    mesh = shapes.grid(4)
     before = reference.exact(mesh, 0, solver="igl")
     with pytest.raises(ReferenceSolverError, match=r"os:abort died with (SIGABRT|exit status).*mesh\.report\(\)"):
         guarded.call("os:abort", {})
@@ -286,7 +269,7 @@ def test_a_crash_is_an_error_and_the_next_call_works():
 
 @pytest.mark.parametrize("function", ["pygeodesic_exact", "igl_exact", "meshlab_front", "igl_heat"])
 def test_an_index_out_of_range_takes_nothing_down(function):
-    mesh = rectangle(4, 4, 1, 1)
+    mesh = shapes.grid(3)
     F = mesh.F.copy()
     F[3, 1] = 10**6
     with pytest.raises(MeshError, match=r"F\[3, 1\] = 1000000 is no vertex"):
@@ -329,7 +312,7 @@ def test_memory_is_bounded():
     ids=["empty", "nan", "short", "long"],
 )
 def test_what_is_no_distance_is_an_error(change, message, monkeypatch):
-    mesh, original = rectangle(5, 5, 1, 1), guarded.call
+    mesh, original = shapes.grid(4), guarded.call
 
     def changed(*args, **options):
         reply = original(*args, **options)
@@ -344,7 +327,7 @@ def test_what_is_no_distance_is_an_error(change, message, monkeypatch):
 
 def test_a_missing_package_names_its_extra(monkeypatch):
     monkeypatch.setattr(solvers, "find_spec", lambda name: object() if name == "igl" else None)
-    mesh = rectangle(3, 3, 1, 1)
+    mesh = shapes.grid(2)
     with pytest.raises(MissingExtraError, match="needs pymeshlab: pip install pymeshlab"):
         reference.meshlab(mesh, 0)
     with pytest.raises(MissingExtraError, match="needs potpourri3d: pip install potpourri3d"):
@@ -394,4 +377,4 @@ def test_a_hanging_child_does_not_outlive_a_killed_caller_for_long():
 
 def test_memory_of_a_solver_is_without_that_of_its_library():
     pytest.importorskip("pymeshlab")  # which takes 50 MB
-    assert (reference.measured("meshlab", rectangle(5, 5, 1, 1), 0).peak_memory or 0) < 2e7
+    assert (reference.measured("meshlab", shapes.grid(4), 0).peak_memory or 0) < 2e7

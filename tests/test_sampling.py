@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
+from surfaces import twice
 
 import heat_igl
 from heat_igl import sampling, shapes
@@ -18,9 +19,8 @@ def square():
 
 def two_spheres() -> Mesh:
     """Two spheres and a vertex that no face uses."""
-    sphere = shapes.icosphere(2)
-    n = sphere.n_vertices
-    return Mesh(np.concatenate([sphere.V, sphere.V + 5, np.ones((1, 3))]), np.concatenate([sphere.F, sphere.F + n]))
+    both = twice(shapes.icosphere(2))
+    return Mesh(np.vstack([both.V, np.ones((1, 3))]), both.F)
 
 
 def test_every_point_is_the_farthest_from_those_before(square):

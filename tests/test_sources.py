@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 from conftest import flat_perturbed, mean_error, perturbed
-from surfaces import nearest_vertex, to_polyline, with_point
+from surfaces import nearest_vertex, sheared, to_polyline, with_point
 
 from heat_igl import (
     GeodesicSolver,
@@ -121,11 +121,9 @@ def term(mesh: Mesh, sources: Sources) -> tuple[SourceTerm, float]:
 
 def sheared_grid() -> Mesh:
     """Flat and convex, but far from Delaunay, and with faces that run either way round."""
-    mesh = perturbed(shapes.grid(40), 0.2)
-    V = mesh.V * [1, 1, 0]
-    V[:, 0] += 1.7 * V[:, 1]
+    mesh = sheared(flat_perturbed(shapes.grid(40), 0.2), 1.7)
     turned = np.random.default_rng(0).random(mesh.n_faces) < 0.5
-    return Mesh(V, np.where(turned[:, None], mesh.F[:, ::-1], mesh.F))
+    return Mesh(mesh.V, np.where(turned[:, None], mesh.F[:, ::-1], mesh.F))
 
 
 @pytest.mark.parametrize("barycentric", [(0.2, 0.5, 0.3), (0.3, 0.0, 0.7), (1e-9, 0.4, 0.6 - 1e-9)])
@@ -347,8 +345,7 @@ def test_solution_of_a_point_holds_the_three_steps():
 
 def test_the_dirac_of_a_curve_is_its_length():
     """The integral of hat functions along it: as much heat as length, with the curve's centre of mass."""
-    sheared = flat_perturbed(shapes.grid(16), 0.2).V @ np.array([[1, 0, 0], [1.7, 1, 0], [0, 0, 1]])
-    mesh = Mesh(sheared, shapes.grid(16).F)
+    mesh = sheared(flat_perturbed(shapes.grid(16), 0.2), 1.7)
     curve = curve_on(mesh, [[0.6, 0.2, 0], [1.0, 0.25, 0], [1.9, 0.8, 0]])
     solver = HeatMethodSolver(mesh)
     assert solver.diagnostics.n_flips > 100

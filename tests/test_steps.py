@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import perturbed
-from surfaces import twice
+from surfaces import pressed, twice
 
 from heat_igl import HeatMethodSolver, Mesh, shapes
 from heat_igl.heat import steps
@@ -176,7 +176,7 @@ def test_fitted_laplacian_of_equal_edges_is_right_in_the_mean_over_a_circle():
 
 def test_fitted_laplacian_is_a_laplacian():
     """Symmetric, rows sum to 0, no negative weight even on slivers; that of short edges is L."""
-    stretched = squeezed_sphere()
+    stretched = pressed(0.1)
     for domain in (operators(stretched), operators(stretched, "cotan"), tufted_operators(shapes.book(3, 4))):
         h = domain.mean_edge_length
         for t in (1e-8 * h**2, h**2, 1e3 * h**2):
@@ -188,11 +188,6 @@ def test_fitted_laplacian_is_a_laplacian():
     assert abs(fitted_laplacian(domain, 1e12) - domain.L).max() < 1e-9
     with pytest.raises(ValueError, match="fitted to the lengths of edges, which this domain does not have"):
         fitted_laplacian(operators(shapes.box(2)), 1.0)
-
-
-def squeezed_sphere() -> Mesh:
-    sphere = perturbed(shapes.icosphere(3), 0.3)
-    return Mesh(sphere.V * [1.0, 0.6, 0.1], sphere.F)
 
 
 def edges_by_pair(domain: Operators) -> dict[tuple[int, int], list[tuple[float, float]]]:
@@ -225,7 +220,7 @@ class Unseen:
 
 @pytest.mark.parametrize("fitted", [False, True])
 def test_steps_see_matrices_and_lengths_but_no_surface(fitted):
-    seen = operators(squeezed_sphere())
+    seen = operators(pressed(0.1))
     t = 0.5 * seen.mean_edge_length**2
     results = []
     for domain in (seen, replace(seen, surface=Unseen())):
@@ -241,8 +236,8 @@ def test_steps_see_matrices_and_lengths_but_no_surface(fitted):
 def test_fitted_laplacian_takes_each_edge_by_its_own_length(t_coef):
     """Flipped edges, edges of negative weight, and the cover, which has each edge of the sphere twice."""
     for domain, flipped, per_pair in (
-        (operators(squeezed_sphere()), True, 1),
-        (operators(squeezed_sphere(), "cotan"), False, 1),
+        (operators(pressed(0.1)), True, 1),
+        (operators(pressed(0.1), "cotan"), False, 1),
         (tufted_operators(perturbed(shapes.icosphere(2))), False, 2),
     ):
         assert (domain.surface.triangulation.n_flips > 20) == flipped
@@ -278,7 +273,7 @@ def test_several_edges_between_two_vertices_go_by_the_shortest():
 
 
 def test_a_laplacian_that_was_exchanged_is_the_one_that_is_fitted():
-    domain = operators(squeezed_sphere())
+    domain = operators(pressed(0.1))
     t = 0.5 * domain.mean_edge_length**2
     fitted = fitted_laplacian(domain, t)
     random = sp.triu(domain.L, 1, format="csc")
@@ -294,7 +289,7 @@ def test_a_laplacian_that_was_exchanged_is_the_one_that_is_fitted():
 
 
 def test_twice_the_laplacian():
-    domain = operators(squeezed_sphere())
+    domain = operators(pressed(0.1))
     t = 0.5 * domain.mean_edge_length**2
     b = dirac(domain.n, 7)
     heat = HeatFlow(domain, t, fitted=True).solve(b)

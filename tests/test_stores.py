@@ -6,6 +6,7 @@ import random
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -85,26 +86,31 @@ def named(problem: str, files: list[Path], store: Path) -> bool:
     return root or any(place in problem for place in places)
 
 
+def damaged_copies(whole: Path, places: Path, seed: int) -> Iterator[tuple[Path, str, list[str]]]:
+    """Copies of a store, what was done to each, and a list for the errors, of which each must name a damaged file."""
+    generator, refused = random.Random(seed), 0
+    for trial in range(50):
+        store = shutil.copytree(whole, places / str(trial))
+        files, kind = damaged(store, generator)
+        problems: list[str] = []
+        yield store, f"{kind} {files}", problems
+        for problem in problems:
+            assert named(problem, files, store), (kind, files, problem)
+        refused += bool(problems)
+    assert refused >= 35
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_damaged_matrix_is_an_error_or_without_effect(near, tmp_path, seed):
-    generator, whole, refused = random.Random(seed), read_distances_within(near), 0
-    for trial in range(50):
-        store = tmp_path / str(trial)
-        shutil.copytree(near, store)
-        files, kind = damaged(store, generator)
+    whole = read_distances_within(near)
+    for store, harm, problems in damaged_copies(near, tmp_path, seed):
         try:
             found = read_distances_within(store)
         except ValueError as error:
-            problem = str(error)
-        else:
-            problem = ""
-        if problem:
-            assert named(problem, files, store), (kind, files, problem)
-            refused += 1
+            problems.append(str(error))
             continue
         for part in ("indptr", "indices", "data"):
-            np.testing.assert_array_equal(getattr(found, part), getattr(whole, part), err_msg=f"{kind} {files}")
-    assert refused >= 35
+            np.testing.assert_array_equal(getattr(found, part), getattr(whole, part), err_msg=harm)
 
 
 def test_rows_beside_the_damage_are_read(near, tmp_path):
@@ -119,14 +125,9 @@ def test_rows_beside_the_damage_are_read(near, tmp_path):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_damaged_batch_is_an_error_or_without_effect(batch, tmp_path, seed):
-    generator, refused = random.Random(seed), 0
     whole = {name: cluster.read_distances(batch, name) for name in MESHES}
     checksums = {row.name: row.checksum for row in cluster.report(batch).rows}
-    for trial in range(50):
-        store = tmp_path / str(trial)
-        shutil.copytree(batch, store)
-        files, kind = damaged(store, generator)
-        problems = []
+    for store, harm, problems in damaged_copies(batch, tmp_path, seed):
         try:
             for row in cluster.report(store).rows:
                 assert row.checksum == (checksums[row.name] if row.status == "done" else "")
@@ -139,11 +140,7 @@ def test_a_damaged_batch_is_an_error_or_without_effect(batch, tmp_path, seed):
             except ValueError as error:
                 problems.append(str(error))
             else:
-                np.testing.assert_array_equal(found, truth, err_msg=f"{kind} {files}")
-        for problem in problems:
-            assert named(problem, files, store), (kind, files, problem)
-        refused += bool(problems)
-    assert refused >= 35
+                np.testing.assert_array_equal(found, truth, err_msg=harm)
 
 
 def test_blocks_that_changed_places_are_found_before_the_mesh_is_done(batch, tmp_path):

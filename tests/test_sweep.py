@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from conftest import perturbed, relative_error, zoo
-from surfaces import COORDINATES, arcs, moebius_strip, on_pages
+from conftest import relative_error, zoo
+from surfaces import COORDINATES, arcs, bumpy, moebius_strip, on_pages
 from test_exact import FLAT
 
 from heat_igl import GeodesicSolver, Mesh, OffsetSources, SurfacePoints, shapes
@@ -22,11 +22,6 @@ from heat_igl.windows.guards import edge_paths, raise_to_lines
 def swept(mesh: Mesh, sources: object) -> np.ndarray:
     """A sweep, also on meshes on which the plan takes windows."""
     return SweepEngine(MeshTriangles(mesh)).distance(source_set(sources, mesh.n_vertices, mesh.F))
-
-
-@pytest.fixture(scope="module")
-def bumpy():
-    return perturbed(shapes.icosphere(4), 0.3, 1)
 
 
 @pytest.mark.parametrize("name", FLAT)
@@ -86,20 +81,20 @@ def test_straight_over_an_edge_of_more_than_two_faces(k):
     np.testing.assert_allclose(swept(mesh, source)[first_row], truth[first_row], rtol=1e-9)
 
 
-def test_a_sweep_visits_few_vertices_again(bumpy, monkeypatch):
+def test_a_sweep_visits_few_vertices_again(monkeypatch):
     visits = []
     sweep = sweeping.sweep
     monkeypatch.setattr(sweeping, "sweep", lambda *arguments: visits.append(sweep(*arguments)))
-    swept(bumpy, 0)
+    swept(bumpy(4), 0)
     swept(shapes.torus(60, 40), [0, 1000])
     assert len(visits) == 2
     assert max(visits) < 2
 
 
-def test_the_plan_takes_windows_where_these_cost_little(bumpy):
+def test_the_plan_takes_windows_where_these_cost_little():
     small = GeodesicSolver(shapes.icosphere(2), method="sweep")
     assert (small.plan.engine, small.plan.tolerance) == ("windows", 0)
-    assert GeodesicSolver(bumpy, method="sweep").plan.engine in ("sweep", "windows")
+    assert GeodesicSolver(bumpy(4), method="sweep").plan.engine in ("sweep", "windows")
     fine = GeodesicSolver(shapes.icosphere(4), method="sweep")
     assert fine.plan.engine == "sweep"
     np.testing.assert_array_equal(fine.distance(9), swept(shapes.icosphere(4), 9))
