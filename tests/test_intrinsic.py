@@ -29,10 +29,10 @@ from heat_igl.intrinsic import (
     tufted_cover,
 )
 from heat_igl.operators import intrinsic_operators, operators, tufted_operators
+from heat_igl.operators.matrices import edge_paths
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.construction import joined
 from heat_igl.windows import exact_distance
-from heat_igl.windows.guards import edge_paths
 
 
 def delaunay(mesh: Mesh):

@@ -16,7 +16,7 @@ from heat_igl.sweep import SweepEngine
 from heat_igl.sweep.sweep import numbered_spokes
 from heat_igl.windows import MeshTriangles
 from heat_igl.windows.exact import exact_distance
-from heat_igl.windows.guards import edge_paths, raise_to_lines
+from heat_igl.windows.guards import raise_to_lines
 
 
 def swept(mesh: Mesh, sources: object) -> np.ndarray:
@@ -139,7 +139,7 @@ def test_what_leaves_the_bounds_is_brought_back():
     along_edges = connectivity.edge_distance(mesh.edge_graph, np.array([5]))
     straight = np.linalg.norm(mesh.V - mesh.V[5], axis=1)
     d = 2 * along_edges
-    edge_paths(surface.unfolding, surface.faces).shorten(d)
+    surface.paths.shorten(d)
     assert (d <= along_edges * (1 + 1e-9)).all()
     d = straight / 2
     raise_to_lines(d, surface.V, mesh.F, sources)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from heat_igl.sources import SourceSet
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows import Engine, OperatorTriangles, WindowEngine
-from heat_igl.windows.guards import edge_paths, raise_to_lines, source_places
+from heat_igl.windows.guards import raise_to_lines, source_places
 
 # Mean shortfall from which on all distances are raised to straight lines. On 95 shapes 0.002 and 0.01 give the same.
 _RAISED = 0.005
@@ -283,15 +282,11 @@ class Checker:
             step = len(self._vertices) * len(used[0]) // _MOST_LINES + 1
             shortfall, most, shortest, farthest = checking.shortfall(distance, self._vertices, step, self._V, *used)
             largest = most / farthest if farthest > 0 else 0.0
-        if holds and self._paths is not None:
-            self._paths.shorten(distance, share=_STEEP)
+        if holds and self._surface is not None:
+            self._surface.paths.shorten(distance, share=_STEEP)
         is_worth_it = shortfall > _RAISED or len(sources.offsets) <= _VERY_FEW_SOURCES
         raised = holds and is_worth_it and raise_to_lines(distance, self._V, self._F, sources)
         return AnswerCheck(shortfall, largest, shortest, steepness, steepest, raised)
-
-    @cached_property
-    def _paths(self) -> Any:
-        return None if self._surface is None else edge_paths(self._surface.unfolding, self._surface.faces)
 
     def _used(
         self, sources: SourceSet, places: FloatArray, offsets: FloatArray

@@ -11,13 +11,13 @@ import numpy as np
 
 from heat_igl.heat.steps import HeatFlow
 from heat_igl.operators import Operators
+from heat_igl.operators.matrices import edge_paths
 from heat_igl.plan import NEAR_RADIUS
 from heat_igl.runtime import SOURCE_HEAT
 from heat_igl.runtime.threads import BLOCK
 from heat_igl.sources import SourceSegments, SourceSet, nearest_first, samples
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.windows import ExactSurface
-from heat_igl.windows.guards import edge_paths
 
 # So many mean edge lengths of a curve give as much heat as a point, so that both are equally warm some edges away. What
 # matters is the order of magnitude: from 1 to 16, errors from a point and a curve change by less than 0.06 points.
@@ -140,6 +140,8 @@ class SourceAssembler:
     def edges(self) -> Any:
         """The edges that are straight lines: of all triangulations, and on polygons of their triangles."""
         surface = self._domain.surface
+        if surface is not None and surface.faces is self._faces and surface.uncovered is None:
+            return surface.paths
         return edge_paths(self._faces, *(() if surface is None else (surface.triangulation, surface.uncovered)))
 
     @cached_property

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.errors import require_choice
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged, apex
+from heat_igl.kernels.mesh import checking
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -53,6 +54,11 @@ class Surface:
         return self.triangulation if self.uncovered is None else self.uncovered
 
     @cached_property
+    def paths(self) -> Any:
+        """The `edge_paths` of the triangles before and after flips."""
+        return edge_paths(self.unfolding, self.faces)
+
+    @cached_property
     def given_faces(self) -> IntArray | None:
         """Vertices (m, 3) of the triangles that points and curves refer to; None without `faces`."""
         if self.faces is None:
@@ -62,6 +68,16 @@ class Surface:
             if isinstance(move, Merged):
                 F = move.before(F)
         return F
+
+
+def edge_paths(*triangulations: IntrinsicTriangulation | None) -> Any:
+    """Paths along the edges of triangulations of the same vertices, each edge once; None without triangulations."""
+    known = [each for each in triangulations if each is not None]
+    kernel: Any = checking.EdgePaths
+    paths = kernel(np.empty((0, 2), np.int32), np.empty(0), max((each.n for each in known), default=0))
+    for each in known:
+        paths = paths.joined(np.ascontiguousarray(each.F), np.ascontiguousarray(each.l).ravel(), each.twin)
+    return paths if known else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,7 @@ docs/engines_theory.md has the update and its error.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from heat_igl.sources import SourcePoints, SourceSet, samples
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.windows.engine import Query, TriangleEngine, Triangles
 from heat_igl.windows.exact import ExactSolution
-from heat_igl.windows.guards import edge_paths, raise_to_lines
+from heat_igl.windows.guards import raise_to_lines
 
 _SPOKE = np.dtype(
     [(name, "f8") for name in ("length", "along", "height", "base", "beyond_along", "beyond_depth")]
@@ -133,10 +132,6 @@ class SweepEngine(TriangleEngine):
         vertices = np.bincount(components[used], minlength=len(faces))
         return bool(((vertices - (3 * faces - shared / 2) + faces)[faces > 0] < 1).any())
 
-    @cached_property
-    def _edges(self) -> Any:
-        return edge_paths(self._triangles.surface.unfolding, self._triangles.surface.faces)
-
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from."""
         query = Query.of(sources, self._triangles)
@@ -158,7 +153,7 @@ class SweepEngine(TriangleEngine):
         swept = distance.copy()
         distance[np.isnan(distance)] = np.inf
         distance[sources.vertices] = np.minimum(distance[sources.vertices], sources.vertex_offset)
-        self._edges.shorten(distance, labels)
+        self._triangles.surface.paths.shorten(distance, labels)
         raise_to_lines(distance, self._triangles.surface.V, self._triangles.surface.given_faces, sources)
         _warn_if_moved(swept, distance, self._triangles.mean_edge_length)
         return distance, labels

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heat_igl.errors import AccuracyWarning
-from heat_igl.intrinsic import IntrinsicTriangulation
 from heat_igl.kernels.mesh import checking
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.runtime import warn_caller
@@ -310,13 +309,3 @@ def raise_to_lines(distance: FloatArray, V: FloatArray | None, F: IntArray | Non
     line = cKDTree(places[0]).query(V)[0] + start
     np.maximum(distance, line - _ROUNDING * (line - start), out=distance)
     return bool(np.ptp(places[1]) == 0)
-
-
-def edge_paths(*triangulations: IntrinsicTriangulation | None) -> Any:
-    """Paths along the edges of triangulations of the same vertices, each edge once; None without triangulations."""
-    known = [each for each in triangulations if each is not None]
-    kernel: Any = checking.EdgePaths
-    paths = kernel(np.empty((0, 2), np.int32), np.empty(0), max((each.n for each in known), default=0))
-    for each in known:
-        paths = paths.joined(np.ascontiguousarray(each.F), np.ascontiguousarray(each.l).ravel(), each.twin)
-    return paths if known else None
