@@ -167,14 +167,7 @@ def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
 
 def fans(F: IntArray, n: int) -> tuple[IntArray, IntArray]:
     """The fan (3 m,) of each corner of triangles F (m, 3) on n vertices, and the vertex (k,) of each fan."""
-    edge, side = facets(F, n), np.arange(F.size)
-    # A corner is joined to the end of each edge at it, 2 e or 2 e + 1 behind the corners.
-    of_side, pairs = edge.of_face.ravel(), []
-    for turn in (1, 2):
-        at = side - side % 3 + (side + turn) % 3
-        is_upper = F.ravel()[at] == edge.vertices[of_side, 1]
-        pairs.append(np.stack([at, F.size + 2 * of_side + is_upper], axis=1))
-    fan = connected_components(np.concatenate(pairs), F.size + 2 * len(edge.vertices))[: F.size]
+    fan: IntArray = incidence.fans(np.ascontiguousarray(F, np.int32), n)
     vertex = np.empty(int(fan.max(initial=-1)) + 1, np.int64)
     vertex[fan] = F.ravel()
     return fan, vertex

@@ -80,6 +80,31 @@ def components(F: cython.const[cython.longlong][:, ::1], n: cython.Py_ssize_t):
     return labels
 
 
+def fans(F: cython.const[cython.int][:, ::1], n: cython.Py_ssize_t):
+    """Labels (3 m,) int64 of the fans of corners of triangles F (m, 3), ascending by the first corner of each.
+
+    Corners of one of the n vertices are in one fan if edges join their triangles.
+    """
+    begins, found = corners_by_vertex(F, n)
+    labels = np.arange(len(found))
+    first: cython.int[::1] = begins
+    incident: cython.int[::1] = found
+    above: cython.longlong[::1] = labels
+    # The last corner from which an edge to each vertex was seen.
+    seen: cython.int[::1] = np.full(n, -1, np.int32)
+    with cython.nogil:
+        for v in range(n):
+            for i in range(first[v], first[v + 1]):
+                h: cython.int = incident[i]
+                for turn in range(1, 3):
+                    w: cython.int = F[h // 3, (h % 3 + turn) % 3]
+                    if seen[w] >= 0 and F[seen[w] // 3, seen[w] % 3] == v:
+                        _join(above, seen[w], h)
+                    seen[w] = h
+        _number(above)
+    return labels
+
+
 @cython.cfunc
 @cython.nogil
 def _number(above: cython.longlong[::1]) -> cython.void:
