@@ -80,7 +80,8 @@ def field(
 VARIANTS: dict[str, Callable[[Mesh], Query]] = {
     "potpourri3d": METHODS["potpourri3d"],
     "default": ours("heat"),
-    **{f"default, t_coef {t:g}": ours("heat", t_coef=t) for t in (0.25, 0.35, 0.7, 1.0, 2.0)},
+    **{f"default, t_coef {t:g}": ours("heat", t_coef=t) for t in (0.25, 0.35, 0.5, 0.7, 1.0, 2.0)},
+    "not refined, no cover": ours("heat", laplacian="intrinsic-delaunay"),
     "default, average boundary": ours("heat", boundary="average"),
     "default, dirichlet boundary": ours("heat", boundary="dirichlet"),
     "unit field": ours("heat", magnitude="unit"),
@@ -185,7 +186,8 @@ def of_variants(rows: Sequence[Row]) -> list[Row]:
     turned = []
     for variant in VARIANTS:
         error = {row["mesh"]: row[variant]["mean"] for row in rows if variant in row}
-        share = [row[variant]["mean"] / row["potpourri3d"]["mean"] for row in rows if variant in row]
+        both = [row for row in rows if {variant, "potpourri3d"} <= {*row}]
+        share = [row[variant]["mean"] / row["potpourri3d"]["mean"] for row in both]
         means = {"mean": geometric_mean(error.values()), "share": geometric_mean(share), "worst": max(share)}
         turned.append({"variant": variant, "errors": error} | means)
     return turned
