@@ -89,6 +89,7 @@ def test_bad_files_are_rows_and_the_others_go_on(client, tmp_path):
     heat_igl.write_mesh(folder / "fan.off", FAN)
     (folder / "below").mkdir()
     heat_igl.write_mesh(folder / "below" / "tile.obj", heat_igl.shapes.grid(4))
+    (folder / "below" / "._tile.obj").write_bytes(b"left out")
     report = cluster.distances(cluster.folder(folder), [0], tmp_path / "store", client=client)
     assert {Path(row.mesh).name for row in report.failed} == bad
     assert all(row.reason for row in report.failed)
@@ -97,6 +98,7 @@ def test_bad_files_are_rows_and_the_others_go_on(client, tmp_path):
     assert "7" in reasons["outside.off"]
     assert {row.name for row in report.rows if row.status == "done"} == {"good.off", "fan.off", "below%2Ftile.obj"}
     assert cluster.report(tmp_path / "store") == report
+    assert cluster.read_distances(tmp_path / "store", "below/tile.obj").shape == (1, 25)
     assert f"3 of {len(bad) + 3} meshes done, {len(bad)} failed" in report.to_markdown()
 
 

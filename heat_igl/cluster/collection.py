@@ -33,7 +33,8 @@ class Item:
 def folder(path: str | os.PathLike[str], points: bool = False) -> dict[str, Path]:
     """All files of meshes and of point clouds (.xyz) below a folder; the keys are paths in it.
 
-    With `points`, all files that `read_point_cloud` reads. Arrays (.npy) are left out, since they may hold anything.
+    With `points`, all files that `read_point_cloud` reads. Arrays (.npy), which may hold anything, and hidden files
+    are left out.
 
     Raises
     ------
@@ -46,7 +47,7 @@ def folder(path: str | os.PathLike[str], points: bool = False) -> dict[str, Path
     found = {
         file.relative_to(root).as_posix(): file
         for file in sorted(root.rglob("*"))
-        if is_mesh_or_cloud_path(file, points)
+        if is_mesh_or_cloud_path(file, points) and not file.name.startswith(".")
     }
     if not found:
         suffixes = (".ply", ".obj") if points else MESH_SUFFIXES
@@ -75,8 +76,12 @@ def items(meshes: Mapping[str, MeshLike] | Sequence[MeshLike], points: bool = Fa
             raise ValueError(f"a mesh cannot be called {name!r} in a store: choose another name")
         seen.add(name)
         label = os.fspath(mesh) if isinstance(mesh, str | os.PathLike) else name
-        # A name may hold the separator of zarr's groups.
-        yield Item(quote(name, safe=" ()[]"), label, _held(mesh, label), points)
+        yield Item(group_name(name), label, _held(mesh, label), points)
+
+
+def group_name(name: str) -> str:
+    """The name in the store of a mesh, whose own may hold the separator of zarr's groups."""
+    return quote(name, safe=" ()[]")
 
 
 def _held(mesh: MeshLike, label: str) -> Path | Mesh | PointCloud | tuple[Any, Any]:

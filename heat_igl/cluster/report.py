@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from heat_igl.cluster.collection import group_name
 from heat_igl.cluster.store import Store
 from heat_igl.errors import shown
 from heat_igl.typing import AnyArray
@@ -106,7 +107,7 @@ def read_distances(store: str | os.PathLike[str], name: str, rows: slice | None 
     store : path-like
         The store of a batch.
     name : str
-        Name of the mesh in the store: `BatchRow.name`.
+        Name of the mesh, or that in the store, `BatchRow.name`.
     rows : slice, optional
         Consecutive rows; all if not given.
 
@@ -131,6 +132,7 @@ def read_distances(store: str | os.PathLike[str], name: str, rows: slice | None 
     (2, 25)
     """
     opened = Store(store)
+    name = name if opened.attributes(name) else group_name(name)
     status = opened.attributes(name).get("status", "not begun")
     if status != "done":
         raise ValueError(f"the distances on {name} in store {store} are not complete ({status}): run the batch again")
