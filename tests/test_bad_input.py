@@ -316,6 +316,8 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: SurfacePoints([0.5], [[1, 0, 0]]), "faces must be one face index or more, not float64"),
     (lambda _: SurfacePoints([], np.zeros((0, 3))), "faces must be one face index"),
     (lambda m: SurfacePoints([0, 80], CENTRE * 2).positions(m), r"^faces\[1\] = 80 must be a face .* from 0 to 79"),
+    (lambda m: edge_curve(m, [0, 12]).positions(m.halved()), "^faces.* not the triangle that it is on the curve's own"),
+    (lambda m: geodesic_distance(m.halved(), edge_curve(m, [0, 12])), "^faces.* on the curve's own mesh: curve_on"),
     (lambda _: curve_on(GRID, [[0, 0, 0]]), "two corners of a curve or more, not 1"),
     (
         lambda _: curve_on(GRID, np.ones((2, 4))),

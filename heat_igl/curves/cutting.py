@@ -195,7 +195,7 @@ def cut(mesh: MeshLike, curves: NestedCurves) -> CutMesh:
     for name, curve in entries:
         if not isinstance(curve, SurfaceCurve):
             raise SourceError(f"{name} must be a SurfaceCurve, not {type(curve).__name__}")
-        require_faces(curve.faces, triangles.n_faces, f"{name}.")
+        require_faces(curve, triangles.F, triangles.V, f"{name}: ")
     return _Cut(triangles, [curve for _, curve in entries]).result()
 
 

@@ -64,7 +64,7 @@ def course_of(mesh: Mesh, curve: SurfaceCurve) -> FaceSequence:
     A `SourceError` if its segments do not join, a face is none of the mesh, or a closed curve has no length.
     """
     faces = curve.faces
-    require_faces(faces, mesh.n_faces)
+    require_faces(curve, mesh.F, mesh.V)
     count = len(curve) if curve.is_closed else len(curve) - 1
     corner = mesh.V[mesh.F[faces]]
     begins, ends = (np.einsum("kc,kcx->kx", place, corner) for place in (curve.start, curve.end))

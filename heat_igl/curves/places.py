@@ -27,7 +27,7 @@ def checked_places(
     `name` is the name of the argument, for messages; `corner_at`, the result of `corners`, saves time in many calls.
     """
     if isinstance(points, SurfacePoints):
-        require_faces(points.faces, mesh.n_faces, f"{name}: ")
+        require_faces(points, mesh.F, mesh.V, f"{name}: ")
         return points.faces, on_simplex(points.barycentric)
     if isinstance(points, Sequence) and any(isinstance(point, SurfacePoints) for point in points):
         parts = []

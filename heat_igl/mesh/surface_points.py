@@ -77,7 +77,7 @@ class SurfacePoints:
         SourceError
             If a face is not one of the mesh, or the mesh is tetrahedral.
         """
-        return _in_space(mesh, self.faces, self.barycentric)
+        return _in_space(mesh, self, self.barycentric)[0]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,8 +139,8 @@ class SurfaceCurve:
         mesh = self.mesh if mesh is None else mesh
         if mesh is None:
             raise ValueError("this curve does not know its mesh: name it, as in curve.positions(mesh)")
-        first = _in_space(mesh, self.faces[:1], self.start[:1])
-        return np.concatenate([first, _in_space(mesh, self.faces, self.end)])
+        start, end = _in_space(mesh, self, self.start, self.end)
+        return np.concatenate([start[:1], end])
 
     def lengths(self, mesh: MeshLike | None = None) -> FloatArray:
         """Length (s,) of each segment on `mesh`, in the unit of the mesh; mesh and errors as for `positions`."""
@@ -231,16 +231,36 @@ def _coordinates(name: str, barycentric: ArrayLike, k: int) -> FloatArray:
     return np.asarray(array / (a + b + c)[:, None])
 
 
-def require_faces(faces: IntArray, n_faces: int, place: str = "") -> None:
-    """Raise a `SourceError` if there is no such face; the message begins with `place` and names the first."""
-    outside, remedy = (faces < 0) | (faces >= n_faces), f"indices run from 0 to {n_faces - 1}"
-    raise_at_first(outside, f"{place}faces", faces, "must be a face", remedy, SourceError)
+def require_faces(places: SurfacePoints | SurfaceCurve, F: IntArray, V: FloatArray | None, place: str = "") -> None:
+    """Raise a `SourceError` that begins with `place` if a face is none of F, or another one on a curve's own mesh.
+
+    Faces are the same if their corners have the same numbers, or the same positions V, if these are known.
+    """
+    faces, n = places.faces, len(F)
+    raise_at_first(
+        (faces < 0) | (faces >= n),
+        f"{place}faces",
+        faces,
+        "must be a face",
+        f"indices run from 0 to {n - 1}",
+        SourceError,
+    )
+    own = places.mesh if isinstance(places, SurfaceCurve) else None
+    if own is not None and own.F is not F:
+        theirs = np.take(own.F, faces, axis=0, mode="clip")
+        other = (theirs != F[faces]).any(axis=1)
+        if V is not None:
+            other &= (own.V[theirs] != V[F[faces]]).any(axis=(1, 2))
+        problem = "is not the triangle that it is on the curve's own mesh"
+        raise_at_first(other, f"{place}faces", faces, problem, "curve_on(mesh, curve.points) puts it here", SourceError)
 
 
-def _in_space(mesh: MeshLike, faces: IntArray, barycentric: FloatArray) -> FloatArray:
+def _in_space(mesh: MeshLike, places: SurfacePoints | SurfaceCurve, *barycentric: FloatArray) -> list[FloatArray]:
+    """Positions (k, 3) on the faces of `places` for each array of coordinates (k, 3)."""
     mesh = as_triangles(mesh, "points on faces need", SourceError)
-    require_faces(faces, mesh.n_faces)
-    return np.asarray(np.einsum("kc,kcx->kx", barycentric, mesh.V[mesh.F[faces]]))
+    require_faces(places, mesh.F, mesh.V)
+    corners = mesh.V[mesh.F[places.faces]]
+    return [np.asarray(np.einsum("kc,kcx->kx", weights, corners)) for weights in barycentric]
 
 
 class ClosestPoints(NamedTuple):

@@ -114,7 +114,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
     points: list[tuple[IntArray, FloatArray, IntArray, FloatArray]] = []
     for i, (name, part) in enumerate(parts):
         if isinstance(part, OrientedPoints):
-            require_faces(part.points.faces, mesh.n_faces, f"{name}: ")
+            require_faces(part.points, mesh.F, mesh.V, f"{name}: ")
             label = np.full(len(part), i)
             points.append((part.points.faces, on_simplex(part.points.barycentric), label, part.normals))
         else:
@@ -130,7 +130,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
 def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
     """The segments of positive length of a curve, or of the boundary of a region."""
     if isinstance(part, SurfaceCurve):
-        require_faces(part.faces, mesh.n_faces, f"{name}: ")
+        require_faces(part, mesh.F, mesh.V, f"{name}: ")
         start, end = on_simplex(part.start), on_simplex(part.end)
         kept = (start != end).any(axis=1)
         if not kept.any():

@@ -300,10 +300,10 @@ class _Builder:
                 )
             self._offset[start:] += sources.offsets
         elif isinstance(sources, SurfacePoints):
-            self._check_faces(sources.faces)
+            self._check_faces(sources)
             self._points.append((sources, self._counted(len(sources))))
         elif isinstance(sources, SurfaceCurve):
-            self._check_faces(sources.faces)
+            self._check_faces(sources)
             label = self._counted(1)
             if (sources.start == sources.end).all():
                 # A curve without length, such as the path from a vertex to itself, gives no heat. It is a point.
@@ -327,10 +327,10 @@ class _Builder:
         self._offset = np.concatenate([self._offset, np.zeros(k)])
         return np.arange(start, start + k)
 
-    def _check_faces(self, faces: IntArray) -> None:
+    def _check_faces(self, places: SurfacePoints | SurfaceCurve) -> None:
         if self._F is None:
             raise SourceError("points and curves lie on triangles, and this domain has none: name vertices")
-        require_faces(faces, len(self._F))
+        require_faces(places, self._F, None if self._mesh is None else self._mesh.V)
 
     def finish(self) -> SourceSet:
         points = self._points_in_faces() if self._points else NO_POINTS
