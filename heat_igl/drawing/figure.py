@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PICTURE_SUFFIXES = (".png", ".pdf", ".svg")
 PAGE_SUFFIXES = (".html", ".htm")
-OVERSAMPLING = 2
+OVERSAMPLING = 2  # along each side of a pixel; 1 has 2.4 times the error of a colour, 3 half of it in twice the time
 LINE = 2.2  # width of an isoline in pixels
 SOURCE = "#e8000b"
 DPI = 400  # resolution of raster output: 1260 pixels for 8 cm

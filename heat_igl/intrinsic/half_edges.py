@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # The triangle inequality holds with this margin, in mean edge lengths. With 1e-9 heat gives the same on 95 shapes, with
 # 1e-6 it is 160 % wrong on a needle.
 _MARGIN = 1e-8
-# Edges around corners that coincide, in mean edge lengths.
+# Edges around corners that coincide, in mean edge lengths: `mollify` says why.
 _SHORTEST = 1e-10
 # Half-edges and vertices that indices of 32 bits tell apart, with room for two bits of the kernels' own.
 _TOO_MANY = 2**29

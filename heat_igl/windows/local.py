@@ -23,11 +23,12 @@ from heat_igl.windows.exact import TOLERANCE, Found, Leaving, require_memory
 from heat_igl.windows.guards import ROUNDING, distances_instead
 from heat_igl.windows.tables import Tables, from_mesh
 
-# Peak memory per stored distance while a sparse array is assembled, in bytes.
+# Peak memory per stored distance while a sparse array is assembled, in bytes: 26 on a sphere; reordered rows take more.
 _BYTES = 48
 # Largest result, in entries, if more vertices are requested than the mesh has.
 _MOST_PADDED = 2**28
-#: Largest number of sources that a thread takes at a time.
+#: Largest number of sources that a thread takes at a time. Neighbourhoods of few vertices take 1.6 times as long with
+#: 16 and .75 with 256, large ones as long.
 CHUNK = 64
 # Initial capacity of a thread's result arrays.
 _ROOM = 2**16

@@ -3,7 +3,7 @@ cdef enum:
     ANGLE = 0
     X = 1
     Y = 2
-    # The star of so many nearest neighbours rules out most of the others.
+    # The star of so many nearest neighbours rules out most of the others. 6 and 16: 1 and 3 % more time for a cloud.
     FEW = 10
 
 cdef extern from *:

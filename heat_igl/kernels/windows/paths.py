@@ -14,11 +14,13 @@ from cython.cimports.libc.math import INFINITY, fabs, sqrt
 # A path through a vertex near the line is taken if its length is the distance up to this fraction of it: more than
 # rounding, and too little to matter.
 _ON_LINE = cython.declare(cython.double, 1e-13)
-# The same for the root, at which the line is known to start.
+# The same for the root, at which the line is known to start. Of 6000 paths on 106 shapes none changes a bit with 1e-6,
+# and one on a needle is lost with 1e-12.
 _AT_ROOT = cython.declare(cython.double, 1e-9)
-# A line is abandoned if it is too far from the source by more than this fraction of the distance.
+# A line is abandoned if it is too far from the source by more than this fraction of the distance. With 1e-11 and 1e-3
+# none of these paths changes.
 _ASTRAY = cython.declare(cython.double, 1e-6)
-# Largest number of faces that one path crosses.
+# Largest number of faces that one path crosses: its segments take 200 MB.
 _MOST_STEPS = cython.declare(cython.int, 4000000)
 
 

@@ -51,7 +51,7 @@ _ASK = cython.declare(cython.longlong, 50_000)
 # A search ends in vain after so many for each half-edge: on surfaces that are stretched by 1e10, paths that wind around
 # them are equal to rounding. Others take up to 120, and fans of 2048 triangles 1400.
 _MOST = cython.declare(cython.longlong, 100_000)
-# Attempts to take the lock of the other thread before this thread sleeps.
+# Attempts to take the lock of the other thread before this thread sleeps: some 100 us, as long as a round.
 _TRIES = cython.declare(cython.int, 2000)
 
 
