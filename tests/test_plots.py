@@ -121,7 +121,7 @@ def test_curves_are_drawn_where_they_are_seen_and_dotted_where_they_are_not():
     # Along y = 0.5: in the far triangle from x = 0 to 3.5, in the near one from x = 0 to 1.5.
     far = heat_igl.SurfaceCurve([0], [[0.875, 0, 0.125]], [[0, 0.875, 0.125]])
     near = heat_igl.SurfaceCurve([1], [[0.75, 0, 0.25]], [[0, 0.75, 0.25]])
-    drawn = plot(mesh, V[:, 0], curves=[far, near], view=(0, 0))
+    drawn = plot(mesh, V[:, 0], curves=[[far], near], view=(0, 0))  # nested, as isolines are
     axes = drawn.figure.axes[0]
     columns = surface_image(drawn).shape[1]
     spans = {"dotted": [], "solid": []}

@@ -17,7 +17,6 @@ b'PNG'
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -30,7 +29,7 @@ from heat_igl.drawing.raster import rasterize, to_pixels, visible_runs
 from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, Scene, Style, colours, scene, slopes, vertex_values
 from heat_igl.errors import as_array, require_choice
 from heat_igl.io import complete_file, write_svg
-from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_mesh, as_simplices, flat_curves
+from heat_igl.mesh import Mesh, MeshLike, NestedCurves, PointCloud, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -57,7 +56,7 @@ def plot(
     sources: Sources | None = None,
     spacing: float | None = None,
     style: Style = "lines",
-    curves: Sequence[SurfaceCurve] = (),
+    curves: NestedCurves = (),
     view: tuple[float, float] | None = None,
     up: str = "y",
     colormap: str = DISTANCE_COLOURS,
@@ -78,7 +77,7 @@ def plot(
     style : {"lines", "stripes", "plain"}
         "lines" draws isolines. "stripes" draws alternating light and full stripes of width `spacing`, which show kinks
         and ripples best. "plain" draws colours only.
-    curves : sequence of SurfaceCurve
+    curves : SurfaceCurve, or sequence of such of any depth
         Curves on the mesh; their hidden parts are thin and dotted.
     view : (azimuth, elevation), optional
         Direction of the viewer in degrees; see `heat_igl.drawing.raster.rotation`. By default a flat mesh is viewed at
@@ -108,7 +107,7 @@ def plot(
     mesh = _drawn(mesh)
     require_choice("style", style, get_args(Style))
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
-    return lay_out(seen, [seen.line(curve, mesh) for curve in curves], style, colours(colormap), label, "unreachable")
+    return lay_out(seen, seen.placed(curves, mesh), style, colours(colormap), label, "unreachable")
 
 
 def plot_field(
@@ -119,7 +118,7 @@ def plot_field(
     limits: tuple[float, float] | None = None,
     spacing: float | None = None,
     sources: Sources | None = None,
-    curves: Sequence[SurfaceCurve] = (),
+    curves: NestedCurves = (),
     view: tuple[float, float] | None = None,
     up: str = "y",
     colormap: str | None = None,
@@ -162,7 +161,7 @@ def plot_field(
         mesh, values, name="values", sources=sources, spacing=spacing, limits=limits, view=view, up=up
     )  # fmt: skip
     style: Style = "plain" if spacing is None else "lines"
-    return lay_out(seen, [seen.line(curve, mesh) for curve in curves], style, table, label, "no value")
+    return lay_out(seen, seen.placed(curves, mesh), style, table, label, "no value")
 
 
 def plot_labels(
@@ -171,7 +170,7 @@ def plot_labels(
     *,
     distance: ArrayLike | None = None,
     sources: Sources | None = None,
-    curves: Sequence[SurfaceCurve] = (),
+    curves: NestedCurves = (),
     view: tuple[float, float] | None = None,
     up: str = "y",
 ) -> Picture:
@@ -220,7 +219,7 @@ def plot_labels(
         if not isinstance(mesh, PointCloud):  # whose discs have one label each
             # Without a label there is no site to be far from.
             seen = replace(seen, borders=_borders(seen, given, np.where(given < 0, 0.0, measured / seen.unit)))
-    return lay_out(seen, [seen.line(curve, mesh) for curve in curves], "plain", table, "", "no label")
+    return lay_out(seen, seen.placed(curves, mesh), "plain", table, "", "no label")
 
 
 def _colour_numbers(labels: IntArray, edges: IntArray, n_colours: int) -> IntArray:
@@ -316,13 +315,13 @@ def write_line_drawing(
     if target.suffix.lower() != ".svg":
         raise ValueError(f"{target}: line drawings go to .svg files")
     require_choice("hidden", hidden, get_args(Hidden))
-    mesh, lines = as_simplices(mesh), flat_curves(curves)
+    mesh = as_simplices(mesh)
     seen = scene(mesh, np.zeros(mesh.n_vertices), view=view, up=up)
     scale, centre = fitted(seen, _PIXELS, _PIXELS, 0.02 * _PIXELS)
     depth = rasterize(to_pixels(seen.turned, scale, centre), seen.F, _PIXELS, _PIXELS).depth
     groups: dict[str, list[tuple[FloatArray, bool]]] = {"visible": [], "hidden": []}
-    for curve in lines:
-        for is_seen, run in visible_runs(to_pixels(seen.line(curve, mesh), scale, centre), depth, _BEHIND * _PIXELS):
+    for line in seen.placed(curves, mesh):
+        for is_seen, run in visible_runs(to_pixels(line, scale, centre), depth, _BEHIND * _PIXELS):
             # Pixels count downwards, the plane of the drawing upwards; its unit is that of the mesh.
             drawn = (run[:, :2] - centre) * [1, -1] / scale * seen.unit
             groups["visible" if is_seen else "hidden"].append((_corners(drawn), False))

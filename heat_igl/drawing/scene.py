@@ -10,7 +10,7 @@ import numpy as np
 
 from heat_igl.drawing.raster import default_rotation, rotation
 from heat_igl.errors import MissingExtraError, real_numbers
-from heat_igl.mesh import Mesh, MeshLike, PointCloud, SurfaceCurve, as_simplices
+from heat_igl.mesh import Mesh, MeshLike, NestedCurves, PointCloud, as_simplices, flat_curves
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -64,9 +64,10 @@ class Scene:
         low, high = turned.min(axis=0), turned.max(axis=0)
         return (low + high) / 2, np.maximum(high - low, 1e-3 * (high - low).max())
 
-    def line(self, curve: SurfaceCurve, mesh: MeshLike) -> FloatArray:
-        """The vertices (k, 3) of a curve on the mesh that is shown, in viewer coordinates."""
-        return np.asarray((curve.positions(mesh) - self.centre) / self.unit @ self.turn.T)
+    def placed(self, curves: NestedCurves, mesh: MeshLike) -> list[FloatArray]:
+        """The vertices (k, 3) of each curve on the mesh that is shown, in viewer coordinates."""
+        each = (curve.positions(mesh) for curve in flat_curves(curves))
+        return [np.asarray((positions - self.centre) / self.unit @ self.turn.T) for positions in each]
 
 
 def scene(
