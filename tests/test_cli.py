@@ -90,6 +90,7 @@ def test_paths_and_traces_are_those_of_the_library(ball, capsys, monkeypatch):
         ("trace", "--from=12", "--direction=1,2,3", "--length=0.7"): heat_igl.trace_geodesic(mesh, 12, [1, 2, 3], 0.7),
     }
     for (name, *arguments), curve in expected.items():
+        assert cli.run([name, str(ball), *arguments, "--output=curve.svg"]) == 0  # from one side, as of isolines
         assert cli.run([name, str(ball), *arguments, "--output=curve.obj"]) == 0
         printed = capsys.readouterr().out
         assert f"{curve.lengths(mesh).sum():.6g}" in printed

@@ -245,7 +245,10 @@ def _report(
     mesh: Mesh, curve: SurfaceCurve, output: Path, json_file: Path | None, gaps: Sequence[float | None]
 ) -> None:
     """Write a curve, and print the length, and how far positions were off the surface."""
-    heat_igl.write_curves(output, mesh, [curve])
+    if output.suffix.lower() == ".svg" and not is_flat(mesh):
+        heat_igl.plots.write_line_drawing(output, mesh, curve)
+    else:
+        heat_igl.write_curves(output, mesh, [curve])
     length, segments = float(curve.lengths(mesh).sum()), len(curve)
     rows: list[Row] = [("length", f"{length:.6g}", length), ("segments", str(segments), segments)]
     given = [gap for gap in gaps if gap is not None]
