@@ -253,6 +253,14 @@ def test_points_on_an_edge_of_many_faces():
         np.testing.assert_allclose(back, truth[source], rtol=1e-12)
 
 
+def test_points_at_a_source_are_at_its_distance():
+    """Weights that sum to 1 up to rounding put a target beside the source, and there is no larger distance."""
+    mesh = shapes.icosphere(2)
+    for face in range(0, mesh.n_faces, 8):
+        point = SurfacePoints([face], [np.random.default_rng(face).dirichlet([1, 1, 1])])
+        assert geodesic_distance(mesh, point, targets=point) == pytest.approx(0, abs=1e-15)
+
+
 def test_cutoff_and_goals_end_early_with_the_same_bits():
     mesh = bumpy()
     surface = delaunay(mesh)

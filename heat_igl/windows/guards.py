@@ -108,7 +108,10 @@ class Invariants:
         places = self._V[vertices]
         if isinstance(targets, SurfacePoints):
             places = np.einsum("kc,kcx->kx", targets.barycentric, self._V[self._F[targets.faces]])
-        return self._below_lines(distance, sources, ROUNDING * checking.largest_finite(distance), places)
+        slack = ROUNDING * checking.largest_finite(distance)
+        return self._below_lines(distance, sources, slack, places) and self._below_lines(
+            distance, sources, slack + self._rounding_of_lengths(sources), places
+        )
 
     def _elsewhere(self, distance: FloatArray, sources: SourceSet) -> str | None:
         """Finite on a component without a source."""
