@@ -131,7 +131,6 @@ def page(
     mesh = as_simplices(given)
     require_choice("style", style, get_args(Style))
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
-    table = colours(colormap)(np.linspace(0, 1, 256))
     middle, extent = seen.box
     arrays: dict[str, AnyArray] = {
         "positions": seen.V.astype("<f4"),
@@ -148,8 +147,8 @@ def page(
         "dots": np.concatenate([seen.dots, seen.lines.reshape(-1, 3)]).round(7).ravel().tolist(),
         "spacing": spacing,
         "style": str(get_args(Style).index(style)),
-        "colours": _bytes(table),
-        "signedColours": _bytes(colours(_SIGNED_COLOURS, is_trimmed=False)(np.linspace(0, 1, 256))),
+        "colours": _table(colormap),
+        "signedColours": _table(_SIGNED_COLOURS, is_trimmed=False),
         "lineInk": LINE_INK,
         "stripeInk": STRIPE_INK,
         "label": label,
@@ -164,23 +163,7 @@ def page(
         choices.append(_LOG_MAP)
     if beside is not None and beside not in choices:
         raise ValueError(f"beside must be one of {', '.join(map(repr, choices)) or 'the fields'}, not {beside!r}")
-    meta["arrays"] = [
-        (name, "float" if array.dtype.kind == "f" else "int", array.size) for name, array in arrays.items()
-    ]
-    # Bytes are grouped by significance: adjacent signs and exponents compress best.
-    planes = [np.ascontiguousarray(array).view(np.uint8).reshape(-1, 4).T.tobytes() for array in arrays.values()]
-    folder = files("heat_igl.drawing") / "page"
-    names = sorted(file.name for file in folder.iterdir() if file.name.endswith(".js"))
-    return Page(
-        Template((folder / "page.html").read_text(encoding="utf8")).substitute(
-            title=html.escape(title),
-            # Without the character "<", which could end the surrounding script element.
-            meta=json.dumps(meta, allow_nan=False).replace("<", "\\u003c"),
-            data=base64.b64encode(zlib.compress(b"".join(planes), 9)).decode(),
-            # One script in the end: view.js, the last by name, uses what the others define.
-            scripts="\n".join((folder / name).read_text(encoding="utf8") for name in names),
-        )
-    )
+    return Page(_document(title, meta, arrays))
 
 
 def _add_sweep(arrays: dict[str, AnyArray], meta: dict[str, Any], mesh: Mesh) -> None:
@@ -211,7 +194,26 @@ def _add_fields(arrays: dict[str, AnyArray], meta: dict[str, Any], fields: Mappi
         meta["fields"].append([name, values.ndim])
 
 
-def _bytes(table: AnyArray) -> list[list[int]]:
-    """Colours (k, 4) between 0 and 1 as red, green and blue up to 255."""
-    colours_as_bytes: list[list[int]] = np.rint(255 * table[:, :3]).astype(int).tolist()
-    return colours_as_bytes
+def _table(colormap: str, **options: bool) -> list[list[int]]:
+    """Red, green and blue up to 255 of 256 values from 0 to 1."""
+    rgb = colours(colormap, **options)(np.linspace(0, 1, 256))[:, :3]
+    found: list[list[int]] = np.rint(255 * rgb).astype(int).tolist()
+    return found
+
+
+def _document(title: str, meta: dict[str, Any], arrays: dict[str, AnyArray]) -> str:
+    """The template of a page with its scripts, and with `arrays`, of which the page learns from `meta`."""
+    kinds = {"f": "float", "i": "int"}
+    meta["arrays"] = [(name, kinds[array.dtype.kind], array.size) for name, array in arrays.items()]
+    # Bytes are grouped by significance: adjacent signs and exponents compress best.
+    planes = [np.ascontiguousarray(array).view(np.uint8).reshape(-1, 4).T.tobytes() for array in arrays.values()]
+    folder = files("heat_igl.drawing") / "page"
+    names = sorted(file.name for file in folder.iterdir() if file.name.endswith(".js"))
+    return Template((folder / "page.html").read_text(encoding="utf8")).substitute(
+        title=html.escape(title),
+        # Without the character "<", which could end the surrounding script element.
+        meta=json.dumps(meta, allow_nan=False).replace("<", "\\u003c"),
+        data=base64.b64encode(zlib.compress(b"".join(planes), 9)).decode(),
+        # One script in the end: view.js, the last by name, uses what the others define.
+        scripts="\n".join((folder / name).read_text(encoding="utf8") for name in names),
+    )

@@ -80,7 +80,7 @@ def _run(
     bounds: Mapping[str, float],
     begun: Callable[[str, int], None],
 ) -> Run:
-    """Distances from each set of sources by a method from `resolved`; `bounds` are timeout and memory.
+    """Distances from each set of sources by a method from `_resolved`; `bounds` are timeout and memory.
 
     `begun` is called before each distance, with the name of the method and the index of the set.
     """

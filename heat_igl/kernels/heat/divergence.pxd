@@ -1,5 +1,5 @@
 cdef enum:
-    # Columns of the numbers of a face; `heat_igl.steps._divergence_tables` says what they are.
+    # Columns of the numbers of a face; `heat_igl.heat.steps._divergence_tables` says what they are.
     PER_BASE = 0
     FOOT = 1
     PER_HEIGHT = 2

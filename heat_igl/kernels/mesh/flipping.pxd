@@ -1,5 +1,5 @@
 cdef enum:
-    # Kinds of moves, as `heat_igl.intrinsic.history` has them.
+    # Kinds of moves, as `heat_igl.intrinsic.Moved` has them.
     SPLIT = 0
     FLIP = 1
 
