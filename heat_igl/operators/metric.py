@@ -167,10 +167,11 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
     first, group = equal_runs(s)
     each = s[first, None, None]
-    make: Callable[..., Operators] = _of_groups if mesh.is_tetrahedral else partial(operators_in_metric, given=s)
+    least, root = 1 / float(s.max()), (each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None)
     # A metric without a name here does not outlive its use there.
-    root = each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None
-    return make(mesh, np.eye(3) / each**2, 1 / float(s.max()), root, group)
+    if mesh.is_tetrahedral:
+        return _of_groups(mesh, np.eye(3) / each**2, least, root, group)
+    return operators_in_metric(mesh, np.eye(3) / each**2, least, root, group, s)
 
 
 def fibre_metric(

@@ -89,7 +89,7 @@ class MetricSimplices:
         # quarter or more at one, as it leaves of a step: jumps stay where they are.
         group = np.arange(len(corners), dtype=np.int32) if group is None else group
         incident = incidence.corners_by_vertex(corners, mesh.n_vertices)
-        at_vertex, share = fits_around(corners, mesh.V - mesh.V.mean(axis=0), velocity, group, *incident)
+        at_vertex, share = fits_around(corners, mesh.V, velocity, group, *incident)
         del incident
         if not (share > _ROUNDING).any():
             g = np.linalg.matrix_power(symmetric(velocity), -2) if g is None else g

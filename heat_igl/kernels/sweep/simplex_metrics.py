@@ -298,6 +298,8 @@ def fits_around(
     met: cython.int[::1] = np.zeros(len(X), np.int32)
     near: cython.int[::1] = np.empty(len(X) + 1, np.int32)
     level: cython.double[::1] = np.bincount(group) @ W / len(group)
+    # Far from the origin, digits of products of positions are lost.
+    origin: cython.double[::1] = np.mean(X, axis=0)
     row: cython.double[10]
     side: cython.double[6]
     normal: cython.double[3]
@@ -310,7 +312,7 @@ def fits_around(
             for k in range(9):
                 row[1 + k] = W[group[s], k - 3] - level[k - 3] if k > 2 else 0.0
             for k in range(3 * size):
-                row[1 + k % 3] += X[corners[s, k // 3], k % 3] / size
+                row[1 + k % 3] += (X[corners[s, k // 3], k % 3] - origin[k % 3]) / size
             if n_columns == 41:
                 for k in range(6):
                     side[k] = X[corners[s, 1 + k // 3], k % 3] - X[corners[s, 0], k % 3]
@@ -388,7 +390,7 @@ def fits_around(
                 free -= 1.0
                 away: cython.double = 0.0
                 for j in range(3):
-                    away += work[9 + 3 * i + j] * (X[v, j] - mean[1 + j])
+                    away += work[9 + 3 * i + j] * (X[v, j] - origin[j] - mean[1 + j])
                 for k in range(6):
                     rise: cython.double = 0.0
                     for j in range(3):
