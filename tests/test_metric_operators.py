@@ -53,6 +53,22 @@ def test_metrics_in_the_plane_of_each_face_and_in_space():
     np.testing.assert_array_equal(one, [*fibre_metric([[2, 1, 0]], 1.0, 3.0), *other])
 
 
+@pytest.mark.parametrize("speed", [1.05, 1.5])
+def test_lengths_of_edges_of_three_faces(speed):
+    """At the spine of a book, edges have the mean of what the three pages say, or no length if one differs by far."""
+    mesh = shapes.book(3, 6)
+    is_fast = mesh.V[mesh.F].mean(axis=1)[:, 1] > 1e-9
+    assert is_fast.mean() == pytest.approx(1 / 3)
+    surface = heat_igl.speed_operators(mesh, np.where(is_fast, speed, 1.0)).surface
+    assert (surface is None) == (speed > 1.1)
+    if surface is not None:
+        at_spine = np.hypot(*mesh.V[mesh.F, :2].T).T < 1e-9
+        f, c = np.nonzero((at_spine.sum(axis=1) == 2)[:, None] & ~at_spine)
+        assert len(f) == 3 * 6
+        given = igl.edge_lengths(mesh.V, mesh.F)[f, c]
+        np.testing.assert_allclose(surface.faces.l[f, c], given * (2 + 1 / speed) / 3, rtol=1e-12)
+
+
 def test_a_piecewise_constant_metric_that_fits_together():
     """Half of a square is stretched across the border, along which both halves agree: a rectangle."""
     mesh = two_halves(24)
