@@ -11,4 +11,5 @@ ends have distances.
 - `bends`: each edge, from near to far, whose ends have got shorter distances is fitted, and vertices around it take the
   ways around it as far as they see it; until no end gets shorter. Points of an edge take ways as vertices do.
   Distance along it is that from one point beside it, if this agrees at the middle and the quarters, else interpolated.
+  Where both ends see one source, the points between are presumed to, until a way bends there.
 """

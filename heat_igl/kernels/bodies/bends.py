@@ -21,6 +21,9 @@ _SLACK = cython.declare(cython.double, 0.02)
 # Times that distance along an edge is found, and that in bits.
 _MOST_FITS = cython.declare(cython.int, 63)
 _FIT_BITS = cython.declare(cython.int, 6)
+# All five points of an edge, ends, quarters and middle, and its ends, in bits.
+_ALL_POINTS = cython.declare(cython.int, 31)
+_ENDS = cython.declare(cython.int, 17)
 # No edge, and no way.
 _NONE = cython.declare(cython.int, -3)
 
@@ -89,6 +92,7 @@ def bend_around(
         one.edge = cython.cast(cython.pointer[_Edge], cython.address(table[0, 0]))
     one.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
     one.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
+    one.followed, one.is_open, one.refuted = np.zeros(e, np.uint8), np.zeros((e, 2), np.uint8), _NONE
     one.fit_of = np.arange(e, dtype=np.int32) << _FIT_BITS
     one.newest, one.met = np.full((2, n), _NONE, np.int32)
     one.point_of, one.waiting, one.bound = np.zeros(e, np.int32), PriorityQueue(n), np.array(d)
@@ -97,6 +101,9 @@ def bend_around(
     n_asked: cython.Py_ssize_t = 0
     while True:
         with cython.nogil:
+            for i in range(e):
+                one.open_at(edges[i, 0])
+                one.open_at(edges[i, 1])
             for i in range(e):
                 one.begin_around(order[i])
             while one.waiting.count > 0 and not one.failed:
@@ -136,7 +143,8 @@ class _Bends(Ray):
     `met` (n,); `point_of` (e,) is the number of the last `point` of an edge for which an edge was a candidate; `n_near`
     are `near`, on ways of `near_value`. Edges begin from one end if it `is_lone`.
     The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`, and `sought` is
-    the edge that is fitted.
+    the edge that is fitted. It `is_open` (e, 2) at an end if it hides anything there; `followed` (e,) are the points of
+    an edge whose ways have been followed, in bits, and `refuted` is an edge at which one was hidden.
     """
 
     edges: cython.const[cython.int][:, ::1]
@@ -160,6 +168,9 @@ class _Bends(Ray):
     is_lone: cython.bint
     waiting: PriorityQueue
     bound: cython.double[::1]
+    is_open: cython.uchar[:, ::1]
+    followed: cython.uchar[::1]
+    refuted: cython.int
     line: Line
     point: cython.int
     n_near: cython.int
@@ -173,8 +184,12 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def fit(self, i: cython.int) -> cython.void:
-        """Find distance along an edge, at its ends, quarters and middle."""
+    def fit(self, i: cython.int, follows: cython.bint) -> cython.void:
+        """Find distance along an edge, at its ends, quarters and middle, whose ways it follows or may presume.
+
+        If the ways to both ends come from one source, so do those to points between, or they are hidden and longer. If
+        both ends have ways around one edge and it hides nothing, it is seldom needed, and they are presumed as well.
+        """
         x: cython.double[3]
         edge: cython.pointer[_Edge] = cython.address(self.edge[i])
         a: cython.int = self.edges[i, 0]
@@ -190,10 +205,21 @@ class _Bends(Ray):
                 edge.before[1] += (self.line.goal[k] - edge.end[k]) * edge.across[k]
         edge.at[0], edge.at[4] = min(self.d[a], self.d[b] + edge.length), min(self.d[b], self.d[a] + edge.length)
         part: cython.double = 0.25 * edge.length
+        way: cython.int = self.way[a]
+        if way == -1:
+            follows = follows or self.way[b] != -1 or self.label[a] != self.label[b]
+        else:
+            follows = follows or way < 0 or self.way[b] != way or self.is_open[i, 0] or self.is_open[i, 1]
+        self.followed[i] = _ALL_POINTS if follows else _ENDS
         for j in range(1, 4):
-            for k in range(3):
-                x[k] = self.body.positions[a, k] + j * part * edge.tangent[k]
-            edge.at[j] = self.shortest_to(i, x, min(edge.at[j - 1] + part, edge.at[4] + (4 - j) * part))
+            self.point_along(i, j, x)
+            most: cython.double = min(edge.at[j - 1] + part, edge.at[4] + (4 - j) * part)
+            if follows:
+                edge.at[j] = self.shortest_to(i, x, most)
+            elif way >= 0:
+                edge.at[j] = min(most, self.around(way, x, False))
+            else:
+                edge.at[j] = min(most, self.offset[self.label[a]] + self.body.away(self.sources[self.label[a]], x))
         for j in range(3, 0, -1):
             edge.at[j] = min(edge.at[j], edge.at[j + 1] + part)
         self.lay_flat(i, a, b)
@@ -206,6 +232,36 @@ class _Bends(Ray):
             for k in range(max(j - 1, 0), min(j + 1, 3)):
                 if edge.slope[k] > edge.slope[k + 1] + 16 * _MISFIT:
                     edge.lean[j] = 1e30
+
+    @cython.cfunc
+    @cython.nogil
+    def point_along(self, i: cython.int, j: cython.int, x: cython.pointer[cython.double]) -> cython.void:
+        """Set x to the place j quarters along an edge."""
+        for k in range(3):
+            x[k] = self.body.positions[self.edges[i, 0], k] + 0.25 * j * self.edge[i].length * self.edge[i].tangent[k]
+
+    @cython.cfunc
+    @cython.nogil
+    def holds(self, i: cython.int) -> cython.bint:
+        """Whether the ways to the ends of the quarter of an edge in which the last way bends are clear, if presumed."""
+        if self.followed[i] == _ALL_POINTS:
+            return True
+        x: cython.double[3]
+        sought: cython.int = self.sought
+        quarters: cython.double = 4 * self.share
+        is_clear: cython.bint = True
+        self.sought = i
+        for j in range(1, 4):
+            if is_clear and fabs(j - quarters) < 1 and not (self.followed[i] >> j) & 1:
+                self.point_along(i, j, x)
+                way: cython.int = self.way[self.edges[i, 0]]
+                # First, as where edges touch, each may rely on the other.
+                self.followed[i] |= 1 << j
+                is_clear = way > -2 and self.is_lit(way, self.edges[i, 0], x) and (way < 0 or self.holds(way))
+                if not is_clear:
+                    self.followed[i] &= _ALL_POINTS - (1 << j)
+        self.sought = sought
+        return is_clear
 
     @cython.cfunc
     @cython.nogil
@@ -271,8 +327,13 @@ class _Bends(Ray):
             value: cython.double = self.near_value[best]
             self.n_near -= 1
             self.near[best], self.near_value[best] = self.near[self.n_near], self.near_value[self.n_near]
-            if value >= most or self.is_lit(max(way, -1), self.edges[i, 1 if way == -2 else 0], x):
-                return min(value, most)
+            if value >= most:
+                return most
+            if self.is_lit(max(way, -1), self.edges[i, 1 if way == -2 else 0], x):
+                if way < 0 or self.holds(way):
+                    return value
+                self.refuted = way
+                continue
             for c in range(1, 4):
                 self.add_at(self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
         return most
@@ -386,16 +447,54 @@ class _Bends(Ray):
         is_new: cython.bint = self.edge[i].at[0] > to_a * (1 + GAIN) or self.edge[i].at[4] > to_b * (1 + GAIN)
         is_known: cython.bint = (min(to_a, to_b) if self.is_lone else max(to_a, to_b)) < INFINITY
         if is_new and is_known and self.fit_of[i] & _MOST_FITS < _MOST_FITS:
+            self.begin(i, False)
+
+    @cython.cfunc
+    @cython.nogil
+    def begin(self, i: cython.int, follows: cython.bint) -> cython.void:
+        """Fit an edge, anew after one whose ways do not hold, and make it a candidate if it hides anything."""
+        self.sought = i
+        self.fit(i, follows)
+        while self.refuted >= 0:
+            j: cython.int = self.refuted
+            self.refuted = _NONE
+            self.begin(j, True)
             self.sought = i
-            self.fit(i)
+            self.fit(i, follows)
+        if self.fit_of[i] & _MOST_FITS < _MOST_FITS:
             self.fit_of[i] += 1
+        if self.is_open[i, 0] or self.is_open[i, 1]:
             self.offer_around(i, self.edges[i, 0])
             self.offer_around(i, self.edges[i, 1])
 
     @cython.cfunc
     @cython.nogil
+    def open_at(self, v: cython.int) -> cython.void:
+        """Find the edges at v that hide anything from where the way to v comes from, as seen along the edge.
+
+        It hides what is below the plane through it and that place, if that is above the plane of a wall, beyond it.
+        """
+        here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
+        is_known: cython.bint = self.way[v] > -2
+        if is_known and self.first_at_end[v] < self.first_at_end[v + 1]:
+            self.look_back(self.way[v], v, here)
+        for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
+            i: cython.int = self.at_end[k]
+            edge: cython.pointer[_Edge] = cython.address(self.edge[i])
+            out: cython.double = 0.0
+            side: cython.double = 0.0
+            for c in range(3 if is_known else 0):
+                off: cython.double = self.line.goal[c] - here[c]
+                out += off * edge.outward[c]
+                side += off * edge.across[c]
+            above: cython.double = out + edge.wall * sqrt(out * out + side * side)
+            self.is_open[i, self.edges[i, 1] == v] = above > -_LEVEL * edge.length
+
+    @cython.cfunc
+    @cython.nogil
     def begin_at(self, v: cython.int) -> cython.void:
         """Begin around the edges that end at v, in the order of the other ends: ways lead from edge to edge."""
+        self.open_at(v)
         last: cython.double = -1.0
         while last < INFINITY:
             nearest: cython.double = INFINITY
@@ -526,12 +625,20 @@ class _Bends(Ray):
                 break
             self.offers[k].value = INFINITY
             self.look_back(i, v, cython.address(self.body.positions[v, 0]))
+            share: cython.double = self.share
             if self.follows(line, v):
+                if not self.holds(i):
+                    self.begin(i, True)
+                    self.offer(i, v, 0.0)
+                    k = self.shortest(v)
+                    if is_found:
+                        continue
+                    return
                 is_found = True
                 self.d[v], self.way[v] = value, i
                 # A way may bend at an end that is not reached yet, equally short to rounding.
-                end: cython.int = self.edges[i, self.share >= 0.5]
-                self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, self.share < 0.5]]
+                end: cython.int = self.edges[i, share >= 0.5]
+                self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, share < 0.5]]
                 self.offer_at(self.edges[i, 0], v, 0.0)
                 self.offer_at(self.edges[i, 1], v, 0.0)
             else:
