@@ -66,7 +66,7 @@ def test_a_split_model_is_measured_as_one(torn):
     assert path.length == pytest.approx(truth, rel=1e-12)
 
 
-def test_copies_are_neighbours_and_are_smoothed_cut_and_stored(torn, tmp_path):
+def test_copies_are_neighbours_on_edges_and_are_smoothed_cut_and_stored(torn, tmp_path):
     whole, joined, was = torn
     everyone = heat_igl.GeodesicSolver(whole).distances(was)[:, was]
     indices, distances = heat_igl.nearest_vertices(joined, 9)
@@ -82,6 +82,9 @@ def test_copies_are_neighbours_and_are_smoothed_cut_and_stored(torn, tmp_path):
     pieces = heat_igl.cut(joined, heat_igl.isolines(joined, joined.V[:, 2], [0.05])).mesh
     distance = heat_igl.geodesic_distance(pieces, len(was) - 1)[: len(was)]
     np.testing.assert_allclose(distance, everyone[-1], atol=1e-12)
+
+    edge = [int(np.flatnonzero(was == vertex)[-1]) for vertex in whole.edges[0]]
+    assert heat_igl.edge_curve(joined, edge).length == pytest.approx(np.linalg.norm(np.diff(whole.V[whole.edges[0]].T)))
 
     pytest.importorskip("zarr")
     heat_igl.write_distances_within(tmp_path / "near.zarr", joined, 0.8)

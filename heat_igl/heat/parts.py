@@ -123,7 +123,7 @@ class HeatSolution:
     distance : (n,) float64
         As `HeatMethodSolver.distance` returns it.
     t : float
-        Time step.
+        Time step; of several, see `HeatMethodSolver.time_steps`, that of the largest component.
     diagnostics : Diagnostics
         The solver's.
 

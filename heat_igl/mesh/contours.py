@@ -168,9 +168,12 @@ def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> 
     path = np.atleast_1d(as_array("vertices", vertices, SourceError))
     if path.ndim != 1 or path.dtype.kind not in "iu" or len(path) < 2:
         raise SourceError(f"vertices must be two vertex indices or more, not {path.dtype} of shape {path.shape}")
-    path = np.append(path, path[0]) if closed else path
+    named = np.append(path, path[0]) if closed else path
     edges, n = mesh.facets.vertices, mesh.n_vertices
-    pairs = np.sort(np.stack([path[:-1], path[1:]], axis=1).astype(np.int64), axis=1)
+    path = named.astype(np.int64)
+    known = (path >= 0) & (path < n)
+    path[known] = mesh.originals[path[known]]
+    pairs = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
     # Rows of `edges` are in lexicographic order.
     at = np.searchsorted(edges[:, 0] * n + edges[:, 1], pairs[:, 0] * n + pairs[:, 1])
     at = np.minimum(at, len(edges) - 1)
@@ -178,7 +181,7 @@ def edge_curve(mesh: MeshLike, vertices: ArrayLike, *, closed: bool = False) -> 
     if missing.any():
         first = int(np.flatnonzero(missing)[0])
         raise SourceError(
-            f"vertices[{first}] = {path[first]} and the next, {path[first + 1]}, are not joined by an edge: "
+            f"vertices[{first}] = {named[first]} and the next, {named[first + 1]}, are not joined by an edge: "
             "name neighbours, or project the polyline with curve_on"
         )
     face_of = np.empty(len(edges), np.int64)
