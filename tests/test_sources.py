@@ -298,6 +298,16 @@ def test_a_vertex_beside_a_point(method):
     np.testing.assert_allclose(distance[near], truth[near], rtol=0.06 if method == "sweep" else 1e-9)
 
 
+def test_a_curve_with_an_offset_where_heat_adds_vertices():
+    """The distance near curves is that of the vertices of the mesh, which are the first of those of the operators."""
+    mesh = perturbed(shapes.torus(12, 9), 0.1)
+    solver = HeatMethodSolver(mesh)
+    assert solver.operators.n > mesh.n_vertices
+    sources = OffsetSources([SurfaceCurve([3], [[1, 0, 0]], [[0, 0.5, 0.5]]), 5], [0.1, 0.2])
+    truth = geodesic_distance(mesh, sources)
+    assert mean_error(solver.distance(sources), truth) < 0.03
+
+
 @pytest.mark.parametrize("slope", [0.0, 0.5])
 def test_every_vertex_of_a_side_with_an_offset(method, slope):
     """Sources next to one another, each a little later than the one before, do not overtake one another."""

@@ -166,8 +166,10 @@ class Query:
         return cutoff if self.begin is None else cutoff - float(self.begin[np.isfinite(self.begin)].min())
 
     def with_begin(self, distance: FloatArray) -> FloatArray:
-        """Distances (n,) from the sources with their given offsets."""
-        return distance if self.begin is None else distance + np.where(np.isfinite(distance), self.begin, 0.0)
+        """Distances (n,), or (k,) of the first vertices, from the sources with their given offsets."""
+        if self.begin is None:
+            return distance
+        return distance + np.where(np.isfinite(distance), self.begin[: len(distance)], 0.0)
 
 
 class TriangleEngine(Engine):
