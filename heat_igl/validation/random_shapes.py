@@ -14,27 +14,8 @@ import numpy as np
 
 from heat_igl.mesh import Mesh
 from heat_igl.typing import BoolArray, FloatArray, IntArray
-from heat_igl.validation.construction import (
-    Generator,
-    boxes,
-    caps,
-    compact,
-    corridors,
-    delaunay,
-    extruded,
-    holed_plate,
-    hull,
-    joined,
-    merged,
-    opened,
-    planar,
-    raised,
-    revolved,
-    ring,
-    tube,
-    walk,
-    walls,
-)
+from heat_igl.validation import construction as build
+from heat_igl.validation.construction import Generator
 from heat_igl.validation.shapes import grid, icosphere, lattice_mesh
 
 __all__ = ["FAMILIES"]
@@ -67,7 +48,7 @@ def _bounded(outline: FloatArray, points: FloatArray) -> BoolArray:
 def _filled(outline: FloatArray, inner: FloatArray) -> tuple[FloatArray, IntArray]:
     """The corners (e, 2) of a polygon with the points that are inside, and the Delaunay triangles inside."""
     points = np.concatenate([outline, inner[_bounded(outline, inner)]])
-    F = delaunay(points)
+    F = build.delaunay(points)
     return points, F[_bounded(outline, points[F].mean(axis=1))]
 
 
@@ -77,7 +58,7 @@ def _tetrahedra_surface(points: FloatArray, T: IntArray) -> Mesh:
     edges = points[T[:, 1:]] - points[T[:, :1]]
     T = np.where((np.linalg.det(edges) < 0)[:, None], T[:, [0, 2, 1, 3]], T)
     F = np.asarray(igl.boundary_facets(np.ascontiguousarray(T, np.int64))[0], np.int64)
-    return compact(points, F)
+    return build.compact(points, F)
 
 
 def _holed_rectangle(rng: Generator, around: int, n_inside: int) -> tuple[FloatArray, IntArray]:
@@ -90,7 +71,7 @@ def _holed_rectangle(rng: Generator, around: int, n_inside: int) -> tuple[FloatA
             holes.append((x, y, r))
     inside = rng.uniform([0.2, 0.2], [9.8, 5.8], (n_inside, 2))
     corners = [[0, 0], [10, 0], [10, 6], [0, 6]]
-    return holed_plate(np.array(holes)[:, :2], np.array(holes)[:, 2], ring(around), corners, inside, 0.05)
+    return build.holed_plate(np.array(holes)[:, :2], np.array(holes)[:, 2], build.ring(around), corners, inside, 0.05)
 
 
 def _band(middle: FloatArray, across: FloatArray, rows: int) -> Mesh:
@@ -103,7 +84,7 @@ def _band(middle: FloatArray, across: FloatArray, rows: int) -> Mesh:
 def tetrahedra_surface(rng: Generator) -> Mesh:
     """The boundary of the Delaunay tetrahedra between random points: of a half of them that hang together."""
     points = rng.random((int(rng.integers(100, 700)), 3))
-    T = delaunay(points)
+    T = build.delaunay(points)
     middle = points[T].mean(axis=1)
     return _tetrahedra_surface(points, T[np.linalg.norm(middle - 0.5, axis=1) < rng.uniform(0.3, 0.6)])
 
@@ -114,7 +95,7 @@ def alpha_shape(rng: Generator) -> Mesh:
     n = int(rng.integers(200, 700))
     points = rng.standard_normal((n, 3)) * [1, 1, 0.3]
     points[:, 2] += 0.5 * points[:, 0] ** 2
-    T = delaunay(points)
+    T = build.delaunay(points)
     edges = points[T[:, 1:]] - points[T[:, :1]]
     centre = np.linalg.solve(edges, 0.5 * (edges**2).sum(axis=2)[:, :, None])[:, :, 0]
     radius = np.linalg.norm(centre, axis=1)
@@ -126,12 +107,12 @@ def star_polygon(rng: Generator) -> Mesh:
     """A flat star with long thin points, its outline alone or with some vertices inside."""
     tips = int(rng.integers(5, 60))
     radius = np.where(np.arange(2 * tips) % 2 == 0, 1.0, rng.uniform(0.1, 0.6)) * rng.uniform(0.8, 1.2, 2 * tips)
-    outline = radius[:, None] * ring(2 * tips)
+    outline = radius[:, None] * build.ring(2 * tips)
     parts = int(rng.integers(1, 8))
     s = np.arange(parts)[None, :, None] / parts
     rim = (outline[:, None] * (1 - s) + np.roll(outline, -1, axis=0)[:, None] * s).reshape(-1, 2)
     points, F = _filled(rim, rng.uniform(-0.3, 0.3, (int(rng.integers(0, 200)), 2)))
-    return compact(raised(points), F)
+    return build.compact(build.raised(points), F)
 
 
 @family("helix")
@@ -140,7 +121,7 @@ def helix(rng: Generator) -> Mesh:
     turns, n = rng.uniform(2, 8), int(rng.integers(60, 400))
     t = np.linspace(0, 2 * np.pi * turns, n)
     centre = np.stack([np.cos(t), np.sin(t), rng.uniform(0.05, 0.4) * t], axis=1)
-    return tube(centre, np.gradient(centre, axis=0), rng.uniform(0.05, 0.25), int(rng.integers(3, 10)))
+    return build.tube(centre, np.gradient(centre, axis=0), rng.uniform(0.05, 0.25), int(rng.integers(3, 10)))
 
 
 @family("spiral ramp")
@@ -157,21 +138,21 @@ def spiral_ramp(rng: Generator) -> Mesh:
 def maze(rng: Generator) -> Mesh:
     """The corridors of a random tree on cells, each corridor one cell wide, walls one cell wide."""
     size, fine = int(rng.integers(4, 9)), int(rng.integers(1, 4))
-    return opened(np.kron(corridors(rng, size), np.ones((fine, fine), bool)))
+    return build.opened(np.kron(build.corridors(rng, size), np.ones((fine, fine), bool)))
 
 
 @family("CAD plate")
 def cad_plate(rng: Generator) -> Mesh:
     """A flat plate with round holes, vertices on the rims and few elsewhere."""
     points, F = _holed_rectangle(rng, int(rng.integers(12, 96)), int(rng.integers(0, 60)))
-    return compact(raised(points), F)
+    return build.compact(build.raised(points), F)
 
 
 @family("thin plate")
 def thin_plate(rng: Generator) -> Mesh:
     """The same as a body: two sheets a small thickness apart, joined along the rims."""
     points, F = _holed_rectangle(rng, int(rng.integers(8, 40)), int(rng.integers(0, 60)))
-    return extruded(points, F, 10 ** rng.uniform(-2.5, -0.3))
+    return build.extruded(points, F, 10 ** rng.uniform(-2.5, -0.3))
 
 
 @family("CAD cylinder")
@@ -179,10 +160,10 @@ def cad_cylinder(rng: Generator) -> Mesh:
     """Few rings of many sides, capped by fans around one of their own vertices or left open."""
     around, rings = int(rng.integers(24, 600)), int(rng.integers(2, 5))
     height = np.sort(rng.random(rings)) * rng.uniform(0.2, 8)
-    side = revolved(np.ones(rings), height, around)
+    side = build.revolved(np.ones(rings), height, around)
     if rng.random() < 0.4:
-        return merged(side)
-    return Mesh(side.V, np.concatenate([side.F, caps(rings, around)]))
+        return build.merged(side)
+    return Mesh(side.V, np.concatenate([side.F, build.caps(rings, around)]))
 
 
 @family("shell")
@@ -192,10 +173,10 @@ def shell(rng: Generator) -> Mesh:
     k = np.arange(n) + 0.5
     points = np.sqrt(k / n)[:, None] * np.stack([np.cos(2.39996 * k), np.sin(2.39996 * k)], axis=1)
     points += rng.uniform(0, 0.3) / np.sqrt(n) * rng.standard_normal((n, 2))
-    F, bend = delaunay(points), rng.uniform(0.3, 1.0)
+    F, bend = build.delaunay(points), rng.uniform(0.3, 1.0)
     height = np.sqrt(np.maximum(1.5 - bend * (points**2).sum(axis=1), 0.01))
-    V = np.concatenate([raised(points, height), raised(points * (1 - thickness), height * (1 - thickness))])
-    return compact(V, np.concatenate([F, F[:, ::-1] + n, walls(F, n)]))
+    V = np.concatenate([build.raised(points, height), build.raised(points * (1 - thickness), height * (1 - thickness))])
+    return build.compact(V, np.concatenate([F, F[:, ::-1] + n, build.walls(F, n)]))
 
 
 @family("carved voxels")
@@ -206,7 +187,7 @@ def carved_voxels(rng: Generator) -> Mesh:
         low, size = rng.integers(0, where.shape), rng.integers(1, 5, 3)
         cell = np.indices(where.shape).T - low
         where[((cell >= 0) & (cell < size)).all(axis=-1).T] = False
-    return boxes(np.argwhere(where) if where.any() else np.zeros((1, 3), np.int64), rng.uniform(0.3, 1.0, 3))
+    return build.boxes(np.argwhere(where) if where.any() else np.zeros((1, 3), np.int64), rng.uniform(0.3, 1.0, 3))
 
 
 @family("nested circles")
@@ -214,7 +195,7 @@ def nested_circles(rng: Generator) -> Mesh:
     """The Delaunay triangles of circles inside one another, with as many vertices on each, and holes or none."""
     n, around = int(rng.integers(2, 9)), int(rng.integers(16, 160))
     radius = np.sort(rng.uniform(0.1, 1, n))
-    return planar(np.concatenate([r * ring(around) + 0.05 * r * rng.uniform(-1, 1, 2) for r in radius]))
+    return build.planar(np.concatenate([r * build.ring(around) + 0.05 * r * rng.uniform(-1, 1, 2) for r in radius]))
 
 
 @family("spiky sphere")
@@ -244,7 +225,7 @@ def tube_of_few_sides(rng: Generator) -> Mesh:
     t = np.linspace(0, rng.uniform(5, 40), n)
     a = rng.uniform(0.1, 0.8, 4)
     centre = np.stack([t, np.sin(a[0] * t) / a[0], a[1] * np.cos(a[2] * t)], axis=1)
-    return tube(centre, np.gradient(centre, axis=0), 0.2 + 0.3 * a[3], int(rng.integers(3, 9)))
+    return build.tube(centre, np.gradient(centre, axis=0), 0.2 + 0.3 * a[3], int(rng.integers(3, 9)))
 
 
 @family("vase")
@@ -256,7 +237,7 @@ def vase(rng: Generator) -> Mesh:
     radius = np.maximum(profile, 0.08)
     if rng.random() < 0.5:
         radius[0] = 0.0
-    return merged(revolved(radius, z, around))
+    return build.merged(build.revolved(radius, z, around))
 
 
 @family("terrain")
@@ -267,14 +248,14 @@ def terrain(rng: Generator) -> Mesh:
     height = np.real(np.fft.ifft2(spectrum * np.fft.fft2(rng.standard_normal((n, n)))))
     height *= 10 ** rng.uniform(-1.5, 0) / (height.std() + 1e-12)
     mesh = grid(n - 1)
-    return Mesh(mesh.V + raised(np.zeros((n * n, 2)), height.ravel()), mesh.F)
+    return Mesh(mesh.V + build.raised(np.zeros((n * n, 2)), height.ravel()), mesh.F)
 
 
 @family("handles")
 def handles(rng: Generator) -> Mesh:
     """The boundary of a random walk through cells, thickened here and there: a surface with many handles."""
-    nodes = 2 * walk(rng, int(rng.integers(10, 60)))
-    return boxes(np.concatenate([nodes, (nodes[1:] + nodes[:-1]) // 2]))
+    nodes = 2 * build.walk(rng, int(rng.integers(10, 60)))
+    return build.boxes(np.concatenate([nodes, (nodes[1:] + nodes[:-1]) // 2]))
 
 
 @family("hull")
@@ -283,7 +264,7 @@ def flat_hull(rng: Generator) -> Mesh:
     points = rng.standard_normal((int(rng.integers(20, 800)), 3))
     if rng.random() < 0.7:
         points /= np.linalg.norm(points, axis=1, keepdims=True)
-    return hull(points * 10 ** rng.uniform(-1, 0, 3))
+    return build.hull(points * 10 ** rng.uniform(-1, 0, 3))
 
 
 @family("clusters")
@@ -293,7 +274,7 @@ def clusters(rng: Generator) -> Mesh:
     for _ in range(int(rng.integers(1, 6))):
         parts.append(rng.random(2) + 10 ** rng.uniform(-4, -1) * rng.standard_normal((int(rng.integers(30, 200)), 2)))
     points = np.concatenate(parts)
-    return compact(raised(points), delaunay(points))
+    return build.compact(build.raised(points), build.delaunay(points))
 
 
 @family("stretched noise")
@@ -309,7 +290,7 @@ def extrusion(rng: Generator) -> Mesh:
     """A random polygon with a height and nothing but its outline on the two lids, a gear for instance."""
     n = int(rng.integers(12, 200))
     radius = 1 + rng.uniform(0.05, 0.5) * np.sign(np.sin(rng.integers(2, 20) * 2 * np.pi * (np.arange(n) + 0.3) / n))
-    return extruded(*_filled(radius[:, None] * ring(n), np.empty((0, 2))), rng.uniform(0.02, 3))
+    return build.extruded(*_filled(radius[:, None] * build.ring(n), np.empty((0, 2))), rng.uniform(0.02, 3))
 
 
 @family("comb")
@@ -318,7 +299,7 @@ def comb(rng: Generator) -> Mesh:
     teeth = int(rng.integers(3, 30))
     cells = [(i, 0, 0) for i in range(2 * teeth - 1)]
     cells += [(2 * i, j, 0) for i in range(teeth) for j in range(1, 2 + int(rng.integers(0, 12)))]
-    return boxes(np.array(cells), rng.uniform(0.1, 1.0, 3))
+    return build.boxes(np.array(cells), rng.uniform(0.1, 1.0, 3))
 
 
 @family("folds")
@@ -334,7 +315,7 @@ def folds(rng: Generator) -> Mesh:
 def several_spheres(rng: Generator) -> Mesh:
     """Spheres of different size and fineness beside one another: several components."""
     parts = [icosphere(int(rng.integers(1, 4))) for _ in range(int(rng.integers(2, 5)))]
-    return joined(*(Mesh(part.V * 10 ** rng.uniform(-2, 1) + 30.0 * i, part.F) for i, part in enumerate(parts)))
+    return build.joined(*(Mesh(part.V * 10 ** rng.uniform(-2, 1) + 30.0 * i, part.F) for i, part in enumerate(parts)))
 
 
 # Nearly flat random shapes, on which shortest paths pass many vertices whose angles sum to 2 pi up to the rounding of

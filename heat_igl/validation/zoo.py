@@ -16,25 +16,7 @@ import numpy as np
 
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
-from heat_igl.validation.construction import (
-    boxes,
-    caps,
-    compact,
-    corridors,
-    delaunay,
-    extruded,
-    holed_plate,
-    hull,
-    joined,
-    merged,
-    opened,
-    planar,
-    raised,
-    revolved,
-    ring,
-    tube,
-    walk,
-)
+from heat_igl.validation import construction as build
 from heat_igl.validation.random_shapes import FAMILIES
 from heat_igl.validation.shapes import (
     book,
@@ -97,11 +79,11 @@ def _noisy(mesh: Mesh, amount: float, seed: int) -> Mesh:
 
 
 def _heights(mesh: Mesh, height: AnyArray) -> Mesh:
-    return Mesh(raised(mesh.V[:, :2], height), mesh.F)
+    return Mesh(build.raised(mesh.V[:, :2], height), mesh.F)
 
 
 def _scattered(n: int, seed: int) -> Mesh:
-    return planar(seeded(seed).random((n, 2)))
+    return build.planar(seeded(seed).random((n, 2)))
 
 
 def _on_sphere(n: int, seed: int) -> FloatArray:
@@ -116,12 +98,12 @@ def _bumps(V: FloatArray) -> FloatArray:
 def _capped(around: int) -> Mesh:
     """Two rings, each capped by a fan around one of its own vertices."""
     side = cylinder(around, 1, 4.0)
-    return Mesh(side.V, np.concatenate([side.F, caps(2, around)]))
+    return Mesh(side.V, np.concatenate([side.F, build.caps(2, around)]))
 
 
 def _spheres(ratio: float) -> Mesh:
     one = icosphere(3)
-    return joined(one, Mesh(one.V * ratio + [2 * ratio + 2, 0, 0], one.F))
+    return build.joined(one, Mesh(one.V * ratio + [2 * ratio + 2, 0, 0], one.F))
 
 
 def _shear(by: float) -> FloatArray:
@@ -130,7 +112,7 @@ def _shear(by: float) -> FloatArray:
 
 def _cells(n: int, where: Callable[[IntArray], Any]) -> Mesh:
     """Of n^3 cells those that a function of their indices (3, n, n, n) chooses."""
-    return boxes(np.argwhere(where(np.indices((n, n, n)))))
+    return build.boxes(np.argwhere(where(np.indices((n, n, n)))))
 
 
 _EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
@@ -151,8 +133,8 @@ _EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
     "CAD": {
         "capped cylinder 128": lambda: _capped(64),
         "capped cylinder 512": lambda: _capped(256),
-        "box cube": lambda: boxes(np.zeros((1, 3), int)),
-        "box long": lambda: boxes(np.zeros((1, 3), int), np.array([1.0, 1.0, 30.0])),
+        "box cube": lambda: build.boxes(np.zeros((1, 3), int)),
+        "box long": lambda: build.boxes(np.zeros((1, 3), int), np.array([1.0, 1.0, 30.0])),
     },
     "scattered": {
         "scattered square 1000": lambda: _scattered(1000, 3),
@@ -169,12 +151,12 @@ _EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
         "cliff": lambda: _heights(grid(40), 2.0 * (grid(40).V[:, 0] > 0.5)),
     },
     "hull": {
-        "hull of 12": lambda: hull(_on_sphere(12, 12)),
-        "hull of 35": lambda: hull(_on_sphere(35, 13)),
-        "hull of 100": lambda: hull(_on_sphere(100, 14)),
-        "hull of 400": lambda: hull(_on_sphere(400, 15)),
-        "flat hull *": lambda: hull(_on_sphere(150, 16) * [1, 1, 0.03]),
-        "hull of a cloud *": lambda: hull(seeded(17).standard_normal((300, 3))),
+        "hull of 12": lambda: build.hull(_on_sphere(12, 12)),
+        "hull of 35": lambda: build.hull(_on_sphere(35, 13)),
+        "hull of 100": lambda: build.hull(_on_sphere(100, 14)),
+        "hull of 400": lambda: build.hull(_on_sphere(400, 15)),
+        "flat hull *": lambda: build.hull(_on_sphere(150, 16) * [1, 1, 0.03]),
+        "hull of a cloud *": lambda: build.hull(seeded(17).standard_normal((300, 3))),
     },
     "voxels": {
         "cube less one": lambda: _cells(2, lambda i: (i < 1).any(axis=0)),
@@ -198,7 +180,7 @@ _EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
         "tetrahedron": lambda: Mesh(
             [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
         ),
-        "octahedron *": lambda: hull(np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3]),
+        "octahedron *": lambda: build.hull(np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3]),
     },
 }
 SHAPES += [
@@ -216,7 +198,7 @@ def _latitudes() -> Mesh:
     """A sphere by meridians and parallels, with fans of thin triangles at the poles."""
     theta, phi = np.meshgrid(np.linspace(0, np.pi, 31), np.linspace(0, 2 * np.pi, 61)[:-1], indexing="ij")
     x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
-    return merged(lattice_mesh(x, y, np.cos(theta), wrap_columns=True))
+    return build.merged(lattice_mesh(x, y, np.cos(theta), wrap_columns=True))
 
 
 # Surfaces without an orientation, or with edges of many faces.
@@ -226,7 +208,7 @@ def _latitudes() -> Mesh:
 def _moebius_band() -> Mesh:
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 121), np.linspace(-0.4, 0.4, 9), indexing="ij")
     r = 1 + v * np.cos(u / 2)
-    return merged(lattice_mesh(r * np.cos(u), r * np.sin(u), v * np.sin(u / 2)))
+    return build.merged(lattice_mesh(r * np.cos(u), r * np.sin(u), v * np.sin(u / 2)))
 
 
 @shape("topology", held_out=True)
@@ -248,7 +230,7 @@ def _klein_bottle() -> Mesh:
 def _pinched() -> Mesh:
     """Two cones that meet in their tips."""
     one = cone(24, 8)
-    return merged(joined(one, Mesh(one.V * [1, 1, -1], one.F[:, ::-1])))
+    return build.merged(build.joined(one, Mesh(one.V * [1, 1, -1], one.F[:, ::-1])))
 
 
 # Parts as they leave a CAD program: few vertices, long triangles, fans.
@@ -259,15 +241,15 @@ def _pill() -> Mesh:
     """Long triangles along the side of a cylinder between two finely meshed caps of a sphere."""
     theta = np.concatenate([np.linspace(0, np.pi / 2, 13), np.linspace(np.pi / 2, np.pi, 13)])
     shift = np.where(np.arange(26) < 13, 6.0, 0.0)
-    return merged(revolved(np.sin(theta), np.cos(theta) + shift, 48))
+    return build.merged(build.revolved(np.sin(theta), np.cos(theta) + shift, 48))
 
 
 def _plate_with_holes(holes: FloatArray, around: int, seed: int) -> Mesh:
     """The rectangle 10 by 6 with round holes (k, 3): centres and radii; vertices on the rims and few elsewhere."""
     corners = np.array([[0, 0], [10, 0], [10, 6], [0, 6], [5, 0], [5, 6.0]])
     inside = seeded(seed).uniform([0.3, 0.3], [9.7, 5.7], (30, 2))
-    points, F = holed_plate(holes[:, :2], holes[:, 2], ring(around, 0.5), corners, inside, 0.2)
-    return compact(raised(points), F)
+    points, F = build.holed_plate(holes[:, :2], holes[:, 2], build.ring(around, 0.5), corners, inside, 0.2)
+    return build.compact(build.raised(points), F)
 
 
 @shape("CAD")
@@ -285,7 +267,7 @@ def _slotted_plate() -> Mesh:
 @shape("CAD")
 def _needle_fan() -> Mesh:
     """A disk of 300 needles around its centre."""
-    V = np.concatenate([np.zeros((1, 3)), raised(ring(300))])
+    V = np.concatenate([np.zeros((1, 3)), build.raised(build.ring(300))])
     k = np.arange(300)
     return Mesh(V, np.stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % 300], axis=1))
 
@@ -295,12 +277,12 @@ def _gear() -> Mesh:
     """A toothed wheel of 24 teeth with a bore, extruded; its faces are Delaunay triangles between bore and teeth."""
     angle = 2 * np.pi * np.arange(96) / 96
     radius = np.where((np.arange(96) // 2) % 2 == 0, 3.0, 2.6)
-    rim = np.concatenate([radius[:, None] * ring(96), ring(48)])
-    F = delaunay(rim)
+    rim = np.concatenate([radius[:, None] * build.ring(96), build.ring(48)])
+    F = build.delaunay(rim)
     middle = rim[F].mean(axis=1)
     r, at = np.linalg.norm(middle, axis=1), np.arctan2(middle[:, 1], middle[:, 0]) % (2 * np.pi)
     F = F[(r > 0.998) & (r < np.interp(at, np.append(angle, 2 * np.pi), np.append(radius, radius[0])))]
-    return extruded(rim, F, 1.0)
+    return build.extruded(rim, F, 1.0)
 
 
 @shape("CAD")
@@ -314,7 +296,7 @@ def _stairs() -> Mesh:
 def _wide_funnel() -> Mesh:
     """A cone whose rings come closer and closer to the tip, with 24 vertices each."""
     radius: FloatArray = 0.6 ** np.arange(20.0)
-    return revolved(radius, 2 * radius, 24)
+    return build.revolved(radius, 2 * radius, 24)
 
 
 # Scattered points.
@@ -323,7 +305,7 @@ def _wide_funnel() -> Mesh:
 @shape("scattered", held_out=True)
 def _scattered_disk() -> Mesh:
     r, angle = seeded(5).random((2, 1500))
-    return planar(np.sqrt(r)[:, None] * np.stack([np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)], axis=1))
+    return build.planar(np.sqrt(r)[:, None] * np.stack([np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)], axis=1))
 
 
 @shape("scattered")
@@ -334,7 +316,7 @@ def _clusters() -> Mesh:
     points = np.concatenate(
         [rng.random((300, 2)), *(centre + 0.003 * rng.standard_normal((200, 2)) for centre in centres)]
     )
-    return planar(points)
+    return build.planar(points)
 
 
 @shape("scattered")
@@ -343,7 +325,7 @@ def _slivers_at_the_rim() -> Mesh:
     s = np.linspace(-1, 1, 41) ** 3
     rim = np.concatenate([np.column_stack([s, np.full(41, side)]) for side in (-1.0, 1.0)])
     rim = np.concatenate([rim, rim[:, ::-1]])
-    return planar(np.unique(np.concatenate([rim, seeded(7).uniform(-0.9, 0.9, (120, 2))]), axis=0))
+    return build.planar(np.unique(np.concatenate([rim, seeded(7).uniform(-0.9, 0.9, (120, 2))]), axis=0))
 
 
 @shape("scattered", held_out=True)
@@ -358,7 +340,7 @@ def _graded_square() -> Mesh:
 
 def _height_field(n: int, height: float, seed: int) -> Mesh:
     points = seeded(seed).random((n, 2))
-    return planar(points, height * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1]))
+    return build.planar(points, height * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1]))
 
 
 @shape("terrain", held_out=True)
@@ -391,7 +373,7 @@ def _sponge() -> Mesh:
     """Menger's sponge of level 2."""
     i = np.indices((9, 9, 9))
     level = [((i // step % 3) == 1).sum(axis=0) < 2 for step in (1, 3)]
-    return boxes(np.argwhere(level[0] & level[1]))
+    return build.boxes(np.argwhere(level[0] & level[1]))
 
 
 @shape("voxels", held_out=True)
@@ -400,7 +382,7 @@ def _voxel_blob() -> Mesh:
     from scipy.ndimage import gaussian_filter
 
     field = gaussian_filter(seeded(18).standard_normal((12, 12, 12)), 1.2)
-    return boxes(np.argwhere(field > np.quantile(field, 0.6)))
+    return build.boxes(np.argwhere(field > np.quantile(field, 0.6)))
 
 
 # Mazes and walls.
@@ -410,7 +392,7 @@ def _voxel_blob() -> Mesh:
 def _maze() -> Mesh:
     """A square with walls one cell wide from alternate sides."""
     column, row = np.indices((45, 45))
-    return opened((column % 5 != 4) | np.where(column // 5 % 2 == 0, row >= 41, row < 4))
+    return build.opened((column % 5 != 4) | np.where(column // 5 % 2 == 0, row >= 41, row < 4))
 
 
 @shape("maze")
@@ -425,10 +407,10 @@ def _spiral() -> Mesh:
 def _labyrinth() -> Mesh:
     """A random spanning tree of rooms, carved out of a grid of cells."""
     rng, n = seeded(19), 12
-    fine = np.kron(np.pad(corridors(rng, n), 1), np.ones((2, 2), bool))
+    fine = np.kron(np.pad(build.corridors(rng, n), 1), np.ones((2, 2), bool))
     side = len(fine)
     mesh = strip(side, side)
-    return compact(mesh.V, mesh.F[np.concatenate([fine.ravel(), fine.ravel()])])
+    return build.compact(mesh.V, mesh.F[np.concatenate([fine.ravel(), fine.ravel()])])
 
 
 # Rough and thin surfaces.
@@ -465,7 +447,7 @@ def _sphere_with_slivers() -> Mesh:
 def _dense_pole() -> Mesh:
     """A sphere whose triangles shrink to a thousandth towards a pole."""
     t = np.concatenate([np.linspace(0, 1, 60) ** 4 * np.pi / 2, np.linspace(np.pi / 2, np.pi, 20)[1:-1]])
-    return merged(revolved(np.sin(t), np.cos(t), 40))
+    return build.merged(build.revolved(np.sin(t), np.cos(t), 40))
 
 
 # Several components.
@@ -474,7 +456,7 @@ def _dense_pole() -> Mesh:
 @shape("components", held_out=True)
 def _part_and_plate() -> Mesh:
     """A small torus beside a square of two triangles, a thousand times larger."""
-    return joined(
+    return build.joined(
         torus(16, 32), Mesh(np.array([[0, 0, -1], [1e3, 0, -1], [1e3, 1e3, -1], [0, 1e3, -1]]), [[0, 1, 2], [0, 2, 3]])
     )
 
@@ -484,10 +466,10 @@ def _dust() -> Mesh:
     """Twenty hulls of 60 points beside one another, from 1 to a thousandth in size."""
     parts, at = [], 0.0
     for k, size in enumerate(np.logspace(0, -3, 20)):
-        part = hull(_on_sphere(60, 40 + k))
+        part = build.hull(_on_sphere(60, 40 + k))
         parts.append(Mesh(size * part.V + [at, 0, 0], part.F))
         at += 3 * size
-    return joined(*parts)
+    return build.joined(*parts)
 
 
 # Made after every default had been chosen, all held out.
@@ -501,7 +483,7 @@ def _gyroid() -> Mesh:
     field = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
     points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
     V, F, _ = igl.marching_cubes(field.ravel(), points, n, n, n, 0.1)
-    return merged(Mesh(V, F))
+    return build.merged(Mesh(V, F))
 
 
 @shape("smooth", held_out=True)
@@ -510,8 +492,8 @@ def _trefoil() -> Mesh:
     t = 2 * np.pi * np.arange(300) / 300
     centre = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1)
     along = np.roll(centre, -1, axis=0) - np.roll(centre, 1, axis=0)
-    V = tube(centre, along, 0.35, 8, up=(0.3, 0.2, 1.0)).V
-    return merged(Mesh(np.concatenate([V, V[:8]]), lattice_faces(301, 8, wrap_columns=True)))
+    V = build.tube(centre, along, 0.35, 8, up=(0.3, 0.2, 1.0)).V
+    return build.merged(Mesh(np.concatenate([V, V[:8]]), lattice_faces(301, 8, wrap_columns=True)))
 
 
 @shape("CAD", held_out=True)
@@ -531,9 +513,9 @@ def _elbow() -> Mesh:
 @shape("CAD", held_out=True)
 def _drum() -> Mesh:
     """The hull of two circles in tilted planes: long triangles between two polygons that are fans."""
-    flat = raised(ring(120))
+    flat = build.raised(build.ring(120))
     tilt = np.array([[np.cos(0.7), 0, np.sin(0.7)], [0, 1, 0], [-np.sin(0.7), 0, np.cos(0.7)]])
-    return hull(np.concatenate([flat * 1.5, 0.6 * flat @ tilt + [0.4, 0.1, 3.0]]))
+    return build.hull(np.concatenate([flat * 1.5, 0.6 * flat @ tilt + [0.4, 0.1, 3.0]]))
 
 
 @shape("scattered", held_out=True)
@@ -541,7 +523,7 @@ def _sunflower() -> Mesh:
     """Seeds at the golden angle, denser towards the centre by the cube of the radius."""
     k = np.arange(1200) + 0.5
     radius, angle = (k / 1200) ** 1.5, k * np.pi * (3 - np.sqrt(5))
-    return planar(radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    return build.planar(radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 @shape("terrain", held_out=True)
@@ -555,7 +537,7 @@ def _dunes() -> Mesh:
 @shape("voxels", held_out=True)
 def _wandering_cells() -> Mesh:
     """Cells that a random walk visits."""
-    return boxes(walk(seeded(32), 150))
+    return build.boxes(build.walk(seeded(32), 150))
 
 
 @shape("maze", held_out=True)
@@ -563,14 +545,14 @@ def _fern() -> Mesh:
     """A stem of cells with leaves on both sides, which are two cells wide and one cell apart."""
     column, row = np.indices((36, 36))
     is_leaf = (row % 3 < 2) & (np.abs(column - 18) < 17 - row // 3)
-    return opened(is_leaf | (np.abs(column - 17.5) < 1))
+    return build.opened(is_leaf | (np.abs(column - 17.5) < 1))
 
 
 @shape("topology", held_out=True)
 def _crossed_sheets() -> Mesh:
     """Two rectangles through one another along a common edge path, each with its own spacing."""
     s, t = np.linspace(0, 1, 25)[:, None], np.linspace(-1, 1, 21) ** 3
-    return merged(joined(lattice_mesh(s, t), lattice_mesh(s, 0.3 * t, t)))
+    return build.merged(build.joined(lattice_mesh(s, t), lattice_mesh(s, 0.3 * t, t)))
 
 
 @shape("rough", held_out=True)
