@@ -68,13 +68,16 @@ class MetricSides(SideLengths):
     def __init__(self, mesh: Mesh, metric: ArrayLike) -> None:
         self.mesh, given = mesh, np.asarray(metric, np.float64)
         self._metric = (given + np.swapaxes(given, 1, 2)) / 2
-        corners = mesh.V[mesh.F]
-        if given.shape[1] == 2:
-            corners = np.einsum("mkx,mcx->mck", plane_axes(mesh), corners - corners[:, :1])
-        # From the next corner to the one after.
-        self._along = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
-        self._own = np.sqrt((self._along @ self._metric * self._along).sum(axis=2))
+        along = self._along()
+        self._own = np.sqrt((along @ self._metric * along).sum(axis=2))
         self._n_faces = np.bincount(mesh.facets.of_face.ravel())
+
+    def _along(self) -> FloatArray:
+        """The sides (m, 3, p) as vectors in the axes of the metric, from the next corner to the one after."""
+        corners = self.mesh.V[self.mesh.F]
+        if self._metric.shape[1] == 2:
+            corners = np.einsum("mkx,mcx->mck", plane_axes(self.mesh), corners - corners[:, :1])
+        return np.asarray(np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1))
 
     @property
     def lengths(self) -> FloatArray:
@@ -89,14 +92,14 @@ class MetricSides(SideLengths):
                 "give it in space (m, 3, 3), or use by_metric and by_lengths"
             )
         is_ascending = self.mesh.F[:, [1, 2, 0]] < self.mesh.F[:, [2, 0, 1]]
-        slopes = self._along @ self._metric / np.where(is_ascending, self._own, -self._own)[..., None]
+        slopes = self._along() @ self._metric / np.where(is_ascending, self._own, -self._own)[..., None]
         of_side = self.mesh.facets.of_face.ravel()
         return np.stack([np.bincount(of_side, x) / self._n_faces for x in slopes.reshape(len(of_side), -1).T])
 
     def by_metric(self, by_side: FloatArray) -> FloatArray:
         """The derivative by the metric, in the shape in which it was given, from that by the lengths (m, 3)."""
-        own = self._mean(by_side) / (2 * self._own)
-        return np.asarray(np.einsum("mc,mci,mcj->mij", own, self._along, self._along))
+        own, along = self._mean(by_side) / (2 * self._own), self._along()
+        return np.asarray(np.einsum("mc,mci,mcj->mij", own, along, along))
 
     def by_speed(self, by_side: FloatArray) -> FloatArray:
         """The derivative (m,) by the speeds of which the metric is the inverse square."""
