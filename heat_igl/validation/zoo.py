@@ -17,19 +17,8 @@ import numpy as np
 from heat_igl.mesh import Mesh
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.validation import construction as build
+from heat_igl.validation import shapes
 from heat_igl.validation.random_shapes import FAMILIES
-from heat_igl.validation.shapes import (
-    book,
-    cone,
-    cylinder,
-    disk,
-    grid,
-    icosphere,
-    lattice_faces,
-    lattice_mesh,
-    strip,
-    torus,
-)
 
 __all__ = ["FAMILIES", "SHAPES", "Shape"]
 
@@ -97,12 +86,12 @@ def _bumps(V: FloatArray) -> FloatArray:
 
 def _capped(around: int) -> Mesh:
     """Two rings, each capped by a fan around one of its own vertices."""
-    side = cylinder(around, 1, 4.0)
+    side = shapes.cylinder(around, 1, 4.0)
     return Mesh(side.V, np.concatenate([side.F, build.caps(2, around)]))
 
 
 def _spheres(ratio: float) -> Mesh:
-    one = icosphere(3)
+    one = shapes.icosphere(3)
     return build.joined(one, Mesh(one.V * ratio + [2 * ratio + 2, 0, 0], one.F))
 
 
@@ -117,19 +106,19 @@ def _cells(n: int, where: Callable[[IntArray], Any]) -> Mesh:
 
 _EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
     "smooth": {
-        "sphere": lambda: icosphere(4),
-        "ellipsoid": lambda: _stretched(icosphere(4), [1, 1, 8]),
-        "torus": lambda: torus(30, 60),
-        "thin torus *": lambda: torus(12, 240, 0.05),
-        "bumpy sphere": lambda: _stretched(icosphere(4), _bumps(icosphere(4).V)),
+        "sphere": lambda: shapes.icosphere(4),
+        "ellipsoid": lambda: _stretched(shapes.icosphere(4), [1, 1, 8]),
+        "torus": lambda: shapes.torus(30, 60),
+        "thin torus *": lambda: shapes.torus(12, 240, 0.05),
+        "bumpy sphere": lambda: _stretched(shapes.icosphere(4), _bumps(shapes.icosphere(4).V)),
         "monkey saddle *": lambda: _heights(
-            disk(20), disk(20).V[:, 0] ** 3 - 3 * disk(20).V[:, 0] * disk(20).V[:, 1] ** 2
+            shapes.disk(20), shapes.disk(20).V[:, 0] ** 3 - 3 * shapes.disk(20).V[:, 0] * shapes.disk(20).V[:, 1] ** 2
         ),
-        "cone": lambda: cone(40, 30),
-        "regular grid": lambda: grid(40),
-        "long strip": lambda: strip(1500, 3),
+        "cone": lambda: shapes.cone(40, 30),
+        "regular grid": lambda: shapes.grid(40),
+        "long strip": lambda: shapes.strip(1500, 3),
     },
-    "topology": {"book": lambda: book(5, 12)},
+    "topology": {"book": lambda: shapes.book(5, 12)},
     "CAD": {
         "capped cylinder 128": lambda: _capped(64),
         "capped cylinder 512": lambda: _capped(256),
@@ -139,16 +128,16 @@ _EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
     "scattered": {
         "scattered square 1000": lambda: _scattered(1000, 3),
         "scattered square 100": lambda: _scattered(100, 4),
-        "sheared grid by 3": lambda: _stretched(grid(30), _shear(3.0)),
-        "sheared grid by 10": lambda: _stretched(grid(30), _shear(10.0)),
-        "stretched grid *": lambda: _stretched(grid(30), [40, 1, 1]),
+        "sheared grid by 3": lambda: _stretched(shapes.grid(30), _shear(3.0)),
+        "sheared grid by 10": lambda: _stretched(shapes.grid(30), _shear(10.0)),
+        "stretched grid *": lambda: _stretched(shapes.grid(30), [40, 1, 1]),
     },
     "terrain": {
-        "noise 10 times": lambda: _heights(grid(30), 10 / 30 * seeded(10).random(31**2)),
-        "noise 100 times": lambda: _heights(grid(30), 100 / 30 * seeded(10).random(31**2)),
+        "noise 10 times": lambda: _heights(shapes.grid(30), 10 / 30 * seeded(10).random(31**2)),
+        "noise 100 times": lambda: _heights(shapes.grid(30), 100 / 30 * seeded(10).random(31**2)),
         "height field 5000": lambda: _height_field(5000, 0.3, 8),
         "height field coarse": lambda: _height_field(47, 0.5, 9),
-        "cliff": lambda: _heights(grid(40), 2.0 * (grid(40).V[:, 0] > 0.5)),
+        "cliff": lambda: _heights(shapes.grid(40), 2.0 * (shapes.grid(40).V[:, 0] > 0.5)),
     },
     "hull": {
         "hull of 12": lambda: build.hull(_on_sphere(12, 12)),
@@ -165,9 +154,11 @@ _EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
         "voxel ball": lambda: _cells(15, lambda i: ((i - 7) ** 2).sum(axis=0) <= 42),
     },
     "rough": {
-        "spiky sphere": lambda: _stretched(icosphere(3), np.where(seeded(20).random(642) < 0.05, 3.0, 1.0)[:, None]),
-        "noisy sphere": lambda: _noisy(icosphere(4), 0.05, 21),
-        "crumpled *": lambda: _noisy(disk(18), 0.04, 22),
+        "spiky sphere": lambda: _stretched(
+            shapes.icosphere(3), np.where(seeded(20).random(642) < 0.05, 3.0, 1.0)[:, None]
+        ),
+        "noisy sphere": lambda: _noisy(shapes.icosphere(4), 0.05, 21),
+        "crumpled *": lambda: _noisy(shapes.disk(18), 0.04, 22),
         "lantern 40 by 400": lambda: _lantern(40, 400),
         "lantern 12 by 60": lambda: _lantern(12, 60),
     },
@@ -198,7 +189,7 @@ def _latitudes() -> Mesh:
     """A sphere by meridians and parallels, with fans of thin triangles at the poles."""
     theta, phi = np.meshgrid(np.linspace(0, np.pi, 31), np.linspace(0, 2 * np.pi, 61)[:-1], indexing="ij")
     x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
-    return build.merged(lattice_mesh(x, y, np.cos(theta), wrap_columns=True))
+    return build.merged(shapes.lattice_mesh(x, y, np.cos(theta), wrap_columns=True))
 
 
 # Surfaces without an orientation, or with edges of many faces.
@@ -208,7 +199,7 @@ def _latitudes() -> Mesh:
 def _moebius_band() -> Mesh:
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 121), np.linspace(-0.4, 0.4, 9), indexing="ij")
     r = 1 + v * np.cos(u / 2)
-    return build.merged(lattice_mesh(r * np.cos(u), r * np.sin(u), v * np.sin(u / 2)))
+    return build.merged(shapes.lattice_mesh(r * np.cos(u), r * np.sin(u), v * np.sin(u / 2)))
 
 
 @shape("topology", held_out=True)
@@ -217,7 +208,7 @@ def _klein_bottle() -> Mesh:
     u, v = np.meshgrid(np.arange(80) * 2 * np.pi / 80, np.arange(40) * 2 * np.pi / 40, indexing="ij")
     r = 2 + np.cos(u / 2) * np.sin(v) - np.sin(u / 2) * np.sin(2 * v)
     z = np.sin(u / 2) * np.sin(v) + np.cos(u / 2) * np.sin(2 * v)
-    tube = lattice_mesh(r * np.cos(u), r * np.sin(u), z, wrap_columns=True)
+    tube = shapes.lattice_mesh(r * np.cos(u), r * np.sin(u), z, wrap_columns=True)
     # The last row is glued to the first with v turned into -v.
     j = np.arange(40)
     last, following = 79 * 40 + j, 79 * 40 + (j + 1) % 40
@@ -229,7 +220,7 @@ def _klein_bottle() -> Mesh:
 @shape("topology")
 def _pinched() -> Mesh:
     """Two cones that meet in their tips."""
-    one = cone(24, 8)
+    one = shapes.cone(24, 8)
     return build.merged(build.joined(one, Mesh(one.V * [1, 1, -1], one.F[:, ::-1])))
 
 
@@ -289,7 +280,7 @@ def _gear() -> Mesh:
 def _stairs() -> Mesh:
     """Twelve steps of two rectangles each, every rectangle two triangles."""
     steps = np.repeat(np.arange(13), 2)
-    return lattice_mesh(steps[1:], np.array([[0.0], [5.0]]), steps[:-1] * 0.5)
+    return shapes.lattice_mesh(steps[1:], np.array([[0.0], [5.0]]), steps[:-1] * 0.5)
 
 
 @shape("CAD", held_out=True)
@@ -332,7 +323,7 @@ def _slivers_at_the_rim() -> Mesh:
 def _graded_square() -> Mesh:
     """Edges from 1 to 1 / 1000 towards a corner."""
     steps = np.linspace(0, 1, 41) ** 3
-    return lattice_mesh(steps, steps[:, None])
+    return shapes.lattice_mesh(steps, steps[:, None])
 
 
 # Height fields and terrain.
@@ -356,13 +347,15 @@ def _fractal_terrain() -> Mesh:
         new[::2, ::2] = False
         z = finer + amplitude * np.where(new, rng.standard_normal(finer.shape), 0)
         amplitude *= 0.6
-    return _heights(grid(64), z.ravel())
+    return _heights(shapes.grid(64), z.ravel())
 
 
 @shape("terrain", held_out=True)
 def _ridges() -> Mesh:
     """A folded sheet: 20 steep folds of a few triangles each."""
-    return lattice_mesh(np.linspace(0, 1, 41)[:, None], np.linspace(0, 1, 11), 0.2 * (np.arange(41)[:, None] % 2))
+    return shapes.lattice_mesh(
+        np.linspace(0, 1, 41)[:, None], np.linspace(0, 1, 11), 0.2 * (np.arange(41)[:, None] % 2)
+    )
 
 
 # Voxels and fractals.
@@ -400,7 +393,7 @@ def _spiral() -> Mesh:
     """A corridor that winds in, four turns."""
     turn = np.linspace(0, 8 * np.pi, 400)
     radius = 1 + turn / 3 + np.array([[0.0], [0.6], [1.2]])
-    return lattice_mesh(radius * np.cos(turn), radius * np.sin(turn))
+    return shapes.lattice_mesh(radius * np.cos(turn), radius * np.sin(turn))
 
 
 @shape("maze")
@@ -409,7 +402,7 @@ def _labyrinth() -> Mesh:
     rng, n = seeded(19), 12
     fine = np.kron(np.pad(build.corridors(rng, n), 1), np.ones((2, 2), bool))
     side = len(fine)
-    mesh = strip(side, side)
+    mesh = shapes.strip(side, side)
     return build.compact(mesh.V, mesh.F[np.concatenate([fine.ravel(), fine.ravel()])])
 
 
@@ -432,7 +425,7 @@ def _lantern(around: int, along: int) -> Mesh:
 @shape("rough")
 def _sphere_with_slivers() -> Mesh:
     """A tenth of the faces split close to the middle of a side."""
-    mesh = icosphere(3)
+    mesh = shapes.icosphere(3)
     rng = seeded(23)
     chosen = rng.choice(mesh.n_faces, mesh.n_faces // 10, replace=False)
     weights = np.array([0.499, 0.499, 0.002])
@@ -457,7 +450,8 @@ def _dense_pole() -> Mesh:
 def _part_and_plate() -> Mesh:
     """A small torus beside a square of two triangles, a thousand times larger."""
     return build.joined(
-        torus(16, 32), Mesh(np.array([[0, 0, -1], [1e3, 0, -1], [1e3, 1e3, -1], [0, 1e3, -1]]), [[0, 1, 2], [0, 2, 3]])
+        shapes.torus(16, 32),
+        Mesh(np.array([[0, 0, -1], [1e3, 0, -1], [1e3, 1e3, -1], [0, 1e3, -1]]), [[0, 1, 2], [0, 2, 3]]),
     )
 
 
@@ -493,7 +487,7 @@ def _trefoil() -> Mesh:
     centre = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1)
     along = np.roll(centre, -1, axis=0) - np.roll(centre, 1, axis=0)
     V = build.tube(centre, along, 0.35, 8, up=(0.3, 0.2, 1.0)).V
-    return build.merged(Mesh(np.concatenate([V, V[:8]]), lattice_faces(301, 8, wrap_columns=True)))
+    return build.merged(Mesh(np.concatenate([V, V[:8]]), shapes.lattice_faces(301, 8, wrap_columns=True)))
 
 
 @shape("CAD", held_out=True)
@@ -507,7 +501,7 @@ def _elbow() -> Mesh:
     outward = np.stack([-np.sin(slope), np.cos(slope), np.zeros(26)], axis=1)
     rings = np.stack([x, y, np.zeros(26)], axis=1)[:, None] + outward[:, None] * np.cos(angle)[:, None]
     rings += np.array([0, 0, 1.0]) * np.sin(angle)[:, None]
-    return lattice_mesh(*np.moveaxis(rings, 2, 0), wrap_columns=True)
+    return shapes.lattice_mesh(*np.moveaxis(rings, 2, 0), wrap_columns=True)
 
 
 @shape("CAD", held_out=True)
@@ -529,7 +523,7 @@ def _sunflower() -> Mesh:
 @shape("terrain", held_out=True)
 def _dunes() -> Mesh:
     """Waves on cells of 1 : 6 whose corners are moved."""
-    mesh, rng = grid(36), seeded(31)
+    mesh, rng = shapes.grid(36), seeded(31)
     x, y = mesh.V[:, 0] + 0.2 / 36 * rng.uniform(-1, 1, mesh.n_vertices), 6 * mesh.V[:, 1]
     return Mesh(np.stack([x, y, 0.08 * np.sin(25 * x + np.sin(2 * y))], axis=1), mesh.F)
 
@@ -552,11 +546,11 @@ def _fern() -> Mesh:
 def _crossed_sheets() -> Mesh:
     """Two rectangles through one another along a common edge path, each with its own spacing."""
     s, t = np.linspace(0, 1, 25)[:, None], np.linspace(-1, 1, 21) ** 3
-    return build.merged(build.joined(lattice_mesh(s, t), lattice_mesh(s, 0.3 * t, t)))
+    return build.merged(build.joined(shapes.lattice_mesh(s, t), shapes.lattice_mesh(s, 0.3 * t, t)))
 
 
 @shape("rough", held_out=True)
 def _folded_paper() -> Mesh:
     """Miura's fold: parallelograms of two triangles, mountains and valleys."""
     i, j = np.arange(25)[:, None], np.arange(25)
-    return lattice_mesh(i + 0.5 * (j % 2), 0.9 * j, 0.7 * (i % 2))
+    return shapes.lattice_mesh(i + 0.5 * (j % 2), 0.9 * j, 0.7 * (i % 2))
