@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
 
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
+from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
+from heat_igl.mesh.connectivity import group_by_label, unique_rows
 from heat_igl.plan import MOST_DOUBT, MOST_DOUBT_AT_WORST
 from heat_igl.sources import SourceSet
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
@@ -14,6 +17,8 @@ from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray
 from heat_igl.windows.engine import Answer
 
+# Relative differences of velocities below this are rounding.
+_ROUNDING = 1e-9
 _GOLDEN = 0.618033988749895  # multiples of it, modulo 1, are spread evenly
 
 
@@ -72,11 +77,54 @@ class HopfLaxEngine(SimplexEngine):
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         self._scheme.shorten(distance, label)
 
+    @cached_property
+    def _arguments(self) -> Any:
+        """What `HopfLax` takes, with the paths that cross facets between two metrics."""
+        of, corners = self._simplices, self._corners
+        kernel: Any = SimplexUpdate
+        metric = of.velocity, of.rows, *of.measured[:-1], of.place
+        # One number for each metric, to seven digits, as rounding makes no difference, and 0 where it varies.
+        if of.velocity is not None and of.rows is not None:
+            mark = (of.velocity @ np.sqrt(np.arange(2, 8)))[of.rows[:, 0]]
+            widest, slack, growth = of.measured[2:5]
+            mark[(slack < 1 - _ROUNDING) | (growth**2 * widest > _ROUNDING**2)] = 0
+        elif of.tensors is not None and of.group is not None:
+            mark = (of.tensors.reshape(-1, 9) @ np.sqrt(np.arange(2, 11)))[of.group]
+        else:
+            mark = np.zeros(len(corners))
+        mark = (mark / max(np.abs(mark).max(initial=0), np.finfo(float).tiny)).astype(np.float32)
+        crossings: tuple[AnyArray, ...] = np.zeros(of.n + 1, np.int32), np.empty((0, 3), np.int32), np.empty(0)
+        if (mark != 0).any():
+            crossings = self._crossings(mark, kernel(corners, *metric))
+        return corners, self._first, self._incident, crossings, *metric
+
+    def _crossings(self, mark: AnyArray, update: Any) -> tuple[AnyArray, ...]:
+        """The paths that cross facets between simplices of different marks."""
+        corners, size, n = self._corners, self._corners.shape[1], self._simplices.n
+        # Marks differ at all vertices of these facets.
+        at_vertex, is_mixed = np.zeros(n, np.float32), np.zeros(n, bool)
+        at_vertex[corners] = mark[:, None]
+        is_mixed[corners[at_vertex[corners] != mark[:, None]]] = True
+        some = np.flatnonzero((mark != 0) & (sum(is_mixed[c].astype(int) for c in corners.T) >= size - 1))
+        rows = corners[some][:, [[j for j in range(size) if j != c] for c in range(size)]].reshape(-1, size - 1).T
+        low, high = reduce(np.minimum, rows), reduce(np.maximum, rows)
+        _, facet, counts = unique_rows(np.stack([low, sum(rows) - low - high, high], axis=1), n)
+        order = np.argsort(facet, kind="stable")
+        at, facet = (size * some[:, None] + np.arange(size)).astype(np.int32).ravel()[order], facet[order]
+        beside = [np.stack([at[k:], at[:-k]])[:, facet[k:] == facet[:-k]] for k in range(1, counts.max(initial=2))]
+        pairs = np.concatenate(beside, axis=1).T
+        pairs = pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]]
+        lengths = update.crossings(np.ascontiguousarray(pairs))
+        pairs, lengths = pairs[np.isfinite(lengths)], lengths[np.isfinite(lengths)]
+        ends = np.concatenate([pairs, pairs[:, ::-1]])
+        ends = np.concatenate([ends, corners.ravel()[ends[:, 1:]]], axis=1)
+        begins, order = group_by_label(corners.ravel()[ends[:, 0]], n)
+        return begins.astype(np.int32), ends[order], np.tile(lengths, 2)[order]
+
     @property
     def _scheme(self) -> Any:
         kernel: Any = HopfLax
-        velocity = self._simplices.velocity, self._simplices.rows, *self._simplices.measured[:-1]
-        return kernel(self._corners, self._first, self._incident, *velocity, self._simplices.place)
+        return kernel(*self._arguments)
 
     def derivative(self, sources: SourceSet) -> FixedPointDerivative:
         """The distance from source vertices with its derivative."""

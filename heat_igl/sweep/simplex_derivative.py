@@ -48,6 +48,8 @@ class _Inputs(NamedTuple):
         One metric for the simplex (q = 1), or the metrics at the vertex and at the corners (q = p + 1).
     start : (k,) float64
         The offset of the source.
+
+    If paths cross facets, the corner beyond it and its metric follow in `distance`, `slope`, `X` and `tensors`.
     """
 
     distance: AnyArray
@@ -68,9 +70,12 @@ class _FacetUpdate:
         How far the second-order term between two corners is used.
     share : (k, p) float64
         Barycentric coordinates of the minimizer on the facet; coordinates that are 0 stay 0.
+    crosses : (k,) bool
+        Whether the path is the shortest one through the facet from the corner beyond it.
     """
 
-    def __init__(self, is_sloped: BoolArray, weight: FloatArray, share: FloatArray) -> None:
+    def __init__(self, is_sloped: BoolArray, weight: FloatArray, share: FloatArray, crosses: BoolArray) -> None:
+        self._crosses = crosses
         self._is_sloped, self._weight = is_sloped, weight * (is_sloped[:, :, None] & is_sloped[:, None])
         self.share = share.copy()
         self._of: _Inputs | None = None
@@ -100,14 +105,16 @@ class _FacetUpdate:
 
     def values(self, at: _Inputs) -> AnyArray:
         """The distance and slope (k, 4) of the vertices; complex inputs also move the minimizers."""
-        share = self.share
+        share, p = self.share, self.share.shape[1]
         change = np.imag(self._value(at, share)[2])
         if change.any():
             share = share + 1j * np.einsum("kij,kj->ki", self.moves, change)
         T, length, _, lean = self._value(at, share)
-        e = at.X[:, 1:] - at.X[:, :1]
+        e = at.X[:, 1 : p + 1] - at.X[:, :1]
         slope = np.einsum("kpx,kpq,kq->kx", e, _inverse(e @ np.swapaxes(e, 1, 2)), lean)
-        return np.concatenate([(at.start + T + length)[:, None], slope], axis=1)
+        # In a simplex of one metric, distance from the corner beyond the facet.
+        start = np.where(self._crosses, at.distance[:, -1], at.start)
+        return np.concatenate([(start + T + length)[:, None], slope], axis=1)
 
     def _value(self, at: _Inputs, x: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray, AnyArray]:
         """Interpolated distance T and path length at the point x (k, p) of the facet, with two derivatives (k, p).
@@ -159,28 +166,39 @@ class _FacetUpdate:
 
     def _anywhere(self, at: _Inputs) -> tuple[AnyArray, ...]:
         """What the value takes that is the same at all places on the facet."""
-        D, e = at.distance - at.start[:, None], at.X[:, 1:] - at.X[:, :1]
-        product = np.einsum("kix,kqxy,kjy->kqij", e, at.tensors, e, optimize=True)
-        return D, product, self._sag(at, D, e, product), *((e, e) if product.shape[1] == 1 else self._velocity(at, e))
+        p, X, tensors = self.share.shape[1], at.X, at.tensors
+        D, e = at.distance[:, :p] - at.start[:, None], X[:, 1 : p + 1] - X[:, :1]
+        if self._crosses.any():
+            tensors = tensors[:, :-1]
+        product = np.einsum("kix,kqxy,kjy->kqij", e, tensors, e, optimize=True)
+        sag, in_metric = self._sag(at, D, e, product), (e, e) if product.shape[1] == 1 else self._velocity(tensors, e)
+        if self._crosses.any():
+            # The distance from the corner beyond the facet, as in `SimplexUpdate.crossing`.
+            between = X[:, 1 : p + 2, None] - X[:, None, 1 : p + 2]
+            square = np.einsum("kijx,kxy,kijy->kij", between, at.tensors[:, -1], between)
+            length = np.sqrt(square[:, :p, p])
+            square = square[:, :p, :p] - (length[:, :, None] - length[:, None]) ** 2
+            D, sag = np.where(self._crosses[:, None], length, D), np.where(self._crosses[:, None, None], square, sag)
+        return D, product, sag, *in_metric
 
-    def _velocity(self, at: _Inputs, e: AnyArray) -> tuple[AnyArray, AnyArray]:
+    def _velocity(self, tensors: AnyArray, e: AnyArray) -> tuple[AnyArray, AnyArray]:
         """The tensors to the power -1/2 (k, q, p, p) and the edge vectors (k, p, p), of triangles in their planes."""
         if e.shape[1] == 3:
-            if self._of_W is not at.tensors:
-                self._of_W, self._W = at.tensors, _inverse_root(at.tensors)
+            if self._of_W is not tensors:
+                self._of_W, self._W = tensors, _inverse_root(tensors)
             return self._W, e
         x, y = e[:, 0], e[:, 1]
         x = x / np.sqrt((x**2).sum(axis=1, keepdims=True))
         y = y - (x * y).sum(axis=1, keepdims=True) * x
         axes = np.stack([x, y / np.sqrt((y**2).sum(axis=1, keepdims=True))], axis=1)
-        W = _inverse_root(axes[:, None] @ at.tensors @ np.swapaxes(axes, 1, 2)[:, None])
+        W = _inverse_root(axes[:, None] @ tensors @ np.swapaxes(axes, 1, 2)[:, None])
         return W, e @ np.swapaxes(axes, 1, 2)
 
     def _sag(self, at: _Inputs, D: AnyArray, e: AnyArray, product: AnyArray) -> AnyArray:
         """Second difference of the squared distance between two corners (k, p, p), as `SimplexUpdate.sag_between`."""
         k, p = D.shape
         metric = product if product.shape[1] == 1 else product[:, 1:]
-        w = np.einsum("kix,kjx->kij", at.slope, e)
+        w = np.einsum("kix,kjx->kij", at.slope[:, :p], e)
         square = np.einsum("kij,kijl,kil->ki", w, _inverse(np.broadcast_to(metric, (k, p, p, p))), w)
         is_known = self._is_sloped & (np.real(square) > 0)
         trust = _larger(1 - np.log(np.where(is_known, square, 1.0)) ** 2, 0.0) * is_known
@@ -357,7 +375,7 @@ class FixedPointDerivative(SimplexDerivative):
         *record: AnyArray,
     ) -> None:
         super().__init__(simplices, sources)
-        facet, place, slope, is_sloped, weight = record
+        facet, beyond, place, slope, is_sloped, weight = record
         n, size, key = simplices.n, simplices.corners.shape[1], source * simplices.n + vertex
         others = np.array([[j for j in range(size) if j != c] for c in range(size)])
         # The node of each vertex that is the nearest.
@@ -365,14 +383,24 @@ class FixedPointDerivative(SimplexDerivative):
         self._reached, first = np.unique(vertex[order], return_index=True)
         self._nearest, self._source, self._facet = order[first], source, facet
         at = np.flatnonzero(facet >= 0)
-        self._simplex, corner = np.divmod(facet[at], size)
-        self._corner = np.concatenate([corner[:, None], others[corner]], axis=1)
+        simplex, corner = np.divmod(facet[at, None], size)
+        corner = np.concatenate([corner, others[corner[:, 0]]], axis=1)
         # The vertex, and the corners of its facet.
-        self._vertices = simplices.corners[self._simplex[:, None], self._corner]
-        by_key = np.argsort(key)
-        self._nodes = by_key[np.searchsorted(key, source[at, None] * n + self._vertices, sorter=by_key)]
-        is_known = is_sloped[self._nodes[:, 1:]].astype(bool)
-        self._update = _FacetUpdate(is_known, weight[at, None, None], place[at])
+        self._vertices = simplices.corners[simplex, corner]
+        q, crosses = 1 if simplices.velocity is None else size, beyond[at] >= 0
+        self._simplex, self._corner = simplex.repeat(q, axis=1), corner[:, :q]
+        if crosses.any():
+            # The corner beyond the facet, or the vertex itself.
+            simplex, corner = np.divmod(np.where(crosses, beyond[at], facet[at])[:, None], size)
+            self._simplex = np.concatenate([self._simplex, simplex], axis=1)
+            self._corner = np.concatenate([self._corner, corner], axis=1)
+            self._vertices = np.concatenate([self._vertices, simplices.corners[simplex, corner]], axis=1)
+        by_key, known = np.argsort(key), self._vertices.copy()
+        # Corners of facets that paths cross need no distance.
+        known[crosses, 1:size] = known[crosses, :1]
+        self._nodes = by_key[np.searchsorted(key, source[at, None] * n + known, sorter=by_key)]
+        is_known = is_sloped[self._nodes[:, 1:size]].astype(bool)
+        self._update = _FacetUpdate(is_known, weight[at, None, None], place[at], crosses)
         self._rank = np.empty(len(key), np.int64)
         self._rank[np.argsort(distance, kind="stable")] = np.arange(len(key))
         self._state = np.concatenate([distance[:, None], slope], axis=1)
@@ -435,10 +463,10 @@ class FixedPointDerivative(SimplexDerivative):
         (row,) = map(self._adjoint, gradient_rows(g, self.distance, 1))
         self._require_given()
         simplices = self._simplices
-        is_at_vertices = self._at.tensors.shape[1] > 1
+        is_at_vertices = simplices.velocity is not None
         result = np.zeros((simplices.n if is_at_vertices else len(simplices.corners), 3, 3))
         for (i, x, y), by in self._derivatives("tensors"):
-            where = self._vertices[:, i] if is_at_vertices else self._simplex
+            where = self._vertices[:, i] if is_at_vertices else self._simplex[:, i]
             result[:, x, y] += self._summed(where, row, by, len(result))
         return (result + np.swapaxes(result, 1, 2)) / 2
 
@@ -461,9 +489,7 @@ class FixedPointDerivative(SimplexDerivative):
 
     def _inputs(self) -> _Inputs:
         simplices, facet, distance = self._simplices, self._nodes[:, 1:], self._state[:, 0]
-        # A metric that is constant in the simplex is one input for all corners.
-        corner = self._corner if simplices.velocity is not None else self._corner[:, :1]
-        tensors = simplices.metric(self._simplex[:, None], corner)
+        tensors = simplices.metric(self._simplex, self._corner)
         start = self._sources.vertex_offset[self._source[self._nodes[:, 0]]]
         return _Inputs(distance[facet], self._state[facet, 1:], simplices.place[self._vertices], tensors, start)
 

@@ -16,6 +16,7 @@ T(x) + |v - x| over the facet opposite, with T the distance on the facet and |v 
 
 Distances begin with those along edges. `hopf_lax` visits vertices from near to far, then in rounds, each after those it
 depends on, until no distance changes. In `simplex_updates`, the least value with T linear has a closed form, and second
-differences of the square of T are found from the slopes of distance at the corners; `facets` has the least value with
-these, `simplex_metrics` inverse roots of tensors, fits around vertices, and lengths in a velocity that is linear.
+differences of the square of T are found from the slopes of distance at the corners, or from the corner beyond a facet
+between two metrics; `facets` has the least value with these, `simplex_metrics` inverse roots of tensors, fits around
+vertices, and lengths in a velocity that is linear.
 """

@@ -29,8 +29,13 @@ cdef class HopfLax:
     cdef int n_reached
     # Distance at the source, the change that is not handed on, and that of the slope of the last vertex.
     cdef double low, settled, turn[3]
-    # The corner whose facet gave each vertex its distance, the place there, and what it adds to T linear.
-    cdef int[::1] facet
+    # The paths to each vertex through a facet between two metrics: the corners at their ends, and their lengths.
+    cdef const int[::1] begin
+    cdef const int[:, ::1] ends
+    cdef const double[::1] lengths
+    # The corner whose facet gave each vertex its distance, the corner beyond if it comes from there alone, else -1, the
+    # place on the facet, and what it adds to T linear.
+    cdef int[::1] facet, beyond
     cdef double[:, ::1] place
     cdef double[::1] step
     # What each vertex rose though those at its place did not, and how far T is of second order for it.
@@ -42,7 +47,9 @@ cdef class HopfLax:
     # By how much each distance may be wrong, and by how much of that at its last step.
     cdef double[::1] doubt, own
 
-    cdef bint add_up(self, int v) noexcept nogil
+    cdef int support(self, int v, int i) noexcept nogil
+    cdef double share(self, int v, int i) noexcept nogil
+    cdef double above(self, int v, double value) noexcept nogil
     cdef double contradiction(self, int v) noexcept nogil
     cdef void forget(self, int v) noexcept nogil
     cdef void march(self) noexcept nogil

@@ -10,6 +10,9 @@ one fixed point, which converges to the distance in a continuous metric (Bornema
 differences along the edges of the facet follow from the slopes of distance at the corners. They are used as far as they
 agree with the distances and with the metric of the simplex.
 
+Where metrics differ, a path may cross the middle of a facet whose corners another wave reaches first. So the shortest
+path through such a facet, from the corner beyond it, is a further update.
+
 The first distances are those along edges. Vertices are visited from near to far, some several times, and then in
 rounds, each vertex after those that its distance comes from. T is not smooth where the fronts of two sources meet, so
 that each source is followed alone.
@@ -38,15 +41,20 @@ class HopfLax:
         Vertices of each simplex.
     first, incident : (n + 1,) int32, (m (p + 1),) int32
         Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
+    crossings : (n + 1,) int32, (k, 3) int32, (k,) float64
+        Paths that may cross a facet between two metrics, ``crossings[0][v]`` to ``crossings[0][v + 1]`` to vertex v:
+        the corners, as above, where they end and start, the vertex of the latter; and lengths.
     in_metric
         What else `SimplexUpdate` takes of the simplices.
     """
 
-    def __init__(self, corners, first, incident, *in_metric):
+    def __init__(self, corners, first, incident, crossings, *in_metric):
         self.corners, self.first, self.incident, n = corners, first, incident, len(first) - 1
+        self.begin, self.ends, self.lengths = crossings
         update = self.update = SimplexUpdate(corners, *in_metric)
         self.waiting, self.reached, self.n_reached = PriorityQueue(n), np.zeros(n, np.int32), 0
         self.facet, self.pending, self.known = np.full(n, -1, np.int32), np.zeros(n), np.full(n, INFINITY)
+        self.beyond = np.full(n, -1, np.int32)
         self.leads, self.label, self.d = np.zeros(n, np.uint8), np.full(n, -1, np.int32), np.full(n, INFINITY)
         self.changed = np.zeros(incident.shape[0], np.uint8)
         self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
@@ -120,112 +128,94 @@ class HopfLax:
 
         Returns
         -------
-        facet, place : (k,) int32, (k, p) float64
-            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1, and
-            the shares of the other corners, in their order, at the best place on that facet.
+        facet, beyond, place : (k,) int32, (k,) int32, (k, p) float64
+            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1; the
+            corner on the other side, if the distance comes from there alone, or -1; and the shares of the other
+            corners, in their order, at the best place on that facet.
         slope, is_sloped : (k, 3) float64, (k,) uint8
             The derivative of distance by the position of each vertex, and whether it is known.
         weight : (k,) float64
             The weight of the second order at each vertex: 1 for all of it, 0 for linear T.
         """
         update = self.update
-        at = np.asarray(self.facet)[v], np.asarray(self.place)[v]
+        at = np.asarray(self.facet)[v], np.asarray(self.beyond)[v], np.asarray(self.place)[v]
         return *at, np.asarray(update.slope)[v], np.asarray(update.is_sloped)[v], np.asarray(self.weight)[v]
 
     def doubts(self, v):
         """By how much distances (k,) may be wrong: what `contradiction` finds adds up over what they come from."""
-        is_early: cython.bint = False
         with cython.nogil:
             self.update.d = cython.address(self.d[0])
             for at in range(self.n_reached):
-                self.doubt[self.order[at]] = 0.0 if self.facet[self.order[at]] < 0 else -1.0
-            for at in range(self.n_reached):
-                is_early |= self.add_up(self.order[at])
+                self.own[self.order[at]] = self.contradiction(self.order[at])
+                self.doubt[self.order[at]] = 0.0
             # Where metrics turn far, the order has cycles and precedes the last visits: 5 rounds find nearly all.
-            for at in range(4 * self.n_reached if is_early else 0):
-                self.add_up(self.order[at % self.n_reached])
+            for _round in range(5):
+                changes: cython.bint = False
+                for at in range(self.n_reached):
+                    w: cython.int = self.order[at]
+                    so_far: cython.double = self.own[w]
+                    for i in range(self.update.p if self.facet[w] >= 0 else 0):
+                        so_far += self.share(w, i) * self.doubt[self.support(w, i)]
+                    changes |= so_far != self.doubt[w]
+                    self.doubt[w] = so_far
+                if not changes:
+                    break
         return np.asarray(self.doubt)[v]
 
-    def add_up(self, v: cython.int) -> cython.bint:
-        """Add the doubts of what v comes from to its own; whether one of these was not known yet."""
-        is_early: cython.bint = False
-        if self.facet[v] < 0:
-            return False
-        if self.doubt[v] < 0.0:
-            self.own[v] = self.contradiction(v)
-        so_far: cython.double = self.own[v]
-        self.update.face(self.facet[v] // self.corners.shape[1], self.facet[v] % self.corners.shape[1])
+    def support(self, v: cython.int, i: cython.int) -> cython.int:
+        """One of the vertices that v has its distance from: the corner i of its facet, or the one beyond the facet."""
+        size: cython.int = self.corners.shape[1]
+        if self.beyond[v] >= 0:
+            return self.corners[self.beyond[v] // size, self.beyond[v] % size]
+        return self.corners[self.facet[v] // size, i if i < self.facet[v] % size else i + 1]
+
+    def share(self, v: cython.int, i: cython.int) -> cython.double:
+        """The share of `support` i in the distance of v."""
+        return self.place[v, i] if self.beyond[v] < 0 else i == 0
+
+    def above(self, v: cython.int, value: cython.double) -> cython.double:
+        """By how much `value` is above the mean distance of what v has its distance from, by their shares."""
         for i in range(self.update.p):
-            u: cython.int = self.corners[self.facet[v] // self.corners.shape[1], self.update.side[i]]
-            is_early |= self.place[v, i] > 0.0 and self.doubt[u] < 0.0
-            so_far += self.place[v, i] * max(self.doubt[u], 0.0)
-        self.doubt[v] = so_far
-        return is_early
+            value -= self.share(v, i) * self.d[self.support(v, i)]
+        return value
 
     def contradiction(self, v: cython.int) -> cython.double:
         """By how much T may be wrong at the place that v has its distance from.
 
         Along an edge of a facet, the square of T rises by what its values say, and by what the slopes at both ends say.
         Both agree if it is quadratic. Else it is off in between by their difference times both shares, and by what the
-        weight takes of its second difference; at most by that of the square of the edge. With one metric each,
-        T is not above the distance of the corner beyond the facet by more than the length from it.
+        weight takes of its second difference; at most by that of the square of the edge.
         """
-        size: cython.int = self.corners.shape[1]
-        s: cython.int = self.facet[v] // size
-        c: cython.int = self.facet[v] % size
-        T: cython.double = -self.low
+        s: cython.int = self.facet[v] // self.corners.shape[1]
         own: cython.double = 0.0
-        square: cython.double = 0.0
-        kept: cython.int[3]
-        where: cython.int[3]
-        self.update.face(s, c)
-        for i in range(self.update.p):
-            kept[i] = self.corners[s, self.update.side[i]]
-            one: cython.double = self.update.level[i] - self.low
-            T += self.place[v, i] * self.update.level[i]
+        if self.facet[v] < 0:
+            return 0.0
+        T: cython.double = self.above(v, self.low)
+        self.update.face(s, self.facet[v] % self.corners.shape[1])
+        for i in range(self.update.p if self.beyond[v] < 0 else 0):
+            a: cython.int = self.support(v, i)
+            one: cython.double = self.d[a] - self.low
             for j in range(i):
-                two: cython.double = self.update.level[j] - self.low
+                b: cython.int = self.support(v, j)
+                two: cython.double = self.d[b] - self.low
                 at_a: cython.double = 0.0
                 at_b: cython.double = 0.0
                 for k in range(3):
-                    e: cython.double = self.update.V[kept[j], k] - self.update.V[kept[i], k]
-                    at_a += one * self.update.slope[kept[i], k] * e
-                    at_b += two * self.update.slope[kept[j], k] * e
+                    e: cython.double = self.update.V[b, k] - self.update.V[a, k]
+                    at_a += one * self.update.slope[a, k] * e
+                    at_b += two * self.update.slope[b, k] * e
                 # Both are 0 where simplices are flat and slopes not known.
                 gap: cython.double = fabs(two * two - one * one - at_a - at_b) if at_a != 0.0 or at_b != 0.0 else 0.0
                 gap += (1.0 - self.weight[v]) * fabs(at_b - at_a - (two - one) * (two - one))
                 between: cython.double = self.update.mean[s, pair(self.update.side[i], self.update.side[j])]
                 own += self.place[v, i] * self.place[v, j] * min(gap, between)
-                square -= self.place[v, i] * self.place[v, j] * between
-            square += self.place[v, i] * self.update.mean[s, pair(c, self.update.side[i])]
-        own = 0.5 * own / T if T > 0.0 and own >= 0.0 else 0.0
-        T = self.d[v] - sqrt(max(square, 0.0))
-        # Lengths in a metric that varies within simplices are not known as well.
-        for at in range(self.first[kept[0]], self.first[kept[0] + 1] if self.update.q == 1 else 0):
-            other: cython.int = self.incident[at] // size
-            far: cython.int = size * (size - 1) // 2
-            n_common: cython.int = 0
-            for i in range(size):
-                for j in range(self.update.p if n_common >= i - 1 else 0):
-                    if self.corners[other, i] == kept[j]:
-                        where[j] = i
-                        far -= i
-                        n_common += 1
-            if n_common < self.update.p or other == s:
-                continue
-            square = 0.0
-            for i in range(self.update.p):
-                square += self.place[v, i] * self.update.mean[other, pair(far, where[i])]
-                for j in range(i):
-                    square -= self.place[v, i] * self.place[v, j] * self.update.mean[other, pair(where[i], where[j])]
-            own = max(own, T - self.d[self.corners[other, far]] - sqrt(max(square, 0.0)))
-        return own
+        return -0.5 * own / T if T < 0.0 and own >= 0.0 else 0.0
 
     def forget(self, v: cython.int) -> cython.void:
         """Make v a vertex that no source has reached."""
         self.d[v], self.known[v], self.facet[v], self.pending[v], self.leads[v] = INFINITY, INFINITY, -1, 0.0, 0
         self.weight[v], self.step[v], self.risen[v], self.n_visits[v] = 1.0, 0.0, 0.0, 0
-        self.update.is_sloped[v], self.update.trusted_in[v] = 0, -1
+        self.update.is_sloped[v], self.update.trusted_in[v], self.beyond[v] = 0, -1, -1
         for k in range(3):
             self.update.slope[v, k] = 0.0
         for k in range(self.update.p):
@@ -345,6 +335,13 @@ class HopfLax:
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
                     if self.left > 0:
                         self.wait(u)
+        for k in range(self.begin[v], self.begin[v + 1]):
+            u = self.ends[k, 2]
+            matters: cython.bint = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
+            if self.facet[u] >= 0 and change > self.settled and (matters or self.beyond[u] == self.ends[k, 0]):
+                self.pending[u] = max(change, self.pending[u])
+                if self.left > 0:
+                    self.wait(u)
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it.
@@ -356,9 +353,17 @@ class HopfLax:
         rise: cython.double = -INFINITY
         best: cython.double = INFINITY
         best_at: cython.int = -1
+        beyond: cython.int = -1
         kept: cython.double[3]
         # Facets that have not changed were no better, unless the one of the last visit is worse now.
         asks_all: cython.bint = True
+        for k in range(self.begin[v], self.begin[v + 1]):
+            value: cython.double = self.known[self.ends[k, 2]] + self.lengths[k]
+            if value < best:
+                best, best_at, beyond = value, self.ends[k, 0], self.ends[k, 1]
+        if self.facet[v] >= 0:
+            rise = self.above(v, -self.step[v])
+            asks_all = self.beyond[v] < 0 or best > self.d[v] * (1 + EQUAL)
         # Without corners that were not visited, for which it would be done again, if it gets nearer by the others.
         for is_open in range(2):
             self.update.d = cython.address(self.d[0]) if is_open else cython.address(self.known[0])
@@ -374,16 +379,13 @@ class HopfLax:
                     has_open |= i != c and self.known[self.corners[s, i]] == INFINITY
                 if not has_open:
                     continue
-                value: cython.double = self.update.through(s, c, best)
+                value = self.update.through(s, c, best)
                 self.changed[at] = False
-                if k < self.first[v] and value < INFINITY:
+                if k < self.first[v] and value < INFINITY and self.beyond[v] < 0:
                     asks_all = value > self.d[v] * (1 + EQUAL)
-                    rise = -self.step[v]
-                    for i in range(size - 1):
-                        rise -= self.place[v, i] * self.update.level[i]
                 # Facets that share the best place have equal values but for rounding: the first one stays.
                 if value + EQUAL * fabs(value) < best:
-                    best, best_at = value, at
+                    best, best_at, beyond = value, at, -1
                     for i in range(size - 1):
                         kept[i] = self.update.share[i]
             if best < self.d[v] + EQUAL * fabs(best):
@@ -397,10 +399,14 @@ class HopfLax:
         s, c = best_at // size, best_at % size
         self.update.face(s, c)
         self.update.d = cython.address(self.known[0])
-        self.d[v], self.known[v], self.facet[v], self.step[v] = best, best, best_at, best
         for i in range(size - 1):
-            self.update.share[i] = self.place[v, i] = kept[i]
-            self.step[v] -= kept[i] * self.update.level[i]
+            self.update.share[i] = kept[i]
+        if beyond >= 0:
+            self.update.crossing(s, c, beyond // size)
+        for i in range(size - 1):
+            self.place[v, i] = self.update.share[i]
+        self.d[v], self.known[v], self.facet[v], self.beyond[v] = best, best, best_at, beyond
+        self.step[v] = self.above(v, best)
         self.update.find_slope(s, c)
 
     def arrange(self) -> cython.void:
@@ -426,12 +432,9 @@ class HopfLax:
                     self.state[v] = 1
                     so_far += self.step[v]
                     self.sum[v] = so_far
-                    k: cython.int = 0
-                    for c in range(size):
-                        if c == self.facet[v] % size:
-                            continue
-                        u: cython.int = self.corners[self.facet[v] // size, c]
-                        if self.place[v, k] > 0.0:
+                    for k in range(size - 1):
+                        if self.share(v, k) > 0.0:
+                            u: cython.int = self.support(v, k)
                             if self.state[u] == 0:
                                 i: cython.int = n_open
                                 while self.stack[i - 1] != v and self.d[self.stack[i - 1]] < self.d[u]:
@@ -441,7 +444,6 @@ class HopfLax:
                                 n_open += 1
                             elif self.state[u] == 1 and self.sum[v] - self.sum[u] + self.step[u] < 0.0:
                                 self.open_circle(u, n_open)
-                        k += 1
                     continue
                 n_open -= 1
                 if self.state[v] == 1:

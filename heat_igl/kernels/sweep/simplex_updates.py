@@ -2,10 +2,13 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep import facets
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, gradient, mean_velocity, pair, squares_of
 from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, FETCH, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
+
+from heat_igl.kernels.signals import raise_caught
 
 
 @cython.final
@@ -48,6 +51,51 @@ class SimplexUpdate(Facet):
                     for j in range(i):
                         lengths[s, pair(i, j)] = edge_length(self, s, i, j)
         return found
+
+    def crossings(self, corners: cython.const[cython.int][:, ::1]):
+        """The length (k,) of `crossing` between corners ``simplex * (p + 1) + corner`` (k, 2) beyond one facet."""
+        found, unused = np.empty(len(corners)), np.zeros(len(self.V))
+        lengths: cython.double[::1] = found
+        levels: cython.double[::1] = unused
+        self.d = cython.address(levels[0])
+        size: cython.int = self.p + 1
+        with cython.nogil:
+            for k in range(lengths.shape[0]):
+                if k % ASK == 0 and is_interrupted():
+                    break
+                lengths[k] = self.crossing(corners[k, 0] // size, corners[k, 0] % size, corners[k, 1] // size)
+        raise_caught()
+        return found
+
+    def crossing(self, s: cython.int, c: cython.int, other: cython.int) -> cython.double:
+        """The least |u - x| + |x - v| over a facet between v, corner c of s, and u in another simplex; sets `share`.
+
+        Both have one metric each. It is inf if the path is no shorter than along an edge.
+        """
+        q: cython.int = self.q
+        sq = cython.address(self.mean[other, 0])
+        where: cython.int[3]
+        far: cython.int = self.p * (self.p + 1) // 2
+        start: cython.double = self.start
+        along: cython.double = INFINITY
+        self.face(s, c)
+        for i in range(self.p):
+            where[i] = 0
+            while self.corners[other, where[i]] != self.corners[s, self.side[i]]:
+                where[i] += 1
+            far -= where[i]
+        self.q, self.start = 1, 0.0
+        self.lay(s, c)
+        for i in range(self.p):
+            self.share[i], self.D[i] = 1.0 / self.p, sqrt(sq[pair(far, where[i])])
+            along = min(along, self.D[i] + sqrt(self.product[4 * i]))
+            for j in range(i):
+                # As T from u in the other metric, whose square is quadratic.
+                rise: cython.double = self.D[i] - self.D[j]
+                self.sag[i][j] = self.sag[j][i] = sq[pair(where[i], where[j])] - rise * rise
+        length: cython.double = self.newton(self.length(self.share), INFINITY)
+        self.q, self.start = q, start
+        return length if length < along * (1.0 - EQUAL) else INFINITY
 
     def face(self, s: cython.int, c: cython.int) -> cython.double:
         """Look at the facet opposite corner c of simplex s: sets `side` and `level`, returns the least distance."""
