@@ -274,7 +274,7 @@ def test_distances_around_speeds_that_jump_give_a_warning():
         assert np.abs(found[1:] / halved_twice(mesh, domain, 0) - 1).max() > 0.15
 
 
-@pytest.mark.parametrize(("seed", "unit"), [(1, 1.0), (2, 1e-30)])
+@pytest.mark.parametrize(("seed", "unit"), [(1, 1.0), (2, 1e-50)])
 @pytest.mark.parametrize(("shape", "spacing"), [((8, 1), [1, 5]), ((6, 1, 1), [1, 4, 4])], ids=["pixels", "voxels"])
 def test_paths_cross_long_sides_between_speeds(shape, spacing, seed, unit):
     """Straight through layers of one cell each, between corners that slower waves reach: widths over speeds add up."""
