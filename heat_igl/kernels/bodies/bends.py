@@ -353,10 +353,7 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def add(self, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double) -> cython.void:
-        """Make an edge a candidate for the `point` x if the way around it is shorter and may bend there.
-
-        There is room for 256; 65 were the most in 62 bodies.
-        """
+        """Make an edge one of 256 candidates (65 at most so far) for the `point` x if its way may be shorter."""
         if self.point_of[i] != self.point and self.fit_of[i] & _MOST_FITS:
             self.point_of[i] = self.point
             value: cython.double = self.around(i, x, False)
@@ -463,12 +460,12 @@ class _Bends(Ray):
         """Fit an edge, anew after one whose ways do not hold, and make it a candidate if it hides anything."""
         self.sought = i
         self.fit(i, follows)
-        while self.refuted >= 0:
-            j: cython.int = self.refuted
+        j: cython.int = self.refuted
+        if j >= 0:
             self.refuted = _NONE
             self.begin(j, True)
-            self.sought = i
-            self.fit(i, follows)
+            self.begin(i, follows)
+            return
         if self.fit_of[i] & _MOST_FITS < _MOST_FITS:
             self.fit_of[i] += 1
         if self.is_open[i, 0] or self.is_open[i, 1]:
