@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
@@ -67,9 +66,6 @@ class Diagnostics:
         Storage of the factors.
     factor_nonzeros, factor_bytes : int
         Entries of all factors, and the memory that a query reads twice, indices included.
-    seconds_operators, seconds_analysis, seconds_factorization : float
-        Wall-clock time of the stages of the constructor: operators; order of elimination, which begins beside them, as
-        far as it takes longer; factors.
     check : AnswerCheck or None
         Of a `HeatSolution`, by how much the distance left bounds that need no reference. None for the solver.
     compared : Comparison or None
@@ -94,9 +90,6 @@ class Diagnostics:
     backend: str
     factor_nonzeros: int
     factor_bytes: int
-    seconds_operators: float
-    seconds_analysis: float
-    seconds_factorization: float
     check: AnswerCheck | None = None
     compared: Comparison | None = None
 
@@ -272,10 +265,8 @@ def prepare_mesh(
     mesh: Mesh | PointCloud | PolygonMesh, options: SolverOptions, known: Analysis | None = None
 ) -> SolverParts:
     """The parts of a solver on `mesh`; a `known` order of elimination is taken if it fits."""
-    start = time.perf_counter()
     if isinstance(mesh, PolygonMesh):
-        domain = fan_operators(mesh, options.laplacian)
-        return prepare(domain, options, seconds_operators=time.perf_counter() - start, V=mesh.V)
+        return prepare(fan_operators(mesh, options.laplacian), options, V=mesh.V)
     begun: list[Future[Analysis]] = []
     with Pool(1) as beside:
 
@@ -292,15 +283,13 @@ def prepare_mesh(
             usual = plan.T_COEF_RANDOM_POINTS if ratio > plan.RANDOM_SIDES else plan.T_COEF_EVEN_POINTS
         else:
             domain = operators(mesh, options.laplacian, on_laplacian)
-        seconds = time.perf_counter() - start
-        return prepare(domain, options, begun[0].result if begun else lambda: known, seconds, mesh.V, usual)
+        return prepare(domain, options, begun[0].result if begun else lambda: known, mesh.V, usual)
 
 
 def prepare(
     domain: Operators,
     options: SolverOptions,
     known: Callable[[], Analysis | None] = lambda: None,
-    seconds_operators: float = 0.0,
     V: FloatArray | None = None,
     t_coef: float | None = None,
 ) -> SolverParts:
@@ -315,9 +304,7 @@ def prepare(
     step, requested = time_step(chosen, domain, fitted)
     check_large_step(options, domain)
     t_damping = step if damped else None
-    begun = time.perf_counter()
     found = analysis(domain.L, options.backend, known())
-    analysed = time.perf_counter()
     # Both matrices at once: the backends run without the interpreter's lock. The Poisson problem is done first, and
     # the divergence follows on that thread.
     makers: list[Callable[[], Any]] = [
@@ -329,7 +316,6 @@ def prepare(
     threads = 1 if found.backend == "scipy" else min(2, n_threads())
     with naming_thinnest(domain.source_surface):
         poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
-    factored = time.perf_counter()
     assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped)
     triangulation = None if domain.surface is None else domain.surface.triangulation
     factors = [*heat_flow.factors, poisson.factor]
@@ -342,11 +328,8 @@ def prepare(
         n_flips=triangulation.n_flips if triangulation else 0,
         lengthening=triangulation.lengthening if triangulation else 0.0,
         backend=heat_flow.backend,
-        seconds_operators=seconds_operators,
         factor_nonzeros=sum(factor.nonzeros for factor in factors),
         factor_bytes=sum(factor.n_bytes for factor in factors),
-        seconds_analysis=analysed - begun,
-        seconds_factorization=factored - analysed,
     )
     is_comparable = domain.surface is not None or domain.simplices is not None
     return SolverParts(

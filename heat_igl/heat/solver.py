@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -165,9 +164,7 @@ class HeatMethodSolver(BatchedSolver):
             If `F`, `lengths` or `twin` cannot be used; the message names the first offender.
         """
         options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
-        start = time.perf_counter()
-        domain = edge_length_operators(F, lengths, n, options.laplacian, twin)
-        return cls._of(prepare(domain, options, seconds_operators=time.perf_counter() - start))
+        return cls._of(prepare(edge_length_operators(F, lengths, n, options.laplacian, twin), options))
 
     def _moved(self, V: ArrayLike) -> HeatMethodSolver:
         options, fans = self._parts.options, self.operators.fans
