@@ -22,9 +22,6 @@ from heat_igl.validation.random_shapes import FAMILIES
 
 __all__ = ["FAMILIES", "SHAPES", "Shape"]
 
-SHAPES: list[Shape] = []
-"""All shapes, family after family."""
-
 
 @dataclass(frozen=True)
 class Shape:
@@ -39,22 +36,9 @@ class Shape:
     held_out: bool
 
 
-def shape(family: str, *, held_out: bool = False) -> Callable[[Callable[[], Mesh]], Callable[[], Mesh]]:
-    """Register a function as the shape of its name."""
-
-    def register(make: Callable[[], Mesh]) -> Callable[[], Mesh]:
-        SHAPES.append(Shape(make.__name__.strip("_").replace("_", " "), family, make, held_out))
-        return make
-
-    return register
-
-
 def seeded(seed: int) -> np.random.Generator:
     """A random generator with a fixed seed."""
     return np.random.default_rng([20240815, seed])
-
-
-# Given by one expression: family -> name -> mesh; a star marks those held out.
 
 
 def _stretched(mesh: Mesh, factors: ArrayLike) -> Mesh:
@@ -104,87 +88,9 @@ def _cells(n: int, where: Callable[[IntArray], Any]) -> Mesh:
     return build.boxes(np.argwhere(where(np.indices((n, n, n)))))
 
 
-_EXPRESSIONS: dict[str, dict[str, Callable[[], Mesh]]] = {
-    "smooth": {
-        "sphere": lambda: shapes.icosphere(4),
-        "ellipsoid": lambda: _stretched(shapes.icosphere(4), [1, 1, 8]),
-        "torus": lambda: shapes.torus(30, 60),
-        "thin torus *": lambda: shapes.torus(12, 240, 0.05),
-        "bumpy sphere": lambda: _stretched(shapes.icosphere(4), _bumps(shapes.icosphere(4).V)),
-        "monkey saddle *": lambda: _heights(
-            shapes.disk(20), shapes.disk(20).V[:, 0] ** 3 - 3 * shapes.disk(20).V[:, 0] * shapes.disk(20).V[:, 1] ** 2
-        ),
-        "cone": lambda: shapes.cone(40, 30),
-        "regular grid": lambda: shapes.grid(40),
-        "long strip": lambda: shapes.strip(1500, 3),
-    },
-    "topology": {"book": lambda: shapes.book(5, 12)},
-    "CAD": {
-        "capped cylinder 128": lambda: _capped(64),
-        "capped cylinder 512": lambda: _capped(256),
-        "box cube": lambda: build.boxes(np.zeros((1, 3), int)),
-        "box long": lambda: build.boxes(np.zeros((1, 3), int), np.array([1.0, 1.0, 30.0])),
-    },
-    "scattered": {
-        "scattered square 1000": lambda: _scattered(1000, 3),
-        "scattered square 100": lambda: _scattered(100, 4),
-        "sheared grid by 3": lambda: _stretched(shapes.grid(30), _shear(3.0)),
-        "sheared grid by 10": lambda: _stretched(shapes.grid(30), _shear(10.0)),
-        "stretched grid *": lambda: _stretched(shapes.grid(30), [40, 1, 1]),
-    },
-    "terrain": {
-        "noise 10 times": lambda: _heights(shapes.grid(30), 10 / 30 * seeded(10).random(31**2)),
-        "noise 100 times": lambda: _heights(shapes.grid(30), 100 / 30 * seeded(10).random(31**2)),
-        "height field 5000": lambda: _height_field(5000, 0.3, 8),
-        "height field coarse": lambda: _height_field(47, 0.5, 9),
-        "cliff": lambda: _heights(shapes.grid(40), 2.0 * (shapes.grid(40).V[:, 0] > 0.5)),
-    },
-    "hull": {
-        "hull of 12": lambda: build.hull(_on_sphere(12, 12)),
-        "hull of 35": lambda: build.hull(_on_sphere(35, 13)),
-        "hull of 100": lambda: build.hull(_on_sphere(100, 14)),
-        "hull of 400": lambda: build.hull(_on_sphere(400, 15)),
-        "flat hull *": lambda: build.hull(_on_sphere(150, 16) * [1, 1, 0.03]),
-        "hull of a cloud *": lambda: build.hull(seeded(17).standard_normal((300, 3))),
-    },
-    "voxels": {
-        "cube less one": lambda: _cells(2, lambda i: (i < 1).any(axis=0)),
-        # A lattice of square beams between 4 by 4 by 4 nodes, of genus 81.
-        "beams": lambda: _cells(7, lambda i: (i % 2 == 0).sum(axis=0) >= 2),
-        "voxel ball": lambda: _cells(15, lambda i: ((i - 7) ** 2).sum(axis=0) <= 42),
-    },
-    "rough": {
-        "spiky sphere": lambda: _stretched(
-            shapes.icosphere(3), np.where(seeded(20).random(642) < 0.05, 3.0, 1.0)[:, None]
-        ),
-        "noisy sphere": lambda: _noisy(shapes.icosphere(4), 0.05, 21),
-        "crumpled *": lambda: _noisy(shapes.disk(18), 0.04, 22),
-        "lantern 40 by 400": lambda: _lantern(40, 400),
-        "lantern 12 by 60": lambda: _lantern(12, 60),
-    },
-    "components": {f"two spheres 1 to {ratio}": partial(_spheres, float(ratio)) for ratio in (1, 10, 100)},
-    "small": {
-        "triangle": lambda: Mesh([[0, 0, 0], [3, 0, 0], [0, 2, 0]], [[0, 1, 2]]),
-        "needle *": lambda: Mesh(
-            np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-4, 0], [0.5, -1e-4, 0]]), [[0, 1, 2], [1, 0, 3]]
-        ),
-        "tetrahedron": lambda: Mesh(
-            [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
-        ),
-        "octahedron *": lambda: build.hull(np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3]),
-    },
-}
-SHAPES += [
-    Shape(name.removesuffix(" *"), family, make, name.endswith("*"))
-    for family, members in _EXPRESSIONS.items()
-    for name, make in members.items()
-]
-
-
 # Smooth surfaces.
 
 
-@shape("smooth", held_out=True)
 def _latitudes() -> Mesh:
     """A sphere by meridians and parallels, with fans of thin triangles at the poles."""
     theta, phi = np.meshgrid(np.linspace(0, np.pi, 31), np.linspace(0, 2 * np.pi, 61)[:-1], indexing="ij")
@@ -195,14 +101,12 @@ def _latitudes() -> Mesh:
 # Surfaces without an orientation, or with edges of many faces.
 
 
-@shape("topology")
 def _moebius_band() -> Mesh:
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 121), np.linspace(-0.4, 0.4, 9), indexing="ij")
     r = 1 + v * np.cos(u / 2)
     return build.merged(shapes.lattice_mesh(r * np.cos(u), r * np.sin(u), v * np.sin(u / 2)))
 
 
-@shape("topology", held_out=True)
 def _klein_bottle() -> Mesh:
     """The figure of eight turned by half a turn on its way around; it crosses itself without sharing vertices."""
     u, v = np.meshgrid(np.arange(80) * 2 * np.pi / 80, np.arange(40) * 2 * np.pi / 40, indexing="ij")
@@ -217,7 +121,6 @@ def _klein_bottle() -> Mesh:
     return Mesh(tube.V, np.concatenate([tube.F, seam]))
 
 
-@shape("topology")
 def _pinched() -> Mesh:
     """Two cones that meet in their tips."""
     one = shapes.cone(24, 8)
@@ -227,7 +130,6 @@ def _pinched() -> Mesh:
 # Parts as they leave a CAD program: few vertices, long triangles, fans.
 
 
-@shape("CAD", held_out=True)
 def _pill() -> Mesh:
     """Long triangles along the side of a cylinder between two finely meshed caps of a sphere."""
     theta = np.concatenate([np.linspace(0, np.pi / 2, 13), np.linspace(np.pi / 2, np.pi, 13)])
@@ -243,19 +145,11 @@ def _plate_with_holes(holes: FloatArray, around: int, seed: int) -> Mesh:
     return build.compact(build.raised(points), F)
 
 
-@shape("CAD")
-def _plate() -> Mesh:
-    holes = np.array([[2, 1.6, 0.8], [2, 4.4, 0.8], [5, 3, 1.2], [8, 1.6, 0.8], [8, 4.4, 0.8]])
-    return _plate_with_holes(holes, 96, 1)
-
-
-@shape("CAD", held_out=True)
 def _slotted_plate() -> Mesh:
     x, y = np.meshgrid(np.linspace(1, 9, 7), np.linspace(1, 5, 4))
     return _plate_with_holes(np.column_stack([x.ravel(), y.ravel(), np.full(28, 0.42)]), 24, 2)
 
 
-@shape("CAD")
 def _needle_fan() -> Mesh:
     """A disk of 300 needles around its centre."""
     V = np.concatenate([np.zeros((1, 3)), build.raised(build.ring(300))])
@@ -263,7 +157,6 @@ def _needle_fan() -> Mesh:
     return Mesh(V, np.stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % 300], axis=1))
 
 
-@shape("CAD", held_out=True)
 def _gear() -> Mesh:
     """A toothed wheel of 24 teeth with a bore, extruded; its faces are Delaunay triangles between bore and teeth."""
     angle = 2 * np.pi * np.arange(96) / 96
@@ -276,30 +169,20 @@ def _gear() -> Mesh:
     return build.extruded(rim, F, 1.0)
 
 
-@shape("CAD")
 def _stairs() -> Mesh:
     """Twelve steps of two rectangles each, every rectangle two triangles."""
     steps = np.repeat(np.arange(13), 2)
     return shapes.lattice_mesh(steps[1:], np.array([[0.0], [5.0]]), steps[:-1] * 0.5)
 
 
-@shape("CAD", held_out=True)
-def _wide_funnel() -> Mesh:
-    """A cone whose rings come closer and closer to the tip, with 24 vertices each."""
-    radius: FloatArray = 0.6 ** np.arange(20.0)
-    return build.revolved(radius, 2 * radius, 24)
-
-
 # Scattered points.
 
 
-@shape("scattered", held_out=True)
 def _scattered_disk() -> Mesh:
     r, angle = seeded(5).random((2, 1500))
     return build.planar(np.sqrt(r)[:, None] * np.stack([np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)], axis=1))
 
 
-@shape("scattered")
 def _clusters() -> Mesh:
     """Points in a square, most of them in five small clusters: edges differ by a factor of a thousand."""
     rng = seeded(6)
@@ -310,20 +193,12 @@ def _clusters() -> Mesh:
     return build.planar(points)
 
 
-@shape("scattered")
 def _slivers_at_the_rim() -> Mesh:
     """A square whose boundary vertices stand on a cubic scale, with few points inside."""
     s = np.linspace(-1, 1, 41) ** 3
     rim = np.concatenate([np.column_stack([s, np.full(41, side)]) for side in (-1.0, 1.0)])
     rim = np.concatenate([rim, rim[:, ::-1]])
     return build.planar(np.unique(np.concatenate([rim, seeded(7).uniform(-0.9, 0.9, (120, 2))]), axis=0))
-
-
-@shape("scattered", held_out=True)
-def _graded_square() -> Mesh:
-    """Edges from 1 to 1 / 1000 towards a corner."""
-    steps = np.linspace(0, 1, 41) ** 3
-    return shapes.lattice_mesh(steps, steps[:, None])
 
 
 # Height fields and terrain.
@@ -334,7 +209,6 @@ def _height_field(n: int, height: float, seed: int) -> Mesh:
     return build.planar(points, height * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1]))
 
 
-@shape("terrain", held_out=True)
 def _fractal_terrain() -> Mesh:
     """Midpoint displacement on 65 by 65 vertices, each level with 0.6 of the height of the one before."""
     rng, z, amplitude = seeded(11), np.zeros((2, 2)), 0.5
@@ -350,18 +224,9 @@ def _fractal_terrain() -> Mesh:
     return _heights(shapes.grid(64), z.ravel())
 
 
-@shape("terrain", held_out=True)
-def _ridges() -> Mesh:
-    """A folded sheet: 20 steep folds of a few triangles each."""
-    return shapes.lattice_mesh(
-        np.linspace(0, 1, 41)[:, None], np.linspace(0, 1, 11), 0.2 * (np.arange(41)[:, None] % 2)
-    )
-
-
 # Voxels and fractals.
 
 
-@shape("voxels", held_out=True)
 def _sponge() -> Mesh:
     """Menger's sponge of level 2."""
     i = np.indices((9, 9, 9))
@@ -369,7 +234,6 @@ def _sponge() -> Mesh:
     return build.boxes(np.argwhere(level[0] & level[1]))
 
 
-@shape("voxels", held_out=True)
 def _voxel_blob() -> Mesh:
     """Cells below a random threshold, connected or not, touching along edges and in corners."""
     from scipy.ndimage import gaussian_filter
@@ -381,14 +245,12 @@ def _voxel_blob() -> Mesh:
 # Mazes and walls.
 
 
-@shape("maze")
 def _maze() -> Mesh:
     """A square with walls one cell wide from alternate sides."""
     column, row = np.indices((45, 45))
     return build.opened((column % 5 != 4) | np.where(column // 5 % 2 == 0, row >= 41, row < 4))
 
 
-@shape("maze")
 def _spiral() -> Mesh:
     """A corridor that winds in, four turns."""
     turn = np.linspace(0, 8 * np.pi, 400)
@@ -396,7 +258,6 @@ def _spiral() -> Mesh:
     return shapes.lattice_mesh(radius * np.cos(turn), radius * np.sin(turn))
 
 
-@shape("maze")
 def _labyrinth() -> Mesh:
     """A random spanning tree of rooms, carved out of a grid of cells."""
     rng, n = seeded(19), 12
@@ -422,7 +283,6 @@ def _lantern(around: int, along: int) -> Mesh:
     return Mesh(V, np.concatenate([first, np.where(is_turned[..., None], odd, even)], axis=1).reshape(-1, 3))
 
 
-@shape("rough")
 def _sphere_with_slivers() -> Mesh:
     """A tenth of the faces split close to the middle of a side."""
     mesh = shapes.icosphere(3)
@@ -436,7 +296,6 @@ def _sphere_with_slivers() -> Mesh:
     return Mesh(np.concatenate([mesh.V, new]), np.concatenate([np.delete(mesh.F, chosen, axis=0), *split]))
 
 
-@shape("rough", held_out=True)
 def _dense_pole() -> Mesh:
     """A sphere whose triangles shrink to a thousandth towards a pole."""
     t = np.concatenate([np.linspace(0, 1, 60) ** 4 * np.pi / 2, np.linspace(np.pi / 2, np.pi, 20)[1:-1]])
@@ -446,16 +305,6 @@ def _dense_pole() -> Mesh:
 # Several components.
 
 
-@shape("components", held_out=True)
-def _part_and_plate() -> Mesh:
-    """A small torus beside a square of two triangles, a thousand times larger."""
-    return build.joined(
-        shapes.torus(16, 32),
-        Mesh(np.array([[0, 0, -1], [1e3, 0, -1], [1e3, 1e3, -1], [0, 1e3, -1]]), [[0, 1, 2], [0, 2, 3]]),
-    )
-
-
-@shape("components")
 def _dust() -> Mesh:
     """Twenty hulls of 60 points beside one another, from 1 to a thousandth in size."""
     parts, at = [], 0.0
@@ -469,7 +318,6 @@ def _dust() -> Mesh:
 # Made after every default had been chosen, all held out.
 
 
-@shape("smooth", held_out=True)
 def _gyroid() -> Mesh:
     """A piece of the gyroid by marching cubes, with their slivers and a boundary of many loops."""
     n = 22
@@ -480,7 +328,6 @@ def _gyroid() -> Mesh:
     return build.merged(Mesh(V, F))
 
 
-@shape("smooth", held_out=True)
 def _trefoil() -> Mesh:
     """A tube around a knot, with rings closer together than the vertices on them."""
     t = 2 * np.pi * np.arange(300) / 300
@@ -490,7 +337,6 @@ def _trefoil() -> Mesh:
     return build.merged(Mesh(np.concatenate([V, V[:8]]), shapes.lattice_faces(301, 8, wrap_columns=True)))
 
 
-@shape("CAD", held_out=True)
 def _elbow() -> Mesh:
     """A pipe: two straight pieces of one ring each, and a bend of 24 rings between them."""
     bend = np.pi / 2 * np.linspace(0, 1, 24)
@@ -504,7 +350,6 @@ def _elbow() -> Mesh:
     return shapes.lattice_mesh(*np.moveaxis(rings, 2, 0), wrap_columns=True)
 
 
-@shape("CAD", held_out=True)
 def _drum() -> Mesh:
     """The hull of two circles in tilted planes: long triangles between two polygons that are fans."""
     flat = build.raised(build.ring(120))
@@ -512,7 +357,6 @@ def _drum() -> Mesh:
     return build.hull(np.concatenate([flat * 1.5, 0.6 * flat @ tilt + [0.4, 0.1, 3.0]]))
 
 
-@shape("scattered", held_out=True)
 def _sunflower() -> Mesh:
     """Seeds at the golden angle, denser towards the centre by the cube of the radius."""
     k = np.arange(1200) + 0.5
@@ -520,7 +364,6 @@ def _sunflower() -> Mesh:
     return build.planar(radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
-@shape("terrain", held_out=True)
 def _dunes() -> Mesh:
     """Waves on cells of 1 : 6 whose corners are moved."""
     mesh, rng = shapes.grid(36), seeded(31)
@@ -528,13 +371,6 @@ def _dunes() -> Mesh:
     return Mesh(np.stack([x, y, 0.08 * np.sin(25 * x + np.sin(2 * y))], axis=1), mesh.F)
 
 
-@shape("voxels", held_out=True)
-def _wandering_cells() -> Mesh:
-    """Cells that a random walk visits."""
-    return build.boxes(build.walk(seeded(32), 150))
-
-
-@shape("maze", held_out=True)
 def _fern() -> Mesh:
     """A stem of cells with leaves on both sides, which are two cells wide and one cell apart."""
     column, row = np.indices((36, 36))
@@ -542,15 +378,144 @@ def _fern() -> Mesh:
     return build.opened(is_leaf | (np.abs(column - 17.5) < 1))
 
 
-@shape("topology", held_out=True)
 def _crossed_sheets() -> Mesh:
     """Two rectangles through one another along a common edge path, each with its own spacing."""
     s, t = np.linspace(0, 1, 25)[:, None], np.linspace(-1, 1, 21) ** 3
     return build.merged(build.joined(shapes.lattice_mesh(s, t), shapes.lattice_mesh(s, 0.3 * t, t)))
 
 
-@shape("rough", held_out=True)
-def _folded_paper() -> Mesh:
-    """Miura's fold: parallelograms of two triangles, mountains and valleys."""
-    i, j = np.arange(25)[:, None], np.arange(25)
-    return shapes.lattice_mesh(i + 0.5 * (j % 2), 0.9 * j, 0.7 * (i % 2))
+# Family -> name -> mesh; a star marks those held out.
+_FAMILIES: dict[str, dict[str, Callable[[], Mesh]]] = {
+    "smooth": {
+        "sphere": lambda: shapes.icosphere(4),
+        "ellipsoid": lambda: _stretched(shapes.icosphere(4), [1, 1, 8]),
+        "torus": lambda: shapes.torus(30, 60),
+        "thin torus *": lambda: shapes.torus(12, 240, 0.05),
+        "bumpy sphere": lambda: _stretched(shapes.icosphere(4), _bumps(shapes.icosphere(4).V)),
+        "monkey saddle *": lambda: _heights(
+            shapes.disk(20), shapes.disk(20).V[:, 0] ** 3 - 3 * shapes.disk(20).V[:, 0] * shapes.disk(20).V[:, 1] ** 2
+        ),
+        "cone": lambda: shapes.cone(40, 30),
+        "regular grid": lambda: shapes.grid(40),
+        "long strip": lambda: shapes.strip(1500, 3),
+        "latitudes *": _latitudes,
+        "gyroid *": _gyroid,
+        "trefoil *": _trefoil,
+    },
+    "topology": {
+        "book": lambda: shapes.book(5, 12),
+        "moebius band": _moebius_band,
+        "klein bottle *": _klein_bottle,
+        "pinched": _pinched,
+        "crossed sheets *": _crossed_sheets,
+    },
+    "CAD": {
+        "capped cylinder 128": lambda: _capped(64),
+        "capped cylinder 512": lambda: _capped(256),
+        "box cube": lambda: build.boxes(np.zeros((1, 3), int)),
+        "box long": lambda: build.boxes(np.zeros((1, 3), int), np.array([1.0, 1.0, 30.0])),
+        "pill *": _pill,
+        "plate": lambda: _plate_with_holes(
+            np.array([[2, 1.6, 0.8], [2, 4.4, 0.8], [5, 3, 1.2], [8, 1.6, 0.8], [8, 4.4, 0.8]]), 96, 1
+        ),
+        "slotted plate *": _slotted_plate,
+        "needle fan": _needle_fan,
+        "gear *": _gear,
+        "stairs": _stairs,
+        # A cone whose rings come closer and closer to the tip, with 24 vertices each.
+        "wide funnel *": lambda: build.revolved(0.6 ** np.arange(20.0), 2 * 0.6 ** np.arange(20.0), 24),
+        "elbow *": _elbow,
+        "drum *": _drum,
+    },
+    "scattered": {
+        "scattered square 1000": lambda: _scattered(1000, 3),
+        "scattered square 100": lambda: _scattered(100, 4),
+        "sheared grid by 3": lambda: _stretched(shapes.grid(30), _shear(3.0)),
+        "sheared grid by 10": lambda: _stretched(shapes.grid(30), _shear(10.0)),
+        "stretched grid *": lambda: _stretched(shapes.grid(30), [40, 1, 1]),
+        "scattered disk *": _scattered_disk,
+        "clusters": _clusters,
+        "slivers at the rim": _slivers_at_the_rim,
+        # Edges from 1 to 1 / 1000 towards a corner.
+        "graded square *": lambda: shapes.lattice_mesh(np.linspace(0, 1, 41) ** 3, np.linspace(0, 1, 41)[:, None] ** 3),
+        "sunflower *": _sunflower,
+    },
+    "terrain": {
+        "noise 10 times": lambda: _heights(shapes.grid(30), 10 / 30 * seeded(10).random(31**2)),
+        "noise 100 times": lambda: _heights(shapes.grid(30), 100 / 30 * seeded(10).random(31**2)),
+        "height field 5000": lambda: _height_field(5000, 0.3, 8),
+        "height field coarse": lambda: _height_field(47, 0.5, 9),
+        "cliff": lambda: _heights(shapes.grid(40), 2.0 * (shapes.grid(40).V[:, 0] > 0.5)),
+        "fractal terrain *": _fractal_terrain,
+        # A folded sheet: 20 steep folds of a few triangles each.
+        "ridges *": lambda: shapes.lattice_mesh(
+            np.linspace(0, 1, 41)[:, None], np.linspace(0, 1, 11), 0.2 * (np.arange(41)[:, None] % 2)
+        ),
+        "dunes *": _dunes,
+    },
+    "hull": {
+        "hull of 12": lambda: build.hull(_on_sphere(12, 12)),
+        "hull of 35": lambda: build.hull(_on_sphere(35, 13)),
+        "hull of 100": lambda: build.hull(_on_sphere(100, 14)),
+        "hull of 400": lambda: build.hull(_on_sphere(400, 15)),
+        "flat hull *": lambda: build.hull(_on_sphere(150, 16) * [1, 1, 0.03]),
+        "hull of a cloud *": lambda: build.hull(seeded(17).standard_normal((300, 3))),
+    },
+    "voxels": {
+        "cube less one": lambda: _cells(2, lambda i: (i < 1).any(axis=0)),
+        # A lattice of square beams between 4 by 4 by 4 nodes, of genus 81.
+        "beams": lambda: _cells(7, lambda i: (i % 2 == 0).sum(axis=0) >= 2),
+        "voxel ball": lambda: _cells(15, lambda i: ((i - 7) ** 2).sum(axis=0) <= 42),
+        "sponge *": _sponge,
+        "voxel blob *": _voxel_blob,
+        # Cells that a random walk visits.
+        "wandering cells *": lambda: build.boxes(build.walk(seeded(32), 150)),
+    },
+    "rough": {
+        "spiky sphere": lambda: _stretched(
+            shapes.icosphere(3), np.where(seeded(20).random(642) < 0.05, 3.0, 1.0)[:, None]
+        ),
+        "noisy sphere": lambda: _noisy(shapes.icosphere(4), 0.05, 21),
+        "crumpled *": lambda: _noisy(shapes.disk(18), 0.04, 22),
+        "lantern 40 by 400": lambda: _lantern(40, 400),
+        "lantern 12 by 60": lambda: _lantern(12, 60),
+        "sphere with slivers": _sphere_with_slivers,
+        "dense pole *": _dense_pole,
+        # Miura's fold: parallelograms of two triangles, mountains and valleys.
+        "folded paper *": lambda: shapes.lattice_mesh(
+            np.arange(25)[:, None] + 0.5 * (np.arange(25) % 2), 0.9 * np.arange(25), 0.7 * (np.arange(25)[:, None] % 2)
+        ),
+    },
+    "components": {
+        **{f"two spheres 1 to {ratio}": partial(_spheres, float(ratio)) for ratio in (1, 10, 100)},
+        # A small torus beside a square of two triangles, a thousand times larger.
+        "part and plate *": lambda: build.joined(
+            shapes.torus(16, 32),
+            Mesh(np.array([[0, 0, -1], [1e3, 0, -1], [1e3, 1e3, -1], [0, 1e3, -1]]), [[0, 1, 2], [0, 2, 3]]),
+        ),
+        "dust": _dust,
+    },
+    "small": {
+        "triangle": lambda: Mesh([[0, 0, 0], [3, 0, 0], [0, 2, 0]], [[0, 1, 2]]),
+        "needle *": lambda: Mesh(
+            np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-4, 0], [0.5, -1e-4, 0]]), [[0, 1, 2], [1, 0, 3]]
+        ),
+        "tetrahedron": lambda: Mesh(
+            [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
+        ),
+        "octahedron *": lambda: build.hull(np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3]),
+    },
+    "maze": {
+        "maze": _maze,
+        "spiral": _spiral,
+        "labyrinth": _labyrinth,
+        "fern *": _fern,
+    },
+}
+
+SHAPES = [
+    Shape(name.removesuffix(" *"), family, make, name.endswith("*"))
+    for family, members in _FAMILIES.items()
+    for name, make in members.items()
+]
+"""All shapes, family after family."""
