@@ -532,7 +532,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: heat_igl.terrain([[0, 0, 0], [0, 0, np.inf], [0, 0, 0]]), r"heights\[1, 2\] is inf \(1 of 9"),
     # References.
     (lambda _: heat_igl.reference.exact(BOX, 0), r"closed_forms\.convex_solid"),
-    (lambda m: heat_igl.reference.exact(m, 0, solver="magic"), "'auto' or one of windows, pygeodesic, gdist, igl"),
+    (lambda m: heat_igl.reference.exact(m, 0, solver="magic"), "one of windows, pygeodesic, gdist, igl"),
     (lambda m: heat_igl.reference.measured("magic", m, 0), "'magic' is unknown"),
     (lambda _: heat_igl.validation.closed_forms.sphere(GRID, 0), "distance from the center varies"),
     (lambda m: heat_igl.validation.closed_forms.cylinder(m, 0), "distance from the z axis varies"),

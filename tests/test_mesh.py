@@ -287,8 +287,6 @@ def test_groups_hold_what_has_their_label(count):
     asked = np.array([7, 6, 6, 38])
     members, which = groups.of(asked)
     assert [members[which == i].tolist() for i in range(4)] == [np.flatnonzero(labels == v).tolist() for v in asked]
-    renamed = connectivity.group_by_label(labels, 40, 100 + np.arange(count))
-    assert np.array_equal(renamed.members, 100 + groups.members)
 
 
 def test_places_within_runs_and_the_next_in_each_run():

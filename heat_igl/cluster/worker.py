@@ -14,7 +14,6 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -50,6 +49,7 @@ _BYTES_PER_FACE = 500
 _BYTES_PER_WRITTEN_VALUE = 8
 
 TOPIC = "heat-igl-batch"
+_VERSIONS = {"heat_igl": heat_igl.__version__} | {name: version(name) for name in ("libigl", "numpy", "scipy")}
 
 
 def solver_memory(mesh: Mesh | PointCloud, method: DistanceMethod) -> int:
@@ -232,7 +232,7 @@ def _begin(task: Task, store: Store) -> Outcome:
         identity = {"fingerprint": fingerprint, **_described(solver)}
         found = _continued(name, store, known, identity)
         if found is None:
-            sets, facts = _source_sets(task.plan, mesh, solver), {"mesh": task.item.label, "versions": _versions()}
+            sets, facts = _source_sets(task.plan, mesh, solver), {"mesh": task.item.label, "versions": _VERSIONS}
             facts |= {**identity, "report": plain(asdict(mesh.report()))}
             found = store.begin(name, sets, mesh.n_vertices, task.dtype, facts), sets
         group, source_sets = found
@@ -281,11 +281,6 @@ def _fingerprint(mesh: Mesh | PointCloud) -> str:
     digest.update(mesh.V.data)
     digest.update(mesh.F.data)
     return digest.hexdigest()
-
-
-@cache
-def _versions() -> dict[str, str]:
-    return {"heat_igl": heat_igl.__version__} | {name: version(name) for name in ("libigl", "numpy", "scipy")}
 
 
 def _described(solver: Solver) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from heat_igl.heat.curve_sides import (
 )
 from heat_igl.heat.parts import SolverOptions, SolverParts, prepare
 from heat_igl.heat.solver import HeatMethodSolver
-from heat_igl.heat.steps import VectorHeatFlow
+from heat_igl.heat.steps import VectorHeatFlow, unit_numbers
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged, lay_out, oriented
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, one_sided
@@ -355,7 +355,7 @@ class NormalIntegration:
         size = reduce(np.maximum, (at_vertices[corner] for corner in self._triangulation.F.T))
         scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > LOWEST_HEAT)
         turned = zip(self._to_triangles.T, self._triangulation.F.T, strict=True)
-        X = _unit(reduce(np.add, (rotation * (scale * Y[corner]) for rotation, corner in turned)))
+        X = unit_numbers(reduce(np.add, (rotation * (scale * Y[corner]) for rotation, corner in turned)))
         # Step 3: L phi = D X.
         return self._poisson.solve(self._D @ np.concatenate([X.real, X.imag]))
 
@@ -382,7 +382,7 @@ class NormalIntegration:
             np.concatenate([chosen.faces, chosen.point_faces]),
             np.concatenate([(chosen.start + chosen.end) / 2, chosen.point_barycentric]),
             # To the right of a segment is its direction turned by -90 degrees.
-            np.concatenate([-1j * _unit(along), _unit(normal)]),
+            np.concatenate([-1j * unit_numbers(along), unit_numbers(normal)]),
             np.concatenate([length, np.full(len(normal), self._domain.mean_edge_length)]),
             np.concatenate([chosen.label, chosen.point_label]),
             np.arange(len(chosen.faces) + len(normal)) >= len(chosen.faces),
@@ -510,12 +510,6 @@ class Pieces:
     def mean(self, values: FloatArray) -> FloatArray:
         """Mean (n_components,) of values (q,) on each component; 0 without pieces."""
         return _ratio(self.total(values), self.length)
-
-
-def _unit(numbers: AnyArray) -> AnyArray:
-    """Complex numbers divided by their size; 0 stays."""
-    size = np.abs(numbers)
-    return np.divide(numbers, size, out=np.zeros_like(numbers), where=size > 0)
 
 
 def _ratio(above: FloatArray, below: FloatArray) -> FloatArray:

@@ -573,6 +573,12 @@ class VectorHeatFlow:
         return np.ascontiguousarray(Y.reshape(2 * self._n, -1).T).view(np.complex128).T.reshape(b.shape)
 
 
+def unit_numbers(Y: AnyArray) -> AnyArray:
+    """Complex numbers divided by their size; 0 where that is too small for a direction."""
+    size = np.abs(Y)
+    return np.divide(Y, size, out=np.zeros_like(Y), where=size > LOWEST_HEAT)
+
+
 def _real(A: sp.csc_matrix) -> sp.csc_matrix:
     """A Hermitian matrix (n, n) as a real symmetric one (2 n, 2 n), with the block [[a, -b], [b, a]] for a + i b."""
     rows = A.tocsr()

@@ -17,7 +17,7 @@ from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guess
 from heat_igl.heat.checking import naming_thinnest
 from heat_igl.heat.parts import SolverOptions, prepare
 from heat_igl.heat.solver import HeatMethodSolver
-from heat_igl.heat.steps import VectorHeatFlow
+from heat_igl.heat.steps import VectorHeatFlow, unit_numbers
 from heat_igl.intrinsic import (
     PolarAngles,
     TangentFrames,
@@ -373,8 +373,8 @@ class HeatTransport:
         largest = np.abs(outward).max(initial=0.0)
         np.add.at(b[:, 0], at, SOURCE_HEAT * (outward / largest if largest > 0 else outward))
         b[vertex, 1] = SOURCE_HEAT
-        radial, axis = (_unit(Y) for Y in self._vector_flow.solve(b).T)
-        direction = self._outward.to_polar(vertex, _unit(radial * axis.conj()))
+        radial, axis = (unit_numbers(Y) for Y in self._vector_flow.solve(b).T)
+        direction = self._outward.to_polar(vertex, unit_numbers(radial * axis.conj()))
         neighbour, exact = self._outward.ring(vertex)
         direction[neighbour] = np.exp(1j * exact)
         distance = self._solver.distance(vertex)
@@ -391,13 +391,7 @@ class HeatTransport:
         size = np.abs(Y)
         # The diagonal is in every row, so that none is empty.
         nearby = np.maximum.reduceat(size[self._pattern.indices], self._pattern.indptr[:-1])
-        return _unit(np.where(size > _CANCELLED * nearby, Y, 0.0))
-
-
-def _unit(Y: AnyArray) -> AnyArray:
-    """Complex numbers divided by their size; 0 where that is too small for a direction."""
-    size = np.abs(Y)
-    return np.divide(Y, size, out=np.zeros_like(Y), where=size > LOWEST_HEAT)
+        return unit_numbers(np.where(size > _CANCELLED * nearby, Y, 0.0))
 
 
 class OutwardField:

@@ -42,11 +42,10 @@ class Groups(NamedTuple):
         return self.members[first[which] + within], which
 
 
-def group_by_label(labels: IntArray, n: int, elements: IntArray | None = None) -> Groups:
-    """Elements (k,), by default 0 to k - 1, by their labels (k,) in ``range(n)``: linear time, equal ones in order."""
-    elements = np.arange(len(labels)) if elements is None else elements
+def group_by_label(labels: IntArray, n: int) -> Groups:
+    """Elements 0 to k - 1 by their labels (k,) in ``range(n)``: linear time, equal ones in order."""
     # scipy converts a row to columns by counting.
-    by_label = sp.csr_array((elements, labels, [0, len(labels)]), shape=(1, n)).tocsc()
+    by_label = sp.csr_array((np.arange(len(labels)), labels, [0, len(labels)]), shape=(1, n)).tocsc()
     return Groups(by_label.indptr.astype(np.int64), by_label.data)
 
 

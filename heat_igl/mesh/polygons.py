@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+import igl
 import numpy as np
 
 from heat_igl.errors import MeshError, shown
@@ -308,12 +309,7 @@ def _pieces(
 
 def _barycentric(mesh: Mesh, faces: IntArray, X: FloatArray) -> FloatArray:
     """Coordinates (k, 3) in `faces` of the points below or above X (k, 3)."""
-    a, b, c = (mesh.V[mesh.F[faces, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    doubled = np.stack([np.cross(c - b, X - b), np.cross(a - c, X - c), np.cross(b - a, X - a)], axis=1)
-    squared = np.einsum("kx,kx->k", normal, normal)
-    parts = np.einsum("kcx,kx->kc", doubled, normal)
-    return np.asarray(np.divide(parts, squared[:, None], out=np.full_like(parts, -1.0), where=squared[:, None] > 0))
+    return np.asarray(igl.barycentric_coordinates(X, *(mesh.V[mesh.F[faces, i]] for i in range(3))))
 
 
 def _inside(barycentric: FloatArray) -> FloatArray:

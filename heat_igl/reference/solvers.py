@@ -106,7 +106,7 @@ def measured(
     Parameters
     ----------
     solver : str
-        "exact" or "windows" for the windows of this package, one of `EXACT_SOLVERS`, or the name of another function of
+        "windows" for the windows of this package, one of `EXACT_SOLVERS`, or the name of another function of
         `heat_igl.reference`: "meshlab", "meshlab_border", "meshlab_heat", "igl_heat", "potpourri3d_heat".
     mesh, sources
         As for `exact`.
@@ -126,11 +126,9 @@ def measured(
         As for `exact`.
     """
     mesh = as_simplices(mesh)
-    if solver == "exact":
-        solver = WINDOWS
     chosen = _SOLVERS.get(solver)
     if chosen is None and solver != WINDOWS:
-        names = ", ".join(("exact", WINDOWS, *_SOLVERS))
+        names = ", ".join((WINDOWS, *_SOLVERS))
         raise ReferenceSolverError(f"solver {solver!r} is unknown: choose one of {names}")
     if mesh.is_tetrahedral:
         raise ReferenceSolverError(
@@ -243,7 +241,7 @@ def exact(
     sources : int, sequence of int, or (n,) mask of bool
         Source vertices; the distance is that to the nearest of them.
     solver : {"windows", "pygeodesic", "gdist", "igl"}
-        The windows of this package (``"auto"`` means them too), or for a second opinion one of `EXACT_SOLVERS`. Those
+        The windows of this package, or for a second opinion one of `EXACT_SOLVERS`. Those
         three are one implementation of Mitchell, Mount and Papadimitriou (1987) by Kirsanov and agree to rounding;
         libigl's traces a path from every vertex and takes the length, which makes it slow, and a check of the others.
         They need components of the sources that are manifold.
@@ -268,11 +266,9 @@ def exact(
     MissingExtraError
         If the chosen solver is not installed.
     """
-    if solver == "auto":
-        solver = WINDOWS
-    elif solver not in (WINDOWS, *EXACT_SOLVERS):
+    if solver not in (WINDOWS, *EXACT_SOLVERS):
         names = ", ".join((WINDOWS, *EXACT_SOLVERS))
-        raise ReferenceSolverError(f"solver must be 'auto' or one of {names}, not {solver!r}")
+        raise ReferenceSolverError(f"solver must be one of {names}, not {solver!r}")
     return measured(solver, mesh, sources, timeout=timeout, memory=memory).distance
 
 

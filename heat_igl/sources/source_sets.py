@@ -140,7 +140,12 @@ class OffsetSources:
         return f"OffsetSources({np.size(self.offsets)} offsets)"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "offsets", _checked_offsets(self.offsets))
+        offsets = real_numbers("offsets", self.offsets, SourceError)
+        if offsets.ndim > 1:
+            raise SourceError(f"offsets must be one number or one for each source, not of shape {offsets.shape}")
+        wrong = ~(np.isfinite(offsets) & (offsets >= 0))
+        raise_at_first(wrong, "offsets", offsets, "must be finite and not negative", error=SourceError)
+        object.__setattr__(self, "offsets", offsets)
 
 
 _PLACES = (SurfacePoints, SurfaceCurve, OffsetSources)
@@ -261,15 +266,6 @@ def are_positions(places: object) -> bool:
     except ValueError:
         return False
     return array.dtype.kind == "f" and array.ndim in (1, 2) and array.shape[-1] == 3
-
-
-def _checked_offsets(offsets: ArrayLike) -> FloatArray:
-    array = real_numbers("offsets", offsets, SourceError)
-    if array.ndim > 1:
-        raise SourceError(f"offsets must be one number or one for each source, not of shape {array.shape}")
-    wrong = ~(np.isfinite(array) & (array >= 0))
-    raise_at_first(wrong, "offsets", array, "must be finite and not negative", error=SourceError)
-    return array
 
 
 def _holds_places(sources: object) -> TypeGuard[Sequence[Any]]:

@@ -43,7 +43,7 @@ _NATIVE = {
     "meshlab_heat": "meshlab_heat",
     "igl": "igl_heat",
     "potpourri3d": "potpourri3d_heat",
-    "exact": "exact",
+    "exact": "windows",
 }
 #: The names of methods that `validate` takes.
 METHODS = (*_OWN, *_NATIVE)
@@ -136,7 +136,7 @@ def _run_native(
         begun(label, i)
         results.append(reference.measured(solver, mesh, sources, **bounds))
     return np.stack([result.distance for result in results]), {
-        "parameters": {"solver": "windows" if solver == "exact" else solver},
+        "parameters": {"solver": solver},
         "precompute_seconds": float(np.median([result.precompute_seconds for result in results])),
         "solve_seconds": float(np.median([result.solve_seconds for result in results])),
         "peak_memory": max((result.peak_memory for result in results if result.peak_memory is not None), default=None),
