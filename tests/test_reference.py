@@ -349,7 +349,7 @@ def test_arrays_cross_without_a_copy():
     with PeakMemory() as peak:
         reply = guarded.call("numpy:sum", {"a": big})
     assert peak.bytes < big.nbytes / 8
-    # What the child holds of it is the file that the caller wrote, mapped.
+    # The child holds it once.
     assert reply.peak_memory < 1.125 * big.nbytes
 
 

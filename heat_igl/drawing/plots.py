@@ -104,7 +104,7 @@ def plot(
     MissingExtraError
         If matplotlib is not installed.
     """
-    mesh = _drawn(mesh)
+    mesh = as_mesh(mesh)
     require_choice("style", style, get_args(Style))
     seen = scene(mesh, distance, sources=sources, spacing=spacing, view=view, up=up)
     return lay_out(seen, seen.placed(curves, mesh), style, colours(colormap), label, "unreachable")
@@ -152,7 +152,7 @@ def plot_field(
     ValueError, SourceError, MissingExtraError
         As for `plot`.
     """
-    mesh = _drawn(mesh)
+    mesh = as_mesh(mesh)
     if limits is None:
         limits = _limits(values)
     has_signs = limits is not None and limits[0] < 0 < limits[1]
@@ -203,7 +203,7 @@ def plot_labels(
     There are ten colours of different hue. In ascending order, each label gets the first colour that no neighbouring
     label has, or if all ten are taken, the next one in turn.
     """
-    mesh = _drawn(mesh)
+    mesh = as_mesh(mesh)
     given = as_array("labels", labels)
     if given.dtype.kind not in "iu":
         raise ValueError(f"labels must be integers, not {given.dtype}")
@@ -266,12 +266,6 @@ def _limits(values: ArrayLike) -> tuple[float, float] | None:
         return None
     reach = float(np.abs(finite).max())
     return -reach, reach
-
-
-def _drawn(mesh: MeshLike) -> Mesh | PointCloud:
-    """What is drawn: triangles or tetrahedra, or the points of a cloud."""
-    found = as_mesh(mesh)
-    return found if isinstance(found, PointCloud) else as_simplices(found)
 
 
 def write_line_drawing(

@@ -10,7 +10,7 @@ import numpy as np
 
 from heat_igl.drawing.raster import default_rotation, rotation
 from heat_igl.errors import MissingExtraError, real_numbers
-from heat_igl.mesh import Mesh, MeshLike, NestedCurves, PointCloud, as_simplices, flat_curves
+from heat_igl.mesh import Mesh, MeshLike, NestedCurves, PointCloud, PolygonMesh, as_simplices, flat_curves
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -71,7 +71,7 @@ class Scene:
 
 
 def scene(
-    mesh: Mesh | PointCloud,
+    mesh: Mesh | PolygonMesh | PointCloud,
     values: ArrayLike,
     *,
     name: str = "distance",
@@ -102,6 +102,7 @@ def scene(
 
     if isinstance(mesh, PointCloud):
         mesh, checked = discs(mesh, checked, is_categorical)
+    mesh = as_simplices(mesh)
     F = mesh.facets.vertices[mesh.facets.n_faces == 1] if mesh.is_tetrahedral else mesh.F
     used = np.unique(F)
     centre = (mesh.V[used].min(axis=0) + mesh.V[used].max(axis=0)) / 2

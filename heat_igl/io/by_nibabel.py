@@ -106,8 +106,7 @@ def write_maps(path: Path, maps: dict[str, FloatArray]) -> None:
     """Write maps (n,), to GIFTI as shapes; to CIFTI as scalars, under the names that `read_maps` gives them."""
     nibabel = _nibabel("writing")
     if form_suffix(path) == ".gii":
-        arrays: list[tuple[str, AnyArray, dict[str, str]]] = []
-        path.write_bytes(_gifti_image(nibabel, arrays, maps).to_bytes())
+        path.write_bytes(_gifti_image(nibabel, {}, maps))
         return
     surfaces: dict[str, dict[str, FloatArray]] = {}
     for full, values in maps.items():
@@ -132,13 +131,12 @@ def write_maps(path: Path, maps: dict[str, FloatArray]) -> None:
     path.write_bytes(image.to_bytes())
 
 
-def _gifti_image(nibabel: Any, arrays: list[tuple[str, AnyArray, dict[str, str]]], maps: dict[str, FloatArray]) -> Any:
-    arrays += [("SHAPE", values.astype("<f4"), {"Name": name}) for name, values in maps.items()]
-    return nibabel.GiftiImage(
-        darrays=[
-            nibabel.gifti.GiftiDataArray(values, f"NIFTI_INTENT_{intent}", meta=meta) for intent, values, meta in arrays
-        ]
-    )
+def _gifti_image(nibabel: Any, surface: dict[str, AnyArray], maps: dict[str, FloatArray]) -> bytes:
+    """A file of arrays by what they are meant for, and of maps by name."""
+    array = nibabel.gifti.GiftiDataArray
+    arrays = [array(values, f"NIFTI_INTENT_{intent}", meta={}) for intent, values in surface.items()]
+    arrays += [array(x.astype("<f4"), "NIFTI_INTENT_SHAPE", meta={"Name": name}) for name, x in maps.items()]
+    return bytes(nibabel.GiftiImage(darrays=arrays).to_bytes())
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
@@ -151,8 +149,5 @@ def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:
     wide = [name for name, values in attributes.items() if values.ndim > 1]
     if wide:
         raise MeshError(f"GIFTI holds one number per vertex, and {wide[0]} has several: write them apart")
-    arrays: list[tuple[str, AnyArray, dict[str, str]]] = [
-        ("POINTSET", mesh.V.astype("<f4"), {}),
-        ("TRIANGLE", mesh.F.astype("<i4"), {}),
-    ]
-    path.write_bytes(_gifti_image(nibabel, arrays, attributes).to_bytes())
+    surface = {"POINTSET": mesh.V.astype("<f4"), "TRIANGLE": mesh.F.astype("<i4")}
+    path.write_bytes(_gifti_image(nibabel, surface, attributes))

@@ -1,7 +1,7 @@
 """Calls in a child process: it may crash, hang or run out of memory without harm to the caller.
 
-Each call has a Python process of its own, which takes .1 s to start. The request and the reply are JSON in a temporary
-folder, and arrays ``.npy`` files beside them that the child maps into memory: written once, never pickled.
+Each call has a Python process of its own, which takes .1 s to start. The request and the reply are files in a temporary
+folder.
 
 A child started with `multiprocessing` would import the caller's main script again and, on some systems, inherit the
 threads and locks; a plain Python process does neither.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import json
+import pickle
 import signal
 import subprocess
 import sys
@@ -19,8 +19,6 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from heat_igl.errors import ReferenceSolverError
 from heat_igl.runtime import PeakMemory
@@ -32,7 +30,7 @@ MEMORY = 8 * 2**30
 
 # The longest time, in seconds, that both the system's alarm and a wait of Python take.
 _LONGEST = 2.0**20
-# More bytes than any address space has, in place of infinity, which JSON does not have.
+# More bytes than any address space has, in place of infinity, which is no integer.
 _NO_BOUND = 2.0**62
 # Seconds that a child outlives the timeout if the caller was killed.
 _GRACE = 5.0
@@ -58,29 +56,26 @@ def call(
 ) -> Reply:
     """Call a function in a child process, and wait until it returns.
 
-    `function` is ``"module:name"``, imported in the child. It is called with all arrays (read-only) and parameters,
-    values that JSON can carry, as keyword arguments, and returns a mapping of names to arrays or such values. `library`
-    is a module that is imported before memory is measured. The child is killed after `timeout` seconds. Its address
-    space may grow by `memory` bytes during the call: held on Linux; other systems have no bound that a process can set
-    for itself.
+    `function` is ``"module:name"``, imported in the child. It is called with all arrays and parameters as keyword
+    arguments, and returns a mapping of names to values. `library` is a module that is imported before memory is
+    measured. The child is killed after `timeout` seconds. Its address space may grow by `memory` bytes during the call:
+    held on Linux; other systems have no bound that a process can set for itself.
 
     A ReferenceSolverError if the function raised, if the child died, or if the time is over.
     """
     with tempfile.TemporaryDirectory(prefix="heat_igl_") as name:
         folder = Path(name)
-        for key, array in arrays.items():
-            np.save(folder / f"{key}.npy", array, allow_pickle=False)
-        bounds = {"memory": int(min(memory, _NO_BOUND)), "timeout": min(timeout, _LONGEST)}
-        request = {"function": function, "arrays": list(arrays), "parameters": dict(parameters or {}), **bounds}
-        request["library"] = library
-        (folder / "request.json").write_text(json.dumps(request))
+        seconds = min(timeout, _LONGEST)
+        request = function, {**arrays, **(parameters or {})}, library, seconds, int(min(memory, _NO_BOUND))
+        with (folder / "request").open("wb") as file:  # in which arrays are not copied first
+            pickle.dump(request, file, protocol=5)
         try:
             done = subprocess.run(
                 [sys.executable, "-c", _START, name, *sys.path],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
-                timeout=bounds["timeout"],
+                timeout=seconds,
                 check=False,
             )
         except subprocess.TimeoutExpired:
@@ -92,7 +87,7 @@ def call(
                 f"no child process could be started with sys.executable = {sys.executable!r} ({error}): set it to "
                 "a Python interpreter"
             ) from error
-        answered = folder / "reply.json"
+        answered = folder / "reply"
         if done.returncode or not answered.exists():
             lines = done.stdout.decode(errors="replace").strip().splitlines()
             said = f" ({lines[-1].strip()[:200]})" if lines else ""
@@ -100,11 +95,10 @@ def call(
                 f"{function} died with {_status_name(done.returncode)}{said}: look for defects with mesh.report(), "
                 f"or raise memory (now {memory / 2**30:.3g} GiB)"
             )
-        reply = json.loads(answered.read_text())
-        if "error" in reply:
-            raise ReferenceSolverError(_explained(function, reply["error"], memory))
-        found = {key: np.load(folder / f"result_{key}.npy") for key in reply["arrays"]}
-        return Reply({**reply["values"], **found}, reply["peak_memory"])
+        reply = pickle.loads(answered.read_bytes())
+        if not isinstance(reply, Reply):
+            raise ReferenceSolverError(_explained(function, memory, *reply))
+        return reply
 
 
 def _status_name(status: int) -> str:
@@ -114,38 +108,33 @@ def _status_name(status: int) -> str:
     return f"exit status {status:#x}" if abs(status) > 255 else f"exit status {status}"
 
 
-def _explained(function: str, error: Mapping[str, str], memory: float) -> str:
-    if error["kind"] == "MemoryError":
+def _explained(function: str, memory: float, kind: str, text: str) -> str:
+    if kind == "MemoryError":
         return f"{function} needs more than {memory / 2**30:.3g} GiB: raise memory, or use a smaller mesh"
-    if error["kind"] in ("ImportError", "ModuleNotFoundError"):
-        return f"{function} cannot be loaded: {error['text']}; install what the message names"
-    return f"{function} failed with {error['kind']}: {error['text']}"
+    if kind in ("ImportError", "ModuleNotFoundError"):
+        return f"{function} cannot be loaded: {text}; install what the message names"
+    return f"{function} failed with {kind}: {text}"
 
 
 def answer(name: str) -> None:
     """In the child: call the function of the request in a folder, and write the reply, or the error, beside it."""
     folder = Path(name)
-    request = json.loads((folder / "request.json").read_text())
+    called, arguments, library, seconds, memory = pickle.loads((folder / "request").read_bytes())
     if hasattr(signal, "alarm"):
         # If the caller was killed. A thread could not end the child, since a native function may hold the interpreter.
-        signal.alarm(int(min(request["timeout"] + _GRACE, _LONGEST)))
-    module, function = request["function"].split(":")
-    _bound_memory(request["memory"])
+        signal.alarm(int(min(seconds + _GRACE, _LONGEST)))
+    module, function = called.split(":")
+    _bound_memory(memory)
     try:
-        arrays = {key: np.load(folder / f"{key}.npy", mmap_mode="r").view(np.ndarray) for key in request["arrays"]}
-        called = getattr(importlib.import_module(module), function)
-        if request["library"]:
-            importlib.import_module(request["library"])
+        call_it = getattr(importlib.import_module(module), function)
+        if library:
+            importlib.import_module(library)
         with PeakMemory() as peak:
-            result = called(**arrays, **request["parameters"])
-        values = dict(result) if isinstance(result, Mapping) else {}
-        saved = [key for key, value in values.items() if isinstance(value, np.ndarray)]
-        for key in saved:
-            np.save(folder / f"result_{key}.npy", values.pop(key), allow_pickle=False)
-        reply: dict[str, Any] = {"values": values, "arrays": saved, "peak_memory": peak.bytes}
+            result = call_it(**arguments)
+        reply: Any = Reply(dict(result) if isinstance(result, Mapping) else {}, peak.bytes)
     except Exception as error:  # whatever a native library raises belongs to the caller
-        reply = {"error": {"kind": type(error).__name__, "text": " ".join(str(error).split())[:500]}}
-    (folder / "reply.json").write_text(json.dumps(reply))
+        reply = type(error).__name__, " ".join(str(error).split())[:500]
+    (folder / "reply").write_bytes(pickle.dumps(reply))
 
 
 def _bound_memory(extra: int) -> None:
