@@ -6,7 +6,7 @@ No default may be tuned on single members, and a change is measured over many se
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
+from functools import partial
 from zlib import crc32
 
 import igl
@@ -19,23 +19,6 @@ from heat_igl.validation.construction import Generator
 from heat_igl.validation.shapes import grid, icosphere, lattice_mesh
 
 __all__ = ["FAMILIES"]
-
-FAMILIES: dict[str, Callable[[int], Mesh]] = {}
-"""All families by name: seed -> mesh, the same bits at every call."""
-
-
-def family(name: str) -> Callable[[Callable[[Generator], Mesh]], Callable[[int], Mesh]]:
-    """Register a function of a random generator as a family, and turn it into a function of a seed."""
-
-    def register(make: Callable[[Generator], Mesh]) -> Callable[[int], Mesh]:
-        @wraps(make)
-        def member(seed: int) -> Mesh:
-            return make(np.random.default_rng([20261123, crc32(name.encode()), seed]))
-
-        FAMILIES[name] = member
-        return member
-
-    return register
 
 
 def _bounded(outline: FloatArray, points: FloatArray) -> BoolArray:
@@ -80,7 +63,6 @@ def _band(middle: FloatArray, across: FloatArray, rows: int) -> Mesh:
     return lattice_mesh(*np.moveaxis(V, 2, 0))
 
 
-@family("random tetrahedra")
 def tetrahedra_surface(rng: Generator) -> Mesh:
     """The boundary of the Delaunay tetrahedra between random points: of a half of them that hang together."""
     points = rng.random((int(rng.integers(100, 700)), 3))
@@ -89,7 +71,6 @@ def tetrahedra_surface(rng: Generator) -> Mesh:
     return _tetrahedra_surface(points, T[np.linalg.norm(middle - 0.5, axis=1) < rng.uniform(0.3, 0.6)])
 
 
-@family("alpha shape")
 def alpha_shape(rng: Generator) -> Mesh:
     """The boundary of the Delaunay tetrahedra with small circumspheres between points on a bent body."""
     n = int(rng.integers(200, 700))
@@ -102,7 +83,6 @@ def alpha_shape(rng: Generator) -> Mesh:
     return _tetrahedra_surface(points, T[radius < np.quantile(radius, rng.uniform(0.5, 0.9))])
 
 
-@family("star polygon")
 def star_polygon(rng: Generator) -> Mesh:
     """A flat star with long thin points, its outline alone or with some vertices inside."""
     tips = int(rng.integers(5, 60))
@@ -115,7 +95,6 @@ def star_polygon(rng: Generator) -> Mesh:
     return build.compact(build.raised(points), F)
 
 
-@family("helix")
 def helix(rng: Generator) -> Mesh:
     """A tube along a helix, with rings closer together than the vertices on them or farther apart."""
     turns, n = rng.uniform(2, 8), int(rng.integers(60, 400))
@@ -124,7 +103,6 @@ def helix(rng: Generator) -> Mesh:
     return build.tube(centre, np.gradient(centre, axis=0), rng.uniform(0.05, 0.25), int(rng.integers(3, 10)))
 
 
-@family("spiral ramp")
 def spiral_ramp(rng: Generator) -> Mesh:
     """A ramp around an axis, flat across: a strip that winds over itself."""
     n, t = int(rng.integers(60, 400)), np.linspace(0, 2 * np.pi * rng.uniform(1, 6), 1000)
@@ -134,28 +112,24 @@ def spiral_ramp(rng: Generator) -> Mesh:
     return _band(middle, rng.uniform(0.2, 1.5) * out, int(rng.integers(2, 10)))
 
 
-@family("maze")
 def maze(rng: Generator) -> Mesh:
     """The corridors of a random tree on cells, each corridor one cell wide, walls one cell wide."""
     size, fine = int(rng.integers(4, 9)), int(rng.integers(1, 4))
     return build.opened(np.kron(build.corridors(rng, size), np.ones((fine, fine), bool)))
 
 
-@family("CAD plate")
 def cad_plate(rng: Generator) -> Mesh:
     """A flat plate with round holes, vertices on the rims and few elsewhere."""
     points, F = _holed_rectangle(rng, int(rng.integers(12, 96)), int(rng.integers(0, 60)))
     return build.compact(build.raised(points), F)
 
 
-@family("thin plate")
 def thin_plate(rng: Generator) -> Mesh:
     """The same as a body: two sheets a small thickness apart, joined along the rims."""
     points, F = _holed_rectangle(rng, int(rng.integers(8, 40)), int(rng.integers(0, 60)))
     return build.extruded(points, F, 10 ** rng.uniform(-2.5, -0.3))
 
 
-@family("CAD cylinder")
 def cad_cylinder(rng: Generator) -> Mesh:
     """Few rings of many sides, capped by fans around one of their own vertices or left open."""
     around, rings = int(rng.integers(24, 600)), int(rng.integers(2, 5))
@@ -166,7 +140,6 @@ def cad_cylinder(rng: Generator) -> Mesh:
     return Mesh(side.V, np.concatenate([side.F, build.caps(rings, around)]))
 
 
-@family("shell")
 def shell(rng: Generator) -> Mesh:
     """A cap of a sphere with a thickness: an outer and an inner sheet joined along a rim."""
     n, thickness = int(rng.integers(150, 900)), 10 ** rng.uniform(-2, -0.5)
@@ -179,7 +152,6 @@ def shell(rng: Generator) -> Mesh:
     return build.compact(V, np.concatenate([F, F[:, ::-1] + n, build.walls(F, n)]))
 
 
-@family("carved voxels")
 def carved_voxels(rng: Generator) -> Mesh:
     """A block of cells out of which random boxes were cut, without cells that touch in edges or corners alone."""
     where = np.ones(tuple(rng.integers(5, 12, 3)), bool)
@@ -190,7 +162,6 @@ def carved_voxels(rng: Generator) -> Mesh:
     return build.boxes(np.argwhere(where) if where.any() else np.zeros((1, 3), np.int64), rng.uniform(0.3, 1.0, 3))
 
 
-@family("nested circles")
 def nested_circles(rng: Generator) -> Mesh:
     """The Delaunay triangles of circles inside one another, with as many vertices on each, and holes or none."""
     n, around = int(rng.integers(2, 9)), int(rng.integers(16, 160))
@@ -198,7 +169,6 @@ def nested_circles(rng: Generator) -> Mesh:
     return build.planar(np.concatenate([r * build.ring(around) + 0.05 * r * rng.uniform(-1, 1, 2) for r in radius]))
 
 
-@family("spiky sphere")
 def spiky_sphere(rng: Generator) -> Mesh:
     """A sphere of which some vertices stand out far."""
     mesh = icosphere(int(rng.integers(2, 5)))
@@ -206,7 +176,6 @@ def spiky_sphere(rng: Generator) -> Mesh:
     return Mesh(mesh.V * np.where(is_spike, rng.uniform(1.2, 4), 1.0)[:, None], mesh.F)
 
 
-@family("ribbon")
 def ribbon(rng: Generator) -> Mesh:
     """A twisted band of two to four rows."""
     n = int(rng.integers(50, 700))
@@ -218,7 +187,6 @@ def ribbon(rng: Generator) -> Mesh:
     return _band(middle, across, int(rng.integers(2, 5)))
 
 
-@family("tube of few sides")
 def tube_of_few_sides(rng: Generator) -> Mesh:
     """A long tube of three to eight sides along a random smooth curve."""
     n = int(rng.integers(50, 400))
@@ -228,7 +196,6 @@ def tube_of_few_sides(rng: Generator) -> Mesh:
     return build.tube(centre, np.gradient(centre, axis=0), 0.2 + 0.3 * a[3], int(rng.integers(3, 9)))
 
 
-@family("vase")
 def vase(rng: Generator) -> Mesh:
     """A surface of revolution with a random profile of necks and bellies, on long or flat cells."""
     rings, around = int(rng.integers(8, 80)), int(rng.integers(6, 100))
@@ -240,7 +207,6 @@ def vase(rng: Generator) -> Mesh:
     return build.merged(build.revolved(radius, z, around))
 
 
-@family("terrain")
 def terrain(rng: Generator) -> Mesh:
     """Heights with a spectrum of random steepness over a grid or scattered points."""
     n = int(rng.integers(12, 45))
@@ -251,14 +217,12 @@ def terrain(rng: Generator) -> Mesh:
     return Mesh(mesh.V + build.raised(np.zeros((n * n, 2)), height.ravel()), mesh.F)
 
 
-@family("handles")
 def handles(rng: Generator) -> Mesh:
     """The boundary of a random walk through cells, thickened here and there: a surface with many handles."""
     nodes = 2 * build.walk(rng, int(rng.integers(10, 60)))
     return build.boxes(np.concatenate([nodes, (nodes[1:] + nodes[:-1]) // 2]))
 
 
-@family("hull")
 def flat_hull(rng: Generator) -> Mesh:
     """The convex hull of points in a flat or long ellipsoid, in it or on it."""
     points = rng.standard_normal((int(rng.integers(20, 800)), 3))
@@ -267,7 +231,6 @@ def flat_hull(rng: Generator) -> Mesh:
     return build.hull(points * 10 ** rng.uniform(-1, 0, 3))
 
 
-@family("clusters")
 def clusters(rng: Generator) -> Mesh:
     """Points of a plane in clusters of very different size."""
     parts = [rng.random((int(rng.integers(20, 200)), 2))]
@@ -277,7 +240,6 @@ def clusters(rng: Generator) -> Mesh:
     return build.compact(build.raised(points), build.delaunay(points))
 
 
-@family("stretched noise")
 def stretched_noise(rng: Generator) -> Mesh:
     """A noisy sphere, stretched along the axes."""
     mesh = icosphere(int(rng.integers(2, 5)))
@@ -285,7 +247,6 @@ def stretched_noise(rng: Generator) -> Mesh:
     return Mesh(V * 10 ** rng.uniform(-1, 0.3, 3), mesh.F)
 
 
-@family("extrusion")
 def extrusion(rng: Generator) -> Mesh:
     """A random polygon with a height and nothing but its outline on the two lids, a gear for instance."""
     n = int(rng.integers(12, 200))
@@ -293,7 +254,6 @@ def extrusion(rng: Generator) -> Mesh:
     return build.extruded(*_filled(radius[:, None] * build.ring(n), np.empty((0, 2))), rng.uniform(0.02, 3))
 
 
-@family("comb")
 def comb(rng: Generator) -> Mesh:
     """A beam with teeth: long thin prisms side by side, each of a few triangles."""
     teeth = int(rng.integers(3, 30))
@@ -302,7 +262,6 @@ def comb(rng: Generator) -> Mesh:
     return build.boxes(np.array(cells), rng.uniform(0.1, 1.0, 3))
 
 
-@family("folds")
 def folds(rng: Generator) -> Mesh:
     """Paper folded along random parallels, with a few vertices across."""
     n, rows = int(rng.integers(10, 150)), int(rng.integers(2, 30))
@@ -311,7 +270,6 @@ def folds(rng: Generator) -> Mesh:
     return _band(np.stack([x, np.zeros(n), z], axis=1), np.tile([0.0, rng.uniform(1, 20), 0.0], (n, 1)), rows)
 
 
-@family("several spheres")
 def several_spheres(rng: Generator) -> Mesh:
     """Spheres of different size and fineness beside one another: several components."""
     parts = [icosphere(int(rng.integers(1, 4))) for _ in range(int(rng.integers(2, 5)))]
@@ -352,42 +310,77 @@ def _rings(rng: Generator) -> tuple[int, int]:
     return int(_between(rng, 3, 40)), int(_between(rng, 3, 40))
 
 
-@family("nearly flat cylinder")
 def _cylinder(rng: Generator) -> Mesh:
     along, around = _rings(rng)
     return _turned_rings(rng, np.ones(along), np.linspace(0, _between(rng, 0.1, 20), along), around)
 
 
-@family("nearly flat cone")
 def _cone(rng: Generator) -> Mesh:
     along, around = _rings(rng)
     radius, height = np.linspace(rng.uniform(0.05, 0.95), 1, along), np.linspace(0, _between(rng, 0.1, 20), along)
     return _turned_rings(rng, radius, height, around)
 
 
-@family("pipe reducer")
 def _reducer(rng: Generator) -> Mesh:
     along, around = _rings(rng)
     height = np.linspace(-1, 1, along) * rng.uniform(2, 20)
     return _turned_rings(rng, 1 + np.tanh(height) / 2, height, around)
 
 
-@family("geometrically spaced rings")
 def _spaced_rings(rng: Generator) -> Mesh:
     along, around = _rings(rng)
     height = np.cumsum(rng.uniform(1.01, 1.6) ** np.arange(along)) * 2 * np.pi / around
     return _turned_rings(rng, np.ones(along), height, around)
 
 
-@family("nearly flat grid")
 def _grid(rng: Generator) -> Mesh:
     n = int(_between(rng, 4, 40))
     z = rng.normal(size=(n, n)) * 10 ** rng.uniform(-12, 0)
     return _stored(rng, lattice_mesh(np.arange(n)[:, None], np.arange(n), z))
 
 
-@family("grid of integers")
 def _integers(rng: Generator) -> Mesh:
     n = int(_between(rng, 4, 30))
     x, y = (np.arange(n) * rng.integers(1, 4) for _ in range(2))
     return _stored(rng, lattice_mesh(x[:, None], y, rng.integers(0, rng.integers(1, 4), size=(n, n))))
+
+
+def _member(name: str, make: Callable[[Generator], Mesh], seed: int) -> Mesh:
+    return make(np.random.default_rng([20261123, crc32(name.encode()), seed]))
+
+
+_FAMILIES: dict[str, Callable[[Generator], Mesh]] = {
+    "random tetrahedra": tetrahedra_surface,
+    "alpha shape": alpha_shape,
+    "star polygon": star_polygon,
+    "helix": helix,
+    "spiral ramp": spiral_ramp,
+    "maze": maze,
+    "CAD plate": cad_plate,
+    "thin plate": thin_plate,
+    "CAD cylinder": cad_cylinder,
+    "shell": shell,
+    "carved voxels": carved_voxels,
+    "nested circles": nested_circles,
+    "spiky sphere": spiky_sphere,
+    "ribbon": ribbon,
+    "tube of few sides": tube_of_few_sides,
+    "vase": vase,
+    "terrain": terrain,
+    "handles": handles,
+    "hull": flat_hull,
+    "clusters": clusters,
+    "stretched noise": stretched_noise,
+    "extrusion": extrusion,
+    "comb": comb,
+    "folds": folds,
+    "several spheres": several_spheres,
+    "nearly flat cylinder": _cylinder,
+    "nearly flat cone": _cone,
+    "pipe reducer": _reducer,
+    "geometrically spaced rings": _spaced_rings,
+    "nearly flat grid": _grid,
+    "grid of integers": _integers,
+}
+FAMILIES = {name: partial(_member, name, make) for name, make in _FAMILIES.items()}
+"""All families by name: seed -> mesh, the same bits at every call."""
