@@ -219,11 +219,8 @@ class _Cut:
     def result(self) -> CutMesh:
         """The cut mesh."""
         mesh = self._mesh
-        is_touched = np.zeros(mesh.n_faces, bool)
-        is_touched[self._faces] = True
-        with_points = np.zeros(len(mesh.facets.vertices), bool)
-        with_points[list(self._on_edge)] = True
-        is_touched |= with_points[mesh.facets.of_face].any(axis=1)
+        is_touched = connectivity.mask_of(self._faces, mesh.n_faces)
+        is_touched |= np.isin(mesh.facets.of_face, list(self._on_edge)).any(axis=1)
         touched = np.flatnonzero(is_touched)
         order = np.argsort(self._faces, kind="stable")
         first = np.searchsorted(self._faces[order], [touched, touched + 1])

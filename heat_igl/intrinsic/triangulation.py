@@ -187,9 +187,7 @@ class IntrinsicTriangulation:
     def boundary(self) -> BoolArray:
         """Mask (n,) of the vertices on the boundary."""
         outer = np.flatnonzero(self.twin == -1)
-        mask = np.zeros(self.n, bool)
-        mask[self.tail(outer)] = mask[self.head(outer)] = True
-        return mask
+        return connectivity.mask_of(np.concatenate([self.tail(outer), self.head(outer)]), self.n)
 
     def tail(self, half_edge: IntArray) -> IntArray:
         """Vertex at the tail of each half-edge, in the direction around the face."""
@@ -212,9 +210,7 @@ class IntrinsicTriangulation:
     @cached_property
     def n_used(self) -> int:
         """Number of vertices that a triangle uses."""
-        used = np.zeros(self.n, bool)
-        used[self.F] = True
-        return int(np.count_nonzero(used))
+        return int(np.count_nonzero(connectivity.mask_of(self.F, self.n)))
 
     @cached_property
     def areas(self) -> FloatArray:

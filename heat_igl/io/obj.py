@@ -12,6 +12,7 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning, MeshError
 from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, integers, of_corner, warn_if_cut
 from heat_igl.mesh import Mesh
+from heat_igl.mesh.connectivity import mask_of
 from heat_igl.runtime import warn_caller
 from heat_igl.typing import FloatArray, IntArray
 
@@ -63,8 +64,7 @@ def read(path: Path, data: bytes) -> Contents:
 
 def _warn_of_unused(path: Path, n: int, corners: IntArray) -> None:
     """Warn of vertices without a face: OBJ has no counts, so nothing else tells that the last faces are lost."""
-    used = np.zeros(n, bool)
-    used[corners] = True
+    used = mask_of(corners, n)
     if not used.all():
         warn_caller(
             f"{path}: no face uses {int((~used).sum())} of the {n} vertices, such as vertex {int(np.argmin(used)) + 1} "

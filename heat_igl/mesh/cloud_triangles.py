@@ -19,7 +19,7 @@ from heat_igl.kernels.cloud.local_delaunay import delaunay_stars
 from heat_igl.kernels.cloud.loop_filling import filling_triangles, torn_points
 from heat_igl.kernels.mesh.gluing import glue
 from heat_igl.kernels.mesh.incidence import corners_by_vertex
-from heat_igl.mesh.connectivity import Groups, connected_components, fans, unique_rows
+from heat_igl.mesh.connectivity import Groups, connected_components, fans, mask_of, unique_rows
 from heat_igl.mesh.neighbourhoods import K, Neighbourhoods, PointTree, by_rows
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -174,9 +174,7 @@ def _with_small_parts(tree: PointTree, F: IntArray, part: IntArray, size: IntArr
     is_other, is_inserted = is_small[part], np.zeros(len(size), bool)
     if not is_other.any():
         return F
-    is_near = np.zeros(len(P), bool)
-    is_near[index[is_other]] = True
-    is_inside = at_all_corners(~is_near, F)
+    is_inside = at_all_corners(~mask_of(index[is_other], len(P)), F)
     inside, F = F.compress(is_inside, axis=0), F.compress(~is_inside, axis=0)
     while is_other.any():
         points = np.flatnonzero(is_other)
@@ -271,5 +269,4 @@ def _with_largest_fans(F: IntArray, is_gap: BoolArray) -> IntArray:
         if stays.all():
             return np.concatenate([inside, around])
         # What is left of a fan may be several.
-        F, is_gap = around[stays], np.zeros(n, bool)
-        is_gap[around[~stays]] = True
+        F, is_gap = around[stays], mask_of(around[~stays], n)

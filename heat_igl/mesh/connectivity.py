@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.kernels.mesh import incidence
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 # Corners of the parts of a simplex: its own, then the middles of its edges. The last four are of an octahedron.
 PARTS = {
@@ -44,9 +44,15 @@ class Groups(NamedTuple):
 
 def group_by_label(labels: IntArray, n: int) -> Groups:
     """Elements 0 to k - 1 by their labels (k,) in ``range(n)``: linear time, equal ones in order."""
-    # scipy converts a row to columns by counting.
-    by_label = sp.csr_array((np.arange(len(labels)), labels, [0, len(labels)]), shape=(1, n)).tocsc()
-    return Groups(by_label.indptr.astype(np.int64), by_label.data)
+    found = incidence.corners_by_vertex(labels.astype(np.int32)[:, None], n)
+    return Groups(*(part.astype(np.int64) for part in found))
+
+
+def mask_of(places: IntArray, n: int) -> BoolArray:
+    """The mask (n,) that is true at some places."""
+    mask = np.zeros(n, bool)
+    mask[places] = True
+    return mask
 
 
 def enumerate_runs(counts: IntArray) -> tuple[IntArray, IntArray]:
@@ -152,16 +158,12 @@ def boundary_loops(found: Facets, n: int) -> int:
 def duplicate_faces(F: IntArray, n: int) -> IntArray:
     """Indices of the faces with the same vertices, in any order, as an earlier face."""
     first, _, _ = unique_rows(np.sort(F, axis=1), n)
-    repeated = np.ones(len(F), bool)
-    repeated[first] = False
-    return np.flatnonzero(repeated)
+    return np.flatnonzero(~mask_of(first, len(F)))
 
 
 def nonmanifold_vertices(F: IntArray, found: Facets, n: int) -> IntArray:
     """Vertices whose triangles do not form one fan: two cones that touch in a point, or more than two on an edge."""
-    bad = np.zeros(n, bool)
-    bad[pinched_vertices(F, n)] = bad[found.vertices[found.n_faces > 2]] = True
-    return np.flatnonzero(bad)
+    return np.union1d(pinched_vertices(F, n), found.vertices[found.n_faces > 2])
 
 
 def fans(F: IntArray, n: int) -> tuple[IntArray, IntArray]:

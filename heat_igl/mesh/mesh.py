@@ -315,16 +315,13 @@ class Mesh:
     @cached_property
     def referenced(self) -> BoolArray:
         """Which vertices (n,) belong to a face."""
-        mask = np.zeros(self.n_vertices, bool)
-        mask[self.F] = True
-        return _frozen(mask)
+        return _frozen(connectivity.mask_of(self.F, self.n_vertices))
 
     @cached_property
     def boundary(self) -> BoolArray:
         """Which vertices (n,) lie on the boundary: on an edge (a triangle, for tetrahedra) of only one face."""
-        mask = np.zeros(self.n_vertices, bool)
-        mask[self.facets.vertices[self.facets.n_faces == 1]] = True
-        return _frozen(mask)
+        outer = self.facets.vertices[self.facets.n_faces == 1]
+        return _frozen(connectivity.mask_of(outer, self.n_vertices))
 
     @property
     def measures(self) -> FloatArray:
@@ -367,8 +364,7 @@ def first_quadrilateral(V: FloatArray, F: IntArray) -> int | None:
         return 0
     if np.median(thickness) >= _THIN:
         return None
-    is_near = np.zeros(len(V), bool)
-    is_near[F[chosen]] = True
+    is_near = connectivity.mask_of(F[chosen], len(V))
     # Elements that may have a side or diagonal in common with one of these.
     near = np.flatnonzero(is_near[F].sum(axis=1) > 1)
     pairs = np.sort(F[near][:, _SIDES_AND_DIAGONALS].reshape(-1, 2), axis=1)

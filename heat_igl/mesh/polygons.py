@@ -10,7 +10,7 @@ import igl
 import numpy as np
 
 from heat_igl.errors import MeshError, shown
-from heat_igl.mesh.connectivity import enumerate_runs, next_in_run
+from heat_igl.mesh.connectivity import enumerate_runs, mask_of, next_in_run
 from heat_igl.mesh.mesh import Mesh, checked_positions
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 
@@ -118,9 +118,7 @@ def which_repeat_a_vertex(corners: IntArray, degree: IntArray) -> BoolArray:
     owner = np.repeat(np.arange(len(degree)), degree)
     order = np.lexsort((corners, owner))
     same = (owner[order[1:]] == owner[order[:-1]]) & (corners[order[1:]] == corners[order[:-1]])
-    found = np.zeros(len(degree), bool)
-    found[owner[order[1:][same]]] = True
-    return found
+    return mask_of(owner[order[1:][same]], len(degree))
 
 
 def _flattened(polygons: Sequence[Sequence[int] | IntArray] | IntArray) -> tuple[IntArray, IntArray]:

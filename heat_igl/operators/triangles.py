@@ -127,8 +127,6 @@ def intrinsic_operators(
     L = cotangent_laplacian(igl.cotmatrix_entries(lengths), F, n)
     if on_laplacian is not None:
         on_laplacian(L)
-    referenced = np.zeros(n, bool)
-    referenced[F] = True
     elements = TriangleElements(triangulation)
     components = connectivity.connected_components(F, n) if paths is None or paths.n_vertices < n else paths.components
     if paths is not None:
@@ -150,7 +148,7 @@ def intrinsic_operators(
         mean_edge_length=triangulation.mean_edge_length,
         components=components,
         boundary=triangulation.boundary,
-        referenced=referenced,
+        referenced=connectivity.mask_of(F, n),
         longest_distance=float(longest.max()),
         longest_distances=longest,
         lengths=elements,

@@ -20,6 +20,7 @@ import igl
 import numpy as np
 
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
+from heat_igl.mesh.connectivity import mask_of
 from heat_igl.reference import edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
@@ -139,11 +140,9 @@ def _of(statistic: Callable[[FloatArray], Any], values: FloatArray) -> float:
 
 def _neighbours(mesh: Mesh, sources: Sources) -> BoolArray:
     """The one-rings of the sources, themselves included: these have no relative error."""
-    is_source = np.zeros(mesh.n_vertices, bool)
-    is_source[vertex_sources(sources, mesh.n_vertices)] = True
-    near = np.zeros(mesh.n_vertices, bool)
-    near[mesh.edges[is_source[mesh.edges].any(axis=1)]] = True
-    return near
+    n = mesh.n_vertices
+    is_source = mask_of(vertex_sources(sources, n), n)
+    return mask_of(mesh.edges[is_source[mesh.edges].any(axis=1)], n)
 
 
 def _norms(mesh: Mesh, distance: FloatArray, truth: FloatArray) -> tuple[float, float, float]:

@@ -211,10 +211,8 @@ def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: Float
     `scale` (n,) is the ratio of polar angles to the angles in which turning is measured.
     """
     n = len(scale)
-    has_path = np.zeros(n, bool)
-    has_path[row] = True
     bends = row[root[row] < n]
-    bends = bends[has_path[root[bends]]]
+    bends = bends[np.isin(root[bends], row)]
     # Pointer jumping to the vertex at which the first part of the path ends: each step doubles the number of bends.
     top, turning, bend = np.arange(n), np.zeros(n), root[bends]
     top[bends] = bend

@@ -15,6 +15,7 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.mesh import checking
 from heat_igl.mesh import Mesh, SurfacePoints
+from heat_igl.mesh.connectivity import mask_of
 from heat_igl.runtime import warn_caller
 from heat_igl.sources import SourceSet, source_set
 from heat_igl.typing import BoolArray, FloatArray, IntArray
@@ -133,11 +134,8 @@ class Invariants:
 
     def _has_source(self, sources: SourceSet) -> BoolArray:
         """Mask of the components that hold a source."""
-        has_source = np.zeros(self._n_components, bool)
-        has_source[self._components[sources.vertices]] = True
-        for faces in (sources.points.faces, sources.segments.faces):
-            has_source[self._components[self._F[faces, 0]]] = True
-        return has_source
+        in_faces = self._F[np.append(sources.points.faces, sources.segments.faces), 0]
+        return mask_of(self._components[np.append(sources.vertices, in_faces)], self._n_components)
 
     @cached_property
     def _n_components(self) -> int:
