@@ -79,9 +79,7 @@ class DistanceDerivative:
             If the solver has no vertices to move: it was made from edge lengths or operators.
         """
         sides = self._positions()
-        result = [
-            sides.by_positions(self._on_given_faces(self._by_sides(row)[0])) for row in gradient_rows(g, self.distance)
-        ]
+        result = [sides.by_positions(self._by_sides(row)[0]) for row in gradient_rows(g, self.distance)]
         return np.stack(result) if np.ndim(g) == 2 else result[0]
 
     def by_lengths(self, g: ArrayLike) -> FloatArray:
@@ -90,7 +88,7 @@ class DistanceDerivative:
         An edge is a side of each of its faces: its derivative is the sum of theirs. Rows are the faces of the mesh. Of
         two faces with the same vertices, one has the derivative of both, and the other 0. Outside a region it is 0.
         """
-        result = np.stack([self._on_given_faces(self._by_sides(row)[0]) for row in gradient_rows(g, self.distance)])
+        result = np.stack([self._by_sides(row)[0] for row in gradient_rows(g, self.distance)])
         if self._part is not None:
             of_part, result = result, np.zeros((len(result), len(self._part.whole), 3))
             result[:, self._part.faces] = of_part
@@ -130,13 +128,13 @@ class DistanceDerivative:
         """
         metric = self._metric("metric_operators(mesh, metric), with a metric on each face for windows")
         (row,) = gradient_rows(g, self.distance, 1)
-        return metric.by_metric(self._on_given_faces(self._by_sides(row)[0]))
+        return metric.by_metric(self._by_sides(row)[0])
 
     def by_speed(self, g: ArrayLike) -> FloatArray:
         """The gradient (m,) by the speeds that were given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
         metric = self._metric("speed_operators(mesh, speed)")
         (row,) = gradient_rows(g, self.distance, 1)
-        return metric.by_speed(self._on_given_faces(self._by_sides(row)[0]))
+        return metric.by_speed(self._by_sides(row)[0])
 
     def _metric(self, function: str) -> MetricSides:
         if not isinstance(self._sides, MetricSides):
@@ -168,15 +166,17 @@ class DistanceDerivative:
         """
         sides, places = self._positions(), self._sources.points
         moved = velocities("dV", dV, sides.mesh.V.shape, "vertex")
-        by_side = self._on_faces(sides.push_positions(moved))
+        by_side = sides.push_positions(moved)
         by_place = np.zeros((len(places.faces), 3))
         if points is not None and len(places.faces):
             velocity = velocities("points", points, by_place.shape, "source point")
             by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
-        if self._merged is not None:
-            on_faces = np.empty_like(by_place)
-            np.put_along_axis(on_faces, self._merged.corner[places.faces], by_place, axis=1)
-            by_place = on_faces
+        if self._merged is not None:  # each face once
+            given_sides, given_places = by_side, by_place
+            kept, which = np.unique(self._merged.face, return_index=True)
+            by_side, by_place = np.zeros((len(kept), 3)), np.empty_like(given_places)
+            np.put_along_axis(by_side, self._merged.corner[which], given_sides[which], axis=1)
+            np.put_along_axis(by_place, self._merged.corner[places.faces], given_places, axis=1)
         result = self._paths.push_forward(by_side, by_place)
         result[self.unreachable] = 0.0
         return result
@@ -208,35 +208,25 @@ class DistanceDerivative:
         return self._sides
 
     def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-        """The derivative (m, 3) by the sides of the faces, each once, and (p, 3) by the points in given faces."""
+        """The derivatives (m, 3) by the sides, and (p, 3) by the points, of the faces that the user gave.
+
+        Of faces that are there twice, all but one have 0.
+        """
         by_side, by_place = self._paths.pull_back(row)
-        if by_place is not None and self._merged is not None:
+        if self._merged is None:
+            return by_side, by_place
+        if by_place is not None:
             by_place = np.take_along_axis(by_place, self._merged.corner[self._sources.points.faces], axis=1)
-        return by_side, by_place
+        kept, which = np.unique(self._merged.face, return_index=True)
+        on_given = np.zeros((len(self._merged.face), 3))
+        on_given[which] = np.take_along_axis(by_side[kept], self._merged.corner[which], axis=1)
+        return on_given, by_place
 
     @cached_property
     def _merged(self) -> Merged | None:
         """The change that removed faces which were there twice; None if there were none."""
         history = self._faces.history
         return history[0] if history and isinstance(history[0], Merged) else None
-
-    def _on_given_faces(self, by_side: FloatArray) -> FloatArray:
-        """The derivative by the sides of the faces that the user gave, some of which may be there twice."""
-        if self._merged is None:
-            return by_side
-        kept, which = np.unique(self._merged.face, return_index=True)
-        on_given = np.zeros((len(self._merged.face), 3))
-        on_given[which] = np.take_along_axis(by_side[kept], self._merged.corner[which], axis=1)
-        return on_given
-
-    def _on_faces(self, by_side: FloatArray) -> FloatArray:
-        """Changes of the sides (m, 3) of the faces that the user gave, for each face once."""
-        if self._merged is None:
-            return by_side
-        kept, which = np.unique(self._merged.face, return_index=True)
-        on_faces = np.zeros((len(kept), 3))
-        np.put_along_axis(on_faces, self._merged.corner[which], by_side[which], axis=1)
-        return on_faces
 
 
 def require_differentiable(domain: Mesh | PointCloud | Operators, sources: SourceSet) -> None:
@@ -281,24 +271,13 @@ class PathLengths:
         kernels.pull_back(*self._arguments, weight, by_table, by_place)
         by_side = np.zeros(self.triangulation.l.shape)
         by_side[tables.face] = by_table.reshape(-1, 3)
-        return by_side, self._by_points(tables.unscaled(by_place)) if len(self._points.faces) else None
-
-    def _by_points(self, by_place: FloatArray) -> FloatArray:
-        """The derivative (p, 3) by the coordinates of each source point in its own triangle.
-
-        Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
-        """
-        result = np.zeros((len(self._points.faces), 3))
+        if not len(self._points.faces):
+            return by_side, None
+        by_point, by_place = np.zeros((len(self._points.faces), 3)), tables.unscaled(by_place)
+        # Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
         for c, (known, point, corner) in enumerate(self._own_corners()):
-            np.add.at(result, (point, corner), by_place[known, c])
-        return result
-
-    def _at_places(self, by_point: FloatArray) -> FloatArray:
-        """The changes of all places, from those (p, 3) of the coordinates of each source point in its own triangle."""
-        result = np.zeros((len(self._places.faces), 3))
-        for c, (known, point, corner) in enumerate(self._own_corners()):
-            result[known, c] = by_point[point, corner]
-        return result
+            np.add.at(by_point, (point, corner), by_place[known, c])
+        return by_side, by_point
 
     def _own_corners(self) -> list[tuple[BoolArray, IntArray, IntArray]]:
         """For each corner of the places' triangles: whether the point's own triangle has it, the point, the corner."""
@@ -310,9 +289,11 @@ class PathLengths:
         known = [at.any(axis=1) for at in same]
         return [(k, places.point[k], at.argmax(axis=1)[k]) for at, k in zip(same, known, strict=True)]
 
-    def push_forward(self, by_side: FloatArray, by_place: FloatArray) -> FloatArray:
+    def push_forward(self, by_side: FloatArray, by_point: FloatArray) -> FloatArray:
         """How the distances (n,) change with sides (m, 3) and places (p, 3) of points in the triangulation."""
-        moves = self._at_places(by_place)
+        moves = np.zeros((len(self._places.faces), 3))
+        for c, (known, point, corner) in enumerate(self._own_corners()):
+            moves[known, c] = by_point[point, corner]
         return self._summed(by_side, moves, np.zeros(self._tables.n + len(moves)))
 
     def lengths(self) -> FloatArray:

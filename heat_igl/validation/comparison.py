@@ -85,7 +85,17 @@ def _run(
     `begun` is called before each distance, with the name of the method and the index of the set.
     """
     if prepare is None:
-        return _run_native(as_simplices(mesh), sets, label, bounds, begun)
+        results = []
+        for i, sources in enumerate(sets):
+            begun(label, i)
+            results.append(reference.measured(_NATIVE[label], as_simplices(mesh), sources, **bounds))
+        memory = (result.peak_memory for result in results if result.peak_memory is not None)
+        return np.stack([result.distance for result in results]), {
+            "parameters": {"solver": _NATIVE[label]},
+            "precompute_seconds": float(np.median([result.precompute_seconds for result in results])),
+            "solve_seconds": float(np.median([result.solve_seconds for result in results])),
+            "peak_memory": max(memory, default=None),
+        }
     distances, seconds = [], []
     with PeakMemory() as peak, _accuracy_notes() as notes:
         start = time.perf_counter()
@@ -125,22 +135,6 @@ def _accuracy_notes() -> Iterator[list[str]]:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
         elif str(warning.message) not in notes:
             notes.append(str(warning.message))
-
-
-def _run_native(
-    mesh: Mesh, sets: list[IntArray], label: str, bounds: Mapping[str, float], begun: Callable[[str, int], None]
-) -> Run:
-    solver = _NATIVE[label]
-    results = []
-    for i, sources in enumerate(sets):
-        begun(label, i)
-        results.append(reference.measured(solver, mesh, sources, **bounds))
-    return np.stack([result.distance for result in results]), {
-        "parameters": {"solver": solver},
-        "precompute_seconds": float(np.median([result.precompute_seconds for result in results])),
-        "solve_seconds": float(np.median([result.solve_seconds for result in results])),
-        "peak_memory": max((result.peak_memory for result in results if result.peak_memory is not None), default=None),
-    }
 
 
 @names_guessed
@@ -267,9 +261,7 @@ def draw_sources(mesh: MeshLike, count: int, seed: int = 0) -> list[list[int]]:
 
 def _source_sets(sources: Sources | Sequence[Sources], n: int) -> list[IntArray]:
     several = isinstance(sources, (list, tuple)) and any(np.ndim(entry) > 0 for entry in sources)
-    if not several:
-        return [vertex_sources(sources, n)]
-    return [vertex_sources(entry, n) for entry in sources]  # type: ignore[union-attr]
+    return [vertex_sources(entry, n) for entry in (sources if several else [sources])]  # type: ignore[union-attr]
 
 
 def _truths(

@@ -85,7 +85,12 @@ def distances_within(
     triangles, part = triangles_inside(mesh, region, _WHAT)
     chosen = _chosen(sources, triangles, part)
     found = _rows_within(triangles, from_mesh(triangles, int(chosen[0])), chosen, limit)
-    return found if sources is not None or part is None else _with_empty_rows(found, np.flatnonzero(part.inside))
+    if sources is not None or part is None:
+        return found
+    # Empty rows for the vertices outside.
+    counts = np.zeros(found.shape[1], found.indptr.dtype)
+    counts[part.inside] = np.diff(found.indptr)
+    return sp.csr_array((found.data, found.indices, np.append(0, np.cumsum(counts))), shape=(len(counts),) * 2)
 
 
 def blocks_within(
@@ -312,14 +317,6 @@ def _chosen(sources: Sources | None, mesh: Mesh, part: MeshPart | None) -> IntAr
     if part is not None:
         part.require_vertices(named)
     return named
-
-
-def _with_empty_rows(found: sp.csr_array, rows: IntArray) -> sp.csr_array:
-    """A matrix (n, n) with the k rows of `found` at `rows` (k,), and empty rows elsewhere."""
-    n = found.shape[1]
-    counts = np.zeros(n, found.indptr.dtype)
-    counts[rows] = np.diff(found.indptr)
-    return sp.csr_array((found.data, found.indices, np.append(0, np.cumsum(counts))), shape=(n, n))
 
 
 def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:
