@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -133,7 +132,12 @@ class HeatMethodSolver(BatchedSolver):
         *,
         n: int | None = None,
         twin: ArrayLike | None = None,
-        **options: Any,
+        t_coef: float | None = None,
+        t: float | None = None,
+        laplacian: Laplacian = "auto",
+        boundary: Boundary = "neumann",
+        magnitude: Magnitude = "auto",
+        backend: Backend = "auto",
     ) -> HeatMethodSolver:
         """A solver on triangles that are known by their edge lengths alone; positions are not needed.
 
@@ -159,8 +163,8 @@ class HeatMethodSolver(BatchedSolver):
         MeshError
             If `F`, `lengths` or `twin` cannot be used; the message names the first offender.
         """
-        chosen = SolverOptions(**options)
-        return cls._of(prepare(edge_length_operators(F, lengths, n, chosen.laplacian, twin), chosen))
+        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
+        return cls._of(prepare(edge_length_operators(F, lengths, n, options.laplacian, twin), options))
 
     def _moved(self, V: ArrayLike) -> HeatMethodSolver:
         options, fans = self._parts.options, self.operators.fans
