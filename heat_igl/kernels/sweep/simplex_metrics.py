@@ -56,8 +56,6 @@ def lengths_in_velocity(
     I: cython.double[6]
     E: cython.double[12]
     rise: cython.double[4]
-    along: cython.double[3]
-    across: cython.double[3]
     at: cython.pointer[cython.const[cython.double]][4]
     with cython.nogil:
         for i in range(velocity.shape[0]):
@@ -84,26 +82,21 @@ def lengths_in_velocity(
             gradient(E + 3, rise + 1, size - 1, here)
             squares_of(W, here, 1, rise)
             steep: cython.double = sqrt(rise[0]) / mean_velocity(W)
-            # How much faster it is in the middle between two corners than in the mean, to first order.
+            # How much faster it is in the middle between the two fastest corners than in the mean, to first order.
             faster: cython.double = 1.0
             for k in range(n_pairs):
-                one: cython.double = squares[k]
-                two: cython.double = squares[k]
-                multiply(I, e + 3 * k, along)
-                multiply(I, along, across)
-                # Of the corners where it is fastest.
-                most: cython.double = 0.0
-                second: cython.double = 0.0
+                # In the metrics of the corners, shortest first.
+                one: cython.double = INFINITY
+                next_one: cython.double = INFINITY
+                two: cython.double = 0.0
                 for i in range(size):
+                    next_one = min(next_one, max(one, squares[6 * i + k]))
                     one, two = min(one, squares[6 * i + k]), max(two, squares[6 * i + k])
-                    multiply(at[i], along, here)
-                    here[3] = here[0] * across[0] + here[1] * across[1] + here[2] * across[2]
-                    second = max(second, min(most, here[3]))
-                    most = max(most, here[3])
-                faster = max(faster, 0.5 * (most + second) / mean[s, k])
+                faster = max(faster, 0.5 * (mean[s, k] / one + mean[s, k] / next_one))
                 longest, widest[s] = max(longest, mean[s, k]), max(widest[s], two)
-                variation += (one + two - 2.0 * sqrt(one * two)) / mean[s, k]
-            slack[s] = 1.0 / faster
+                if size == 3:
+                    variation += (one + two - 2.0 * sqrt(one * two)) / mean[s, k]
+            slack[s] = 1.0 / sqrt(faster)
             # In a flat simplex, the arc over a long edge would leave it, for velocities far above those at the corners.
             fastest /= mean_velocity(W)
             growth[s] = min(steep, 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
