@@ -109,7 +109,7 @@ class HopfLaxEngine(SimplexEngine):
         rows = corners[some][:, [[j for j in range(size) if j != c] for c in range(size)]].reshape(-1, size - 1).T
         low, high = reduce(np.minimum, rows), reduce(np.maximum, rows)
         _, facet, counts = unique_rows(np.stack([low, sum(rows) - low - high, high], axis=1), n)
-        order = np.argsort(facet, kind="stable")
+        _, order = group_by_label(facet, len(counts))
         at, facet = (size * some[:, None] + np.arange(size)).astype(np.int32).ravel()[order], facet[order]
         beside = [np.stack([at[k:], at[:-k]])[:, facet[k:] == facet[:-k]] for k in range(1, counts.max(initial=2))]
         pairs = np.concatenate(beside, axis=1).T
