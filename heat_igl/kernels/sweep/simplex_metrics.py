@@ -9,7 +9,6 @@ from cython.cimports.heat_igl.kernels.sweep.facets import (
     gradient,
     invert,
     mean_velocity,
-    multiply,
     pair,
     squares_of,
 )
@@ -37,7 +36,7 @@ def lengths_in_velocity(
     inverse, mean, widest, slack, growth
         As `SimplexUpdate` takes them, with `mean` in the metric of the centre.
     variation : float
-        How far the lengths of edges differ between the metrics of the corners, mean square of the share.
+        How far the lengths of edges of triangles differ between the metrics of the corners, mean square of the share.
     """
     size: cython.int = corners.shape[1]
     n_pairs: cython.int = size * (size - 1) // 2
