@@ -20,7 +20,7 @@ from heat_igl.cluster.connection import connected, dask_modules
 from heat_igl.cluster.report import BatchReport, rows
 from heat_igl.cluster.store import Store, locked
 from heat_igl.cluster.worker import TOPIC, Outcome, Task, release, work
-from heat_igl.errors import BatchError
+from heat_igl.errors import BatchError, require_choice
 from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.mesh import MeshLike
 from heat_igl.runtime import rich_progress
@@ -103,8 +103,7 @@ def distances(
     at each, and as attributes t, versions, a checksum and the mesh's report. With the same versions on the same kind of
     processor, the bits are those of ``solver.distances(...).astype(dtype)``, however often the batch is interrupted.
     """
-    if dtype not in DTYPES:
-        raise ValueError(f"dtype must be one of {', '.join(map(repr, DTYPES))}, not {dtype!r}")
+    require_choice("dtype", dtype, DTYPES)
     plan = SourcePlan.of(sources)
     choice = SolverChoice.of(method, tolerance, **options)
     solver = {"method": choice.method, "tolerance": tolerance, **options}

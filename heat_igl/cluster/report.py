@@ -81,7 +81,9 @@ class BatchReport:
         concerning = [*self.failed, *self.unfinished]
         if concerning:
             lines += ["", "| mesh | status | reason |", "|---|---|---|"]
-            lines += [f"| {row.mesh} | {row.status} | {_cell(row.reason)} |" for row in concerning]
+            for row in concerning:
+                reason = row.reason.replace("|", "\\|").replace("\n", " ")
+                lines.append(f"| {row.mesh} | {row.status} | {reason} |")
         return "\n".join(lines) + "\n"
 
 
@@ -166,7 +168,3 @@ def _row(store: Store, name: str) -> BatchRow:
     if problem:
         return BatchRow(name, mesh, "damaged", problem, group.n_columns, group.n_rows)
     return BatchRow(name, mesh, status, "", group.n_columns, group.n_rows, found.get("checksum", ""))
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")

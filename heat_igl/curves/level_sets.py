@@ -78,7 +78,7 @@ def isolines(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> list[list[
         wanted = np.linspace(finite.min(), finite.max(), k + 2)[1:-1]
     else:
         checked, wanted = _checked(mesh, values, levels)
-    return [_curves(mesh, checked, level) for level in wanted]
+    return [joined_segments(level_segments(mesh, checked, level), mesh) for level in wanted]
 
 
 def offset_curves(mesh: MeshLike, solver: Solver, sources: Sources, radius: float) -> list[SurfaceCurve]:
@@ -176,7 +176,7 @@ def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArra
     checked, wanted = _checked(mesh, values, level)
     if len(wanted) != 1:
         raise ValueError(f"level must be one number, not {len(wanted)}")
-    curves = _curves(mesh, checked, wanted[0])
+    curves = joined_segments(level_segments(mesh, checked, wanted[0]), mesh)
     below = checked < wanted[0]
     inner = mesh.edges[below[mesh.edges].all(axis=1)]
     part = connectivity.connected_components(inner, mesh.n_vertices)
@@ -205,7 +205,3 @@ def _areas_below(mesh: Mesh, values: FloatArray, level: float) -> FloatArray:
     corner = found.toward[:, 0] * found.toward[:, 1]
     area[found.faces] = mesh.measures[found.faces] * np.where(found.is_below, corner, 1 - corner)
     return area
-
-
-def _curves(mesh: Mesh, values: FloatArray, level: float) -> list[SurfaceCurve]:
-    return joined_segments(level_segments(mesh, values, level), mesh)

@@ -12,7 +12,7 @@ from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import MeshLike, as_mesh, as_simplices
 from heat_igl.runtime import over_rows
 from heat_igl.sources import Sources, distinct_vertices
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import FloatArray, IntArray
 
 # The step of a site is divided by each of these in turn; the first that lowers the energy of its cell is taken.
 _SHORTER = np.array([1, 2, 4, 8])
@@ -156,7 +156,7 @@ class _Relaxation:
                 # A site stays inside its cell, so that no two sites meet.
                 if corner != sites[i] and cell[corner]:
                     found = self._solver.directions(corner)
-                    if self._of_cell(found.distance, cell) < self._of_cell(rows[i], cell):
+                    if self._areas[cell] @ found.distance[cell] ** 2 < self._areas[cell] @ rows[i][cell] ** 2:
                         sites[i], rows[i], angles[i] = corner, found.distance, found.departure
                         return True
             return False
@@ -173,6 +173,3 @@ class _Relaxation:
             moment = area * row[cell] / max(area.sum(), np.finfo(float).tiny)
             found[i] = moment @ np.cos(angle[cell]), moment @ np.sin(angle[cell])
         return found
-
-    def _of_cell(self, row: FloatArray, cell: BoolArray) -> float:
-        return float(self._areas[cell] @ row[cell] ** 2)

@@ -23,7 +23,7 @@ import numpy as np
 
 from heat_igl.drawing.figure import PAGE_SUFFIXES
 from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, LINE_INK, STRIPE_INK, Style, colours, scene
-from heat_igl.errors import require_choice
+from heat_igl.errors import raise_at_first, require_choice
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.io import complete_file
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
@@ -187,9 +187,7 @@ def _add_fields(arrays: dict[str, AnyArray], meta: dict[str, Any], fields: Mappi
         values = np.asarray(given, np.float64)
         if values.shape not in ((n,), (n, 2)):
             raise ValueError(f"fields[{name!r}] must have shape ({n},) or ({n}, 2), not {values.shape}")
-        if np.isnan(values).any():
-            first = np.unravel_index(int(np.argmax(np.isnan(values))), values.shape)
-            raise ValueError(f"fields[{name!r}] is NaN at vertex {first[0]}: there is nothing to draw")
+        raise_at_first(np.isnan(values), f"fields[{name!r}]", values, "must be a number or inf")
         arrays[f"field {name}"] = (values / meta["unit"]).astype("<f4").ravel()
         meta["fields"].append([name, values.ndim])
 

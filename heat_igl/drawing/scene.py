@@ -9,7 +9,7 @@ import igl
 import numpy as np
 
 from heat_igl.drawing.raster import default_rotation, rotation
-from heat_igl.errors import MissingExtraError, real_numbers
+from heat_igl.errors import MissingExtraError, real_numbers, require_choice
 from heat_igl.mesh import Mesh, MeshLike, NestedCurves, PointCloud, PolygonMesh, as_simplices, flat_curves
 from heat_igl.sources import Sources, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray, IntArray
@@ -89,8 +89,7 @@ def scene(
     """
     checked = vertex_values(name, values, mesh.n_vertices)
     vertices, dots, lines = _places(as_simplices(mesh), sources)
-    if up not in _PERMUTATION:
-        raise ValueError(f"up must be 'x', 'y' or 'z', not {up!r}")
+    require_choice("up", up, _PERMUTATION)
     finite = checked[np.isfinite(checked)]
     low, high = (min(0.0, float(finite.min())), float(finite.max())) if limits is None else map(float, limits)
     if limits is not None and not (np.isfinite([low, high]).all() and low < high):

@@ -277,25 +277,19 @@ class Checker:
         steepness, steepest = self._edges.steepness(distance)
         shortfall, largest, shortest = np.nan, np.nan, -1
         places = source_places(self._V, self._F, sources)
-        used = None if places is None else self._used(sources, *places)
-        if used is not None:
-            step = len(self._vertices) * len(used[0]) // _MOST_LINES + 1
-            shortfall, most, shortest, farthest = checking.shortfall(distance, self._vertices, step, self._V, *used)
+        if places is not None and not self._uses_all:
+            # From a vertex that no face uses there is no distance.
+            used = np.append(self._referenced[sources.vertices], np.ones(len(sources.points.faces), bool))
+            places = (places[0][used], places[1][used]) if used.any() else None
+        if places is not None:
+            step = len(self._vertices) * len(places[0]) // _MOST_LINES + 1
+            shortfall, most, shortest, farthest = checking.shortfall(distance, self._vertices, step, self._V, *places)
             largest = most / farthest if farthest > 0 else 0.0
         if holds and self._surface is not None:
             self._surface.paths.shorten(distance, share=_STEEP)
         is_worth_it = shortfall > _RAISED or len(sources.offsets) <= _VERY_FEW_SOURCES
         raised = holds and is_worth_it and raise_to_lines(distance, self._V, self._F, sources)
         return AnswerCheck(shortfall, largest, shortest, steepness, steepest, raised)
-
-    def _used(
-        self, sources: SourceSet, places: FloatArray, offsets: FloatArray
-    ) -> tuple[FloatArray, FloatArray] | None:
-        """Those that a face uses of `source_places`, None if there are none: from others there is no distance."""
-        if self._uses_all:
-            return places, offsets
-        used = np.append(self._referenced[sources.vertices], np.ones(len(sources.points.faces), bool))
-        return (places[used], offsets[used]) if used.any() else None
 
 
 @contextmanager

@@ -94,7 +94,9 @@ def write_curves(
         for name, group in groups.items()
     }
     if write is write_svg:
-        matrix = _plane(mesh, target) if projection is None else _checked_projection(projection)
+        matrix = _plane(mesh, target) if projection is None else real_numbers("projection", projection)
+        if matrix.shape != (2, 3) or not np.isfinite(matrix).all():
+            raise ValueError(f"projection must be a finite array of shape (2, 3), not {shown(projection)}")
         lines = {name: [(P @ matrix.T, closed) for P, closed in group] for name, group in lines.items()}
     with replacing(target) as temporary:
         write(temporary, lines)
@@ -107,13 +109,6 @@ def _own_mesh(curves: Curves) -> Mesh:
     if mesh is None:
         raise ValueError("there is no mesh, which these curves do not know: write_curves(path, mesh, curves)")
     return mesh
-
-
-def _checked_projection(projection: ArrayLike) -> FloatArray:
-    matrix = real_numbers("projection", projection)
-    if matrix.shape != (2, 3) or not np.isfinite(matrix).all():
-        raise ValueError(f"projection must be a finite array of shape (2, 3), not {shown(projection)}")
-    return matrix
 
 
 def _plane(mesh: Mesh, path: Path) -> FloatArray:

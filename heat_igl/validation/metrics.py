@@ -80,7 +80,7 @@ def relative_error(distance: ArrayLike, truth: ArrayLike) -> FloatArray:
     """
     d, x = _same_shape(distance, truth)
     error = np.full(x.shape, np.nan)
-    away = _comparable(x)
+    away = np.isfinite(x) & (x > 0)
     error[away] = np.where(np.isfinite(d[away]), np.abs(_finite_or_zero(d)[away] - x[away]) / x[away], np.inf)
     return error
 
@@ -99,7 +99,7 @@ def error_summary(
             f"distances must have shape ({len(source_sets)}, {mesh.n_vertices}), one row per set of sources, not "
             f"{d.shape}"
         )
-    away = _comparable(x)
+    away = np.isfinite(x) & (x > 0)
     relative = relative_error(d, x)[away]
     near = np.stack([_neighbours(mesh, sources) for sources in source_sets]) & away
     norms = np.array([_norms(mesh, d[row], x[row]) for row in range(len(d))])
@@ -130,10 +130,6 @@ def _same_shape(distance: ArrayLike, truth: ArrayLike) -> tuple[FloatArray, Floa
     return d, x
 
 
-def _comparable(truth: FloatArray) -> BoolArray:
-    return np.isfinite(truth) & (truth > 0)
-
-
 def _of(statistic: Callable[[FloatArray], Any], values: FloatArray) -> float:
     return float(statistic(values)) if len(values) else float("nan")
 
@@ -148,7 +144,7 @@ def _neighbours(mesh: Mesh, sources: Sources) -> BoolArray:
 def _norms(mesh: Mesh, distance: FloatArray, truth: FloatArray) -> tuple[float, float, float]:
     """L1, L2 and L-infinity of the error over the largest distance, weighted by each vertex's share of the area."""
     compared = np.isfinite(truth)
-    if not _comparable(truth).any():
+    if not (truth[compared] > 0).any():
         return 0.0, 0.0, 0.0
     if not np.isfinite(distance[compared]).all():
         return np.inf, np.inf, np.inf

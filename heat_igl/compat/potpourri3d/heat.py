@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from heat_igl.compat.potpourri3d.curves import TIME_STEP, from_vertices, t_coef_here
 from heat_igl.compat.potpourri3d.meshes import proper
+from heat_igl.errors import require_choice
 from heat_igl.heat import HeatMethodSolver, VectorHeatSolver
 from heat_igl.mesh import Mesh, PointCloud, PolygonMesh
 from heat_igl.operators import connection_laplacian
@@ -115,9 +116,7 @@ class MeshVectorHeatSolver(_OnVertices):
             "VectorHeat" is `VectorHeatSolver.log_map`. The two others follow shortest paths and are exact, as
             `heat_igl.log_map`.
         """
-        if strategy not in get_args(_LogMapStrategy):
-            names = ", ".join(map(repr, get_args(_LogMapStrategy)))
-            raise ValueError(f"strategy must be one of {names}, not {strategy!r}")
+        require_choice("strategy", strategy, get_args(_LogMapStrategy))
         return (self._vectors if strategy == "VectorHeat" else self._paths).log_map(v_ind)
 
     @cached_property

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from heat_igl import io
+from heat_igl.errors import require_choice
 from heat_igl.io.contents import format_rows
 from heat_igl.mesh import Mesh, PointCloud
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -100,14 +101,13 @@ def write_mesh(
     if path.suffix.lower() != ".obj":
         raise ValueError(f"UV_coords are written to .obj files, not to {path}")
     m = mesh.n_faces
-    rows_of_corners: dict[str | None, tuple[int, IntArray]] = {
+    rows_of_corners = {
         "per-vertex": (mesh.n_vertices, mesh.F),
         "per-face": (m, np.repeat(np.arange(m)[:, None], 3, axis=1)),
         "per-corner": (3 * m, np.arange(3 * m).reshape(-1, 3)),
     }
-    if UV_type not in rows_of_corners:
-        raise ValueError(f"UV_type must be one of {', '.join(map(repr, rows_of_corners))}, not {UV_type!r}")
-    k, rows = rows_of_corners[UV_type]
+    require_choice("UV_type", UV_type, rows_of_corners)
+    k, rows = rows_of_corners[str(UV_type)]
     coordinates = np.asarray(UV_coords, np.float64)
     if coordinates.shape != (k, 2):
         raise ValueError(f"UV_coords must have shape ({k}, 2), {UV_type}, not {coordinates.shape}")
