@@ -23,12 +23,9 @@ _STRAIGHT_FRONT = cython.declare(cython.double, 1e-7)
 # Share of the longest edge at a vertex by which a way that is passed on is longer than straight, or by a neighbour.
 # Half of it makes 27 vertices longer by .2 to 1 %, nothing 3845 by up to 14 %; twice as much 17 shorter by .2 to .5 %.
 _SLACK = cython.declare(cython.double, 0.02)
-# Times that distance along an edge is found, 6 at most so far, and that in bits.
+# Times that distance along an edge is told from that before, 6 at most so far, and that in bits.
 _MOST_FITS = cython.declare(cython.int, 63)
 _FIT_BITS = cython.declare(cython.int, 6)
-# All five points of an edge, ends, quarters and middle, and its ends, in bits.
-_ALL_POINTS = cython.declare(cython.int, 31)
-_ENDS = cython.declare(cython.int, 17)
 # No edge, and no way.
 _NONE = cython.declare(cython.int, -3)
 
@@ -48,7 +45,6 @@ _Edge = cython.struct(
     outward=cython.double[3],
     across=cython.double[3],
     wall=cython.double,
-    has_before=cython.double,
     before=cython.double[2],
     slope=cython.double[4],
     lean=cython.double[4],
@@ -90,14 +86,14 @@ def bend_around(
     tangent = (ends[:, 1] - ends[:, 0]) / lengths
     beyond, across = np.full((e, 5), np.inf), np.cross(tangent, outward)
     known = [tangent, ends[:, 0], lengths, np.zeros((e, 4)), beyond, outward, across, np.asarray(wall)[:, None]]
-    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 11))], axis=1)
+    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 10))], axis=1)
     one = _Bends(body, sources, offset, d, label)
     one.edges, one.way = edges, way
     if e > 0:
         one.edge = cython.cast(cython.pointer[_Edge], cython.address(table[0, 0]))
     one.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
     one.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
-    one.followed, one.is_open, one.refuted = np.zeros(e, np.uint8), np.zeros((e, 2), np.uint8), _NONE
+    one.followed, one.refuted = np.zeros(e, np.uint8), _NONE
     one.fit_of = np.arange(e, dtype=np.int32) << _FIT_BITS
     one.newest, one.met = np.full((2, n), _NONE, np.int32)
     one.point_of, one.waiting, one.bound = np.zeros(e, np.int32), PriorityQueue(n), np.array(d)
@@ -106,9 +102,6 @@ def bend_around(
     n_asked: cython.Py_ssize_t = 0
     while True:
         with cython.nogil:
-            for i in range(e):
-                one.open_at(edges[i, 0])
-                one.open_at(edges[i, 1])
             for i in range(e):
                 one.begin_around(order[i])
             while one.waiting.count > 0 and not one.failed:
@@ -136,7 +129,7 @@ class _Bends(Ray):
     Distance along an edge that `fits` is ``start + |(x - along, height)|``, x along the edge; at its ends, the quarters
     and the middle it is `at`. Each quarter of another edge has a `slope`, and lines meet the edge there with a `lean`,
     their way along it for each unit across, at its beginning if that is huge. The way comes to the middle from
-    `before`, a place along `outward` and `across`, if it `has_before`. No way to a vertex is longer than its `bound`.
+    `before`, a place along `outward` and `across`, 0 if it is not known. No way to a vertex is longer than its `bound`.
 
     Of the way that was last asked for, `bend` (3,) is the point at which it bends last, and `share` the place of this
     point along the edge.
@@ -147,9 +140,8 @@ class _Bends(Ray):
     it shares an end with an edge that was hidden. All edges that were offered to a vertex are in `lists` that begin at
     `met` (n,); `point_of` (e,) is the number of the last `point` of an edge for which an edge was a candidate; `n_near`
     are `near`, on ways of `near_value`. Edges begin from one end if it `is_lone`.
-    The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`, and `sought` is
-    the edge that is fitted. It `is_open` (e, 2) at an end if it hides anything there; `followed` (e,) are the points of
-    an edge whose ways have been followed, in bits, and `refuted` is an edge at which one was hidden.
+    The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`; `followed` (e,)
+    are the points of an edge whose ways have been followed, in bits, and `refuted` is an edge at which one was hidden.
     """
 
     edges: cython.const[cython.int][:, ::1]
@@ -157,7 +149,6 @@ class _Bends(Ray):
     way: cython.int[::1]
     bend: cython.double[3]
     share: cython.double
-    sought: cython.int
     at_end: cython.int[::1]
     first_at_end: cython.int[::1]
     fit_of: cython.int[::1]
@@ -173,7 +164,6 @@ class _Bends(Ray):
     is_lone: cython.bint
     waiting: PriorityQueue
     bound: cython.double[::1]
-    is_open: cython.uchar[:, ::1]
     followed: cython.uchar[::1]
     refuted: cython.int
     line: Line
@@ -192,8 +182,7 @@ class _Bends(Ray):
     def fit(self, i: cython.int, follows: cython.bint) -> cython.void:
         """Find distance along an edge, at its ends, quarters and middle, whose ways it follows or may presume.
 
-        If the ways to both ends come from one source, so do those to points between, or they are hidden and longer. If
-        both ends have ways around one edge and it hides nothing, it is seldom needed, and they are presumed as well.
+        If the ways to both ends come from one source or edge, so do those to points between, or they are hidden.
         """
         x: cython.double[3]
         edge: cython.pointer[_Edge] = cython.address(self.edge[i])
@@ -201,21 +190,17 @@ class _Bends(Ray):
         b: cython.int = self.edges[i, 1]
         for k in range(3):
             x[k] = 0.5 * (self.body.positions[a, k] + self.body.positions[b, k])
-        edge.has_before = self.way[a] > -2
-        if edge.has_before:
+        edge.before[0] = edge.before[1] = 0.0
+        if self.way[a] > -2:
             self.look_back(self.way[a], a, x)
-            edge.before[0] = edge.before[1] = 0.0
             for k in range(3):
                 edge.before[0] += (self.line.goal[k] - edge.end[k]) * edge.outward[k]
                 edge.before[1] += (self.line.goal[k] - edge.end[k]) * edge.across[k]
         edge.at[0], edge.at[4] = min(self.d[a], self.d[b] + edge.length), min(self.d[b], self.d[a] + edge.length)
         part: cython.double = 0.25 * edge.length
         way: cython.int = self.way[a]
-        if way == -1:
-            follows = follows or self.way[b] != -1 or self.label[a] != self.label[b]
-        else:
-            follows = follows or way < 0 or self.way[b] != way or self.is_open[i, 0] or self.is_open[i, 1]
-        self.followed[i] = _ALL_POINTS if follows else _ENDS
+        follows = follows or way < -1 or self.way[b] != way or (way == -1 and self.label[a] != self.label[b])
+        self.followed[i] = 255 if follows else 0
         for j in range(1, 4):
             self.point_along(i, j, x)
             most: cython.double = min(edge.at[j - 1] + part, edge.at[4] + (4 - j) * part)
@@ -248,25 +233,19 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def holds(self, i: cython.int) -> cython.bint:
-        """Whether the ways to the ends of the quarter of an edge in which the last way bends are clear, if presumed."""
-        if self.followed[i] == _ALL_POINTS:
-            return True
+        """Whether the ways to the points of an edge are clear; they are followed when one bends between its ends."""
         x: cython.double[3]
-        sought: cython.int = self.sought
         quarters: cython.double = 4 * self.share
-        is_clear: cython.bint = True
-        self.sought = i
+        way: cython.int = self.way[self.edges[i, 0]]
         for j in range(1, 4):
-            if is_clear and fabs(j - quarters) < 1 and not (self.followed[i] >> j) & 1:
+            if fabs(j - quarters) < 1 and not (self.followed[i] >> j) & 1:
                 self.point_along(i, j, x)
-                way: cython.int = self.way[self.edges[i, 0]]
                 # First, as where edges touch, each may rely on the other.
                 self.followed[i] |= 1 << j
-                is_clear = way > -2 and self.is_lit(way, self.edges[i, 0], x) and (way < 0 or self.holds(way))
-                if not is_clear:
-                    self.followed[i] &= _ALL_POINTS - (1 << j)
-        self.sought = sought
-        return is_clear
+                if way == -2 or not self.is_lit(i, way, self.edges[i, 0], x) or (way >= 0 and not self.holds(way)):
+                    self.followed[i] &= 255 - (1 << j)
+                    return False
+        return True
 
     @cython.cfunc
     @cython.nogil
@@ -311,12 +290,12 @@ class _Bends(Ray):
         sees: cython.bint = False
         for c in range(2):
             v: cython.int = self.edges[i, c]
-            self.add_at(v, x, most)
+            self.add_at(i, v, x, most)
             for k in range(self.body.first_neighbour[v] - 1, self.body.first_neighbour[v + 1]):
                 way: cython.int = self.way[v if k < self.body.first_neighbour[v] else self.body.neighbours[k]]
                 sees = sees or way == -1
                 if way >= 0:
-                    self.add(way, x, most)
+                    self.add(i, way, x, most)
         for c in range(2 if sees else 0):
             label: cython.int = self.label[self.edges[i, c]]
             if label >= 0 and (c == 0 or label != self.label[self.edges[i, 0]]):
@@ -334,31 +313,35 @@ class _Bends(Ray):
             self.near[best], self.near_value[best] = self.near[self.n_near], self.near_value[self.n_near]
             if value >= most:
                 return most
-            if self.is_lit(max(way, -1), self.edges[i, 1 if way == -2 else 0], x):
+            if self.is_lit(i, max(way, -1), self.edges[i, 1 if way == -2 else 0], x):
                 if way < 0 or self.holds(way):
                     return value
                 self.refuted = way
                 continue
             for c in range(1, 4):
-                self.add_at(self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
+                self.add_at(i, self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
         return most
 
     @cython.cfunc
     @cython.nogil
-    def add_at(self, v: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double) -> cython.void:
-        """Make the edges that end at v candidates for the `point` x."""
+    def add_at(
+        self, e: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
+    ) -> cython.void:
+        """Make the edges that end at v candidates for the `point` x of edge e."""
         for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
-            self.add(self.at_end[k], x, most)
+            self.add(e, self.at_end[k], x, most)
 
     @cython.cfunc
     @cython.nogil
-    def add(self, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double) -> cython.void:
-        """Make an edge one of 256 candidates (65 at most so far) for the `point` x if its way may be shorter."""
-        if self.point_of[i] != self.point and self.fit_of[i] & _MOST_FITS:
+    def add(
+        self, e: cython.int, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
+    ) -> cython.void:
+        """Make edge i one of 256 candidates (65 at most so far) for the `point` x of e if its way may be shorter."""
+        if self.point_of[i] != self.point:
             self.point_of[i] = self.point
             value: cython.double = self.around(i, x, False)
             is_shorter: cython.bint = value < most * (1 - GAIN) and self.n_near < 256
-            if is_shorter and self.is_hidden_from_before(i, x, self.edge[self.sought].length):
+            if is_shorter and self.is_hidden_from_before(i, x, self.edge[e].length):
                 self.near[self.n_near], self.near_value[self.n_near] = i, value
                 self.n_near += 1
 
@@ -419,29 +402,22 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def is_lit(self, i: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
-        """Whether the line back from a point x of the edge `sought` stays inside."""
+    def is_lit(
+        self, e: cython.int, i: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]]
+    ) -> cython.bint:
+        """Whether the line back from a point x of edge e, as of `look_back`, stays inside."""
         self.look_back(i, v, x)
         line: cython.pointer[Line] = cython.address(self.line)
-        a: cython.int = self.edges[self.sought, 0]
+        a: cython.int = self.edges[e, 0]
+        b: cython.int = self.edges[e, 1]
         for k in range(self.body.first[a], self.body.first[a + 1]):
             t: cython.int = self.body.incident[k] >> 2
-            # A line that touches a wall elsewhere is moved to all sides, one of which may be inside.
-            for toward in range(-1, 4 if self.has_sought(t) else -1):
-                found: cython.int = self.arrives(line, 4 * t, -1, toward)
+            at: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[t, 0])
+            if b in (at[0], at[1], at[2], at[3]):
+                found: cython.int = self.arrives(line, 4 * t, -1, -1)
                 if found > 0 or (found == -1 and self.is_blocked(line, 2 * NUDGE * self.body.reach[a])):
                     return found > 0
-                if found == -1 and self.has_sought(line.t):
-                    break
         return False
-
-    @cython.cfunc
-    @cython.nogil
-    def has_sought(self, t: cython.int) -> cython.bint:
-        """Whether a tetrahedron has both ends of the edge `sought`."""
-        at: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[t, 0])
-        a: cython.int = self.edges[self.sought, 0]
-        return a in (at[0], at[1], at[2], at[3]) and self.edges[self.sought, 1] in (at[0], at[1], at[2], at[3])
 
     @cython.cfunc
     @cython.nogil
@@ -451,14 +427,13 @@ class _Bends(Ray):
         to_b: cython.double = self.d[self.edges[i, 1]]
         is_new: cython.bint = self.edge[i].at[0] > to_a * (1 + GAIN) or self.edge[i].at[4] > to_b * (1 + GAIN)
         is_known: cython.bint = (min(to_a, to_b) if self.is_lone else max(to_a, to_b)) < INFINITY
-        if is_new and is_known and self.fit_of[i] & _MOST_FITS < _MOST_FITS:
+        if is_new and is_known:
             self.begin(i, False)
 
     @cython.cfunc
     @cython.nogil
     def begin(self, i: cython.int, follows: cython.bint) -> cython.void:
-        """Fit an edge, anew after one whose ways do not hold, and make it a candidate if it hides anything."""
-        self.sought = i
+        """Fit an edge, anew after one whose ways do not hold, and make it a candidate for those around it."""
         self.fit(i, follows)
         j: cython.int = self.refuted
         if j >= 0:
@@ -468,38 +443,13 @@ class _Bends(Ray):
             return
         if self.fit_of[i] & _MOST_FITS < _MOST_FITS:
             self.fit_of[i] += 1
-        if self.is_open[i, 0] or self.is_open[i, 1]:
-            self.offer_around(i, self.edges[i, 0])
-            self.offer_around(i, self.edges[i, 1])
-
-    @cython.cfunc
-    @cython.nogil
-    def open_at(self, v: cython.int) -> cython.void:
-        """Find the edges at v that hide anything from where the way to v comes from, as seen along the edge.
-
-        It hides what is below the plane through it and that place, if that is above the plane of a wall, beyond it.
-        """
-        here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
-        is_known: cython.bint = self.way[v] > -2
-        if is_known and self.first_at_end[v] < self.first_at_end[v + 1]:
-            self.look_back(self.way[v], v, here)
-        for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
-            i: cython.int = self.at_end[k]
-            edge: cython.pointer[_Edge] = cython.address(self.edge[i])
-            out: cython.double = 0.0
-            side: cython.double = 0.0
-            for c in range(3 if is_known else 0):
-                off: cython.double = self.line.goal[c] - here[c]
-                out += off * edge.outward[c]
-                side += off * edge.across[c]
-            above: cython.double = out + edge.wall * sqrt(out * out + side * side)
-            self.is_open[i, self.edges[i, 1] == v] = above > -_LEVEL * edge.length
+        self.offer_around(i, self.edges[i, 0])
+        self.offer_around(i, self.edges[i, 1])
 
     @cython.cfunc
     @cython.nogil
     def begin_at(self, v: cython.int) -> cython.void:
         """Begin around the edges that end at v, in the order of the other ends: ways lead from edge to edge."""
-        self.open_at(v)
         last: cython.double = -1.0
         while last < INFINITY:
             nearest: cython.double = INFINITY
@@ -525,19 +475,19 @@ class _Bends(Ray):
     @cython.cfunc
     @cython.nogil
     def offer_at(self, a: cython.int, v: cython.int, least: cython.double) -> cython.void:
-        """Make the edges that end at a candidates for v unless the ways around them are shorter than the `least`."""
+        """Make the edges that end at a candidates for v."""
         for k in range(self.first_at_end[a], self.first_at_end[a + 1]):
-            fit: cython.int = self.fit_of[self.at_end[k]]
-            if fit & _MOST_FITS and not self.has_met(v, fit):
-                self.offer(self.at_end[k], v, least)
+            self.offer(self.at_end[k], v, least)
 
     @cython.cfunc
     @cython.nogil
     def offer(self, i: cython.int, v: cython.int, least: cython.double) -> cython.void:
         """Make an edge a candidate for v, which waits, if the way around it would be shorter and v has not met it."""
         here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
+        if self.has_met(v, self.fit_of[i]):
+            return
         value: cython.double = self.around(i, here, False)
-        if value < least or value >= self.most(v) or self.has_met(v, self.fit_of[i]) or self.lacks_room():
+        if value < least or value >= self.most(v) or self.lacks_room():
             return
         k: cython.int = self.met[v]
         if k < 0 or self.lists[k].count == 14:
@@ -617,47 +567,40 @@ class _Bends(Ray):
     def ask(self, v: cython.int) -> cython.void:
         """Give v the way around its first candidate if the line is clear, and offer the edge to the neighbours.
 
-        If it is clear, edges that share an end with it may give shorter ways, and are asked for at once. If it is
+        Edges that share an end with it may give shorter ways, if it is clear, and are asked for at once. If it is
         hidden, they wait with those at the triangle that hides it; guesses that are hidden do not lead to nearer ones.
         """
         line: cython.pointer[Line] = cython.address(self.line)
         is_found: cython.bint = False
         k: cython.int = self.shortest(v)
-        while k >= 0:
+        while k >= 0 and self.offers[k].value < self.d[v] * (1 - GAIN):
             i: cython.int = self.offers[k].fit >> _FIT_BITS
             value: cython.double = self.offers[k].value
-            if value >= self.d[v] * (1 - GAIN):
-                break
+            least: cython.double = value if self.offers[k].is_guess else 0.0
             self.offers[k].value = INFINITY
             self.look_back(i, v, cython.address(self.body.positions[v, 0]))
             share: cython.double = self.share
-            if self.follows(line, v):
-                if not self.holds(i):
-                    self.begin(i, True)
-                    self.offer(i, v, 0.0)
-                    k = self.shortest(v)
-                    if is_found:
-                        continue
-                    return
-                is_found = True
-                self.d[v], self.way[v] = value, i
-                # A way may bend at an end that is not reached yet, equally short to rounding.
-                end: cython.int = self.edges[i, share >= 0.5]
-                self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, share < 0.5]]
-                self.offer_at(self.edges[i, 0], v, 0.0)
-                self.offer_at(self.edges[i, 1], v, 0.0)
+            is_clear: cython.bint = self.follows(line, v)
+            if is_clear and not self.holds(i):
+                self.begin(i, True)
+                self.offer(i, v, 0.0)
             else:
-                for c in range(1, 4):
-                    self.offer_at(self.body.cells[line.t, (line.out + c) & 3], v, 0.0)
-                least: cython.double = value if self.offers[k].is_guess else 0.0
-                self.is_guess = True
-                self.offer_at(self.edges[i, 0], v, least)
-                self.offer_at(self.edges[i, 1], v, least)
+                if is_clear:
+                    is_found = True
+                    self.d[v], self.way[v] = value, i
+                    # A way may bend at an end that is not reached yet, equally short to rounding.
+                    end: cython.int = self.edges[i, share >= 0.5]
+                    self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, share < 0.5]]
+                else:
+                    for c in range(1, 4):
+                        self.offer_at(self.body.cells[line.t, (line.out + c) & 3], v, 0.0)
+                self.is_guess = not is_clear
+                self.offer_at(self.edges[i, 0], v, 0.0 if is_clear else least)
+                self.offer_at(self.edges[i, 1], v, 0.0 if is_clear else least)
                 self.is_guess = False
-                if not is_found:
-                    self.shortest(v)
-                    return
             k = self.shortest(v)
+            if not is_found:
+                return
         if is_found:
             self.offer_around(self.way[v], v)
             self.begin_at(v)
@@ -678,21 +621,15 @@ class _Bends(Ray):
         through has a corner on the other side of the plane, and such corners are neighbours from one to the next.
         """
         edge: cython.pointer[_Edge] = cython.address(self.edge[i])
-        if edge.outward[0] == 0 and edge.outward[1] == 0 and edge.outward[2] == 0:
-            return True
         out: cython.double = 0.0
         side: cython.double = 0.0
         for k in range(3):
             off: cython.double = x[k] - edge.end[k]
             out += off * edge.outward[k]
             side += off * edge.across[k]
+        # Both are 0 where more than two walls meet, and the way is not known where that to its beginning is.
         below: cython.double = out - edge.wall * sqrt(out * out + side * side)
-        if below > _LEVEL * size:
-            return False
-        if not edge.has_before:
-            return True
+        far: cython.double = sqrt(edge.before[0] * edge.before[0] + edge.before[1] * edge.before[1])
         side = side if edge.before[1] >= 0 else -side
         behind: cython.double = out * fabs(edge.before[1]) - side * edge.before[0]
-        return side <= size and behind >= -size * sqrt(
-            edge.before[0] * edge.before[0] + edge.before[1] * edge.before[1]
-        )
+        return below <= _LEVEL * size and side * far <= size * far and behind >= -size * far
