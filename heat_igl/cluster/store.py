@@ -131,8 +131,7 @@ class Store:
         except Exception as error:  # zarr has many for metadata that are damaged
             raise ValueError(f"{folder / 'zarr.json'} is damaged: {error}") from None
         if found.pop("seal", None) != self._seal(name, found):
-            files = ", ".join(file for file in ("zarr.json", *_SMALL_FILES))
-            raise ValueError(f"{folder}: one of {files} is missing or damaged")
+            raise ValueError(f"{folder}: one of {', '.join(('zarr.json', *_SMALL_FILES))} is missing or damaged")
         return found
 
     def _seal(self, name: str, attributes: Mapping[str, Any]) -> str:

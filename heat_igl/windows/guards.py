@@ -183,7 +183,7 @@ class GuardedEngine(Engine):
         """Distance (n,)."""
         try:
             found = self.windows.distance(sources, cutoff, threads)
-            problem = self.problem(found, sources, cutoff)
+            problem = self._invariants.contradiction(found, sources, cutoff)
         except EndlessSearchError as error:
             problem = str(error)
         return found if problem is None else self._replacement(problem, sources, cutoff, threads)[0]
@@ -200,7 +200,7 @@ class GuardedEngine(Engine):
         """Distance (n,) and nearest source (n,)."""
         try:
             found = self.windows.labelled(sources, cutoff, threads)
-            problem = self.problem(found[0], sources, cutoff)
+            problem = self._invariants.contradiction(found[0], sources, cutoff)
         except EndlessSearchError as error:
             problem = str(error)
         return found if problem is None else self._replacement(problem, sources, cutoff, threads)
@@ -218,21 +218,17 @@ class GuardedEngine(Engine):
     def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
         """Distance and directions, see `WindowEngine.directed`; no other engine computes directions."""
         found = self.windows.directed(sources)
-        problem = self.problem(found[0], sources)
+        problem = self._invariants.contradiction(found[0], sources)
         if problem is not None:
             raise contradicted(problem)
         return found
-
-    def problem(self, distance: FloatArray, sources: SourceSet, cutoff: float = np.inf) -> str | None:
-        """How a distance (n,) violates the invariants; None if it does not."""
-        return self._invariants.contradiction(distance, sources, cutoff)
 
     def _replacement(
         self, problem: str, sources: SourceSet, cutoff: float, threads: int
     ) -> tuple[FloatArray, IntArray]:
         for make in self._others:
             found = make().labelled(sources, cutoff, threads)
-            if self.problem(found[0], sources, cutoff) is None:
+            if self._invariants.contradiction(found[0], sources, cutoff) is None:
                 warn_caller(
                     f"the distance contradicted itself ({problem}) and was replaced by that of another method, which "
                     f"is less accurate: {_REPORT}",
