@@ -264,3 +264,10 @@ def test_transport_on_closed_surfaces_is_that_of_potpourri3d(name):
     sources, values = np.array([1, mesh.n_vertices // 2]), np.array([1.0, 2.0])
     found = VectorHeatSolver(mesh, t_coef=1.0).extend(sources, values)
     assert np.median(np.abs(found - theirs.extend_scalar(sources, values))) < 0.02
+
+
+def test_a_source_that_no_face_uses_gets_no_advice_to_raise_t():
+    ball = shapes.icosphere(1)
+    apart = VectorHeatSolver(Mesh(np.append(ball.V, [[3.0, 0.0, 0.0]], axis=0), ball.F))
+    with pytest.warns(heat_igl.AccuracyWarning, match="vertex 42 first: they get 0; no face uses them"):
+        assert apart.extend([0, 42], [2.0, 5.0]) == pytest.approx(np.append(np.full(42, 2.0), 0.0))

@@ -347,12 +347,13 @@ class HeatTransport:
         unit = SOURCE_HEAT / b[:, 1].max()
         u, phi = self._heat_flow.solve(b * unit).T
         warm = phi > LOWEST_HEAT
-        components = self._solver.operators.components
-        cold = np.isin(components, components[vertices]) & ~warm
+        domain = self._solver.operators
+        cold = np.isin(domain.components, domain.components[vertices]) & ~warm
         if cold.any():
+            remedy = "raise t" if domain.referenced[cold].any() else "no face uses them"
             warn_caller(
                 f"heat does not reach {int(cold.sum())} vertices in double precision, vertex {int(np.argmax(cold))} "
-                "first: they get 0; raise t",
+                f"first: they get 0; {remedy}",
                 AccuracyWarning,
             )
         ratio = np.divide(u, phi, out=np.zeros_like(u), where=warm) * largest
