@@ -102,10 +102,10 @@ class HopfLaxEngine(SimplexEngine):
         """The paths that cross facets between simplices of different marks."""
         corners, size, n = self._corners, self._corners.shape[1], self._simplices.n
         # Marks differ at all vertices of these facets.
-        at_vertex, is_mixed = np.zeros(n, np.float32), np.zeros(n, bool)
-        at_vertex[corners] = mark[:, None]
-        is_mixed[corners[at_vertex[corners] != mark[:, None]]] = True
-        some = np.flatnonzero((mark != 0) & (sum(is_mixed[c].astype(int) for c in corners.T) >= size - 1))
+        at_vertex, is_mixed, some = np.zeros(n, np.float32), np.zeros(n, bool), np.flatnonzero(mark)
+        at_vertex[corners[some]] = mark[some, None]
+        is_mixed[corners[some][at_vertex[corners[some]] != mark[some, None]]] = True
+        some = some[np.count_nonzero(is_mixed[corners[some]], axis=1) >= size - 1]
         rows = corners[some][:, [[j for j in range(size) if j != c] for c in range(size)]].reshape(-1, size - 1).T
         low, high = reduce(np.minimum, rows), reduce(np.maximum, rows)
         _, facet, counts = unique_rows(np.stack([low, sum(rows) - low - high, high], axis=1), n)
