@@ -265,6 +265,60 @@ def _add_misses(
             result[v, k] += at[v, k] / max(first[v + 1] - first[v], 1)
 
 
+@cython.cfunc
+@cython.nogil
+def _sum_products(
+    corners: cython.const[cython.int][:, ::1],
+    X: cython.const[cython.double][:, ::1],
+    W: cython.const[cython.double][:, ::1],
+    group: cython.const[cython.int][::1],
+    level: cython.double[::1],
+    origin: cython.double[::1],
+    at: cython.double[:, ::1],
+) -> cython.void:
+    """Add up over the simplices at each vertex, in a row of `at` (n, 35), or (n, 41) for triangles.
+
+    These are the products of 1, x, y, z with 1, x, y, z and the velocity at the centre, each pair once; the square of
+    the velocity; and products of the unit normal. Positions are from the `origin` (3,), velocities from `level` (6,).
+    """
+    size: cython.int = corners.shape[1]
+    n_columns: cython.int = cython.cast(cython.int, at.shape[1])
+    row: cython.double[10]
+    side: cython.double[6]
+    normal: cython.double[3]
+    mean: cython.double[41]
+    row[0] = 1.0
+    for s in range(corners.shape[0]):
+        for k in range(9):
+            row[1 + k] = W[group[s], k - 3] - level[k - 3] if k > 2 else 0.0
+        for k in range(3 * size):
+            row[1 + k % 3] += (X[corners[s, k // 3], k % 3] - origin[k % 3]) / size
+        if n_columns == 41:
+            for k in range(6):
+                side[k] = X[corners[s, 1 + k // 3], k % 3] - X[corners[s, 0], k % 3]
+            cross(side, side + 3, normal)
+            area: cython.double = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+            for k in range(3):
+                normal[k] /= max(area, DBL_MIN)
+        i: cython.int = 0
+        for j in range(4):
+            for k in range(j, 10):
+                mean[i] = row[j] * row[k]
+                i += 1
+        mean[34] = 0.0
+        for k in range(6):
+            mean[34] += _OFTEN[k] * row[4 + k] * row[4 + k]
+        i = 35
+        for j in range(3 if n_columns == 41 else 0):
+            for k in range(j, 3):
+                mean[i] = normal[j] * normal[k]
+                i += 1
+        for c in range(size):
+            to = cython.address(at[corners[s, c], 0])
+            for k in range(n_columns):
+                to[k] += mean[k]
+
+
 def fits_around(
     corners: cython.const[cython.int][:, ::1],
     X: cython.const[cython.double][:, ::1],
@@ -281,7 +335,7 @@ def fits_around(
     """
     size: cython.int = corners.shape[1]
     n_columns: cython.int = 35 if size == 4 else 41
-    # Products of 1, x, y, z with 1, x, y, z and velocity, each pair once; the square of velocity; and of the normal.
+    # As `_sum_products` adds them up.
     sums, found, shares = np.zeros((len(X), n_columns)), np.zeros((len(X), 6)), np.zeros(len(X))
     at: cython.double[:, ::1] = sums
     missed: cython.double[:, ::1] = sums.ravel()[: found.size].reshape(found.shape)
@@ -292,43 +346,12 @@ def fits_around(
     level: cython.double[::1] = np.bincount(group) @ W / len(group)
     # Far from the origin, digits of products of positions are lost.
     origin: cython.double[::1] = np.mean(X, axis=0)
-    row: cython.double[10]
-    side: cython.double[6]
-    normal: cython.double[3]
     mean: cython.double[41]
     work: cython.double[18]
     slope: cython.double[18]
-    row[0] = 1.0
+    i: cython.int
     with cython.nogil:
-        for s in range(corners.shape[0]):
-            for k in range(9):
-                row[1 + k] = W[group[s], k - 3] - level[k - 3] if k > 2 else 0.0
-            for k in range(3 * size):
-                row[1 + k % 3] += (X[corners[s, k // 3], k % 3] - origin[k % 3]) / size
-            if n_columns == 41:
-                for k in range(6):
-                    side[k] = X[corners[s, 1 + k // 3], k % 3] - X[corners[s, 0], k % 3]
-                cross(side, side + 3, normal)
-                area: cython.double = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
-                for k in range(3):
-                    normal[k] /= max(area, DBL_MIN)
-            i: cython.int = 0
-            for j in range(4):
-                for k in range(j, 10):
-                    mean[i] = row[j] * row[k]
-                    i += 1
-            mean[34] = 0.0
-            for k in range(6):
-                mean[34] += _OFTEN[k] * row[4 + k] * row[4 + k]
-            i = 35
-            for j in range(3 if n_columns == 41 else 0):
-                for k in range(j, 3):
-                    mean[i] = normal[j] * normal[k]
-                    i += 1
-            for c in range(size):
-                to = cython.address(at[corners[s, c], 0])
-                for k in range(n_columns):
-                    to[k] += mean[k]
+        _sum_products(corners, X, W, group, level, origin, at)
         for v in range(X.shape[0]):
             others: cython.double = -1.0
             for k in range(41):
