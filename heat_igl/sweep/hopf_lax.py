@@ -83,7 +83,18 @@ class HopfLaxEngine(SimplexEngine):
         of, corners = self._simplices, self._corners
         kernel: Any = SimplexUpdate
         metric = of.velocity, of.rows, *of.measured[:-1], of.place
-        # One number for each metric, to seven digits, as rounding makes no difference, and 0 where it varies.
+        mark = self._marks()
+        crossings: tuple[AnyArray, ...] = np.zeros(of.n + 1, np.int32), np.empty((0, 3), np.int32), np.empty(0)
+        if (mark != 0).any():
+            crossings = self._crossings(mark, kernel(corners, *metric))
+        return corners, self._first, self._incident, crossings, *metric
+
+    def _marks(self) -> AnyArray:
+        """A number (m,) for the metric of each simplex, to seven digits as equal ones may differ by rounding; or 0.
+
+        It is 0 where the metric varies within the simplex.
+        """
+        of = self._simplices
         if of.velocity is not None and of.rows is not None:
             mark = (of.velocity @ np.sqrt(np.arange(2, 8)))[of.rows[:, 0]]
             widest, slack, growth = of.measured[2:5]
@@ -91,12 +102,8 @@ class HopfLaxEngine(SimplexEngine):
         elif of.tensors is not None and of.group is not None:
             mark = (of.tensors.reshape(-1, 9) @ np.sqrt(np.arange(2, 11)))[of.group]
         else:
-            mark = np.zeros(len(corners))
-        mark = (mark / max(np.abs(mark).max(initial=0), np.finfo(float).tiny)).astype(np.float32)
-        crossings: tuple[AnyArray, ...] = np.zeros(of.n + 1, np.int32), np.empty((0, 3), np.int32), np.empty(0)
-        if (mark != 0).any():
-            crossings = self._crossings(mark, kernel(corners, *metric))
-        return corners, self._first, self._incident, crossings, *metric
+            mark = np.zeros(len(self._corners))
+        return np.asarray(mark / max(np.abs(mark).max(initial=0), np.finfo(float).tiny), np.float32)
 
     def _crossings(self, mark: AnyArray, update: Any) -> tuple[AnyArray, ...]:
         """The paths that cross facets between simplices of different marks."""
