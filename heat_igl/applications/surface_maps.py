@@ -184,8 +184,8 @@ def smooth(mesh: MeshLike, values: ArrayLike, fwhm: float, *, region: ArrayLike 
     bad = ~np.isfinite(given) & triangles.referenced
     raise_at_first(bad, "values", given, "must be finite", "fill them, or leave these vertices out by region")
     given[..., triangles.referenced] = _diffused(triangles, given, positive("fwhm", fwhm) ** 2 / (16 * np.log(2)))
-    has_copies = triangles.referenced[triangles.originals]
-    given[..., has_copies] = given[..., triangles.originals[has_copies]]
+    is_used = triangles.referenced[triangles.originals]
+    given[..., is_used] = given[..., triangles.originals[is_used]]
     return given
 
 
