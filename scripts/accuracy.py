@@ -18,20 +18,19 @@ in the mean and at worst: the defaults of `HeatMethodSolver` are chosen by this 
 from __future__ import annotations
 
 import argparse
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
 
 from heat_igl import Mesh, read_mesh, reference
-from heat_igl.errors import AccuracyWarning, MeshError, MissingExtraError, ReferenceSolverError
+from heat_igl.errors import MeshError, MissingExtraError, ReferenceSolverError
 from heat_igl.heat.steps import HeatFlow, PoissonProblem, damping, normalize
 from heat_igl.operators import operators
 from heat_igl.typing import FloatArray
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 
-from harness import Query, Row, Table, collected, drawn, errors, geometric_mean, ours, parsed, publish
+from harness import Query, Row, Table, collected, drawn, errors, geometric_mean, ours, parsed, publish, warned
 
 SUFFIXES = {".off", ".obj", ".ply", ".stl", ".mesh", ".msh"}
 FAILURES = (MeshError, MissingExtraError, ReferenceSolverError, ImportError, RuntimeError, ValueError)
@@ -128,11 +127,8 @@ def measured(query: Query, sources: Sequence[int], truths: Sequence[FloatArray])
     """Mean and largest error, the largest excess below exact, and the number of warned answers."""
     found, n_warned, n_silent, n_in_vain = [], 0, 0, 0
     for source, truth in zip(sources, truths, strict=True):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            distance = np.asarray(query(source), float)
-        is_warned = any(issubclass(warning.category, AccuracyWarning) for warning in caught)
-        found.append(errors(distance, truth))
+        distance, is_warned = warned(lambda source=source: query(source))
+        found.append(errors(np.asarray(distance, float), truth))
         n_warned += is_warned
         n_silent += not is_warned and found[-1]["mean"] > WRONG
         n_in_vain += is_warned and found[-1]["mean"] < RIGHT

@@ -7,17 +7,17 @@
     python scripts/benchmark.py --huge 10000000 --methods heat sweep windows     # one query each on an icosphere
     python scripts/benchmark.py --peers cow.obj bunny.obj --docs docs/peers.md   # all peers, on meshes as they are
     python scripts/benchmark.py --methods "heat, superlu" "heat, multifrontal" --sizes 300 1000 3000  # linear solvers
+    python scripts/benchmark.py --methods heat "heat, not compared"   # the cost of comparisons: first and later query
 
 Every method runs in a process of its own, which measures its peak memory; the processes take turns, so that what else
 happens on the machine hits all alike, and ratios are medians over paired runs. On spheres truth is the great circle; on
 subdivided meshes exact distance at the vertices of the first mesh, whose surface subdivision keeps. VTP is called where
-the variable HEAT_IGL_VTP names its program. ``--backend`` is the linear solver of heat in ``--huge``.
+the variable HEAT_IGL_VTP names its program.
 """
 
 from __future__ import annotations
 
 import statistics
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -40,8 +40,11 @@ from harness import METHODS, Method, Row, Table, collected, drawn, errors, ours,
 SIZES = [10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000]
 BATCH, LATER = 64, 5
 FITTED = (9_000, 1_250_000)  # range of sizes that exponents are fitted in
-TIMED = METHODS | {f"heat, {name}": Method(ours("heat", backend=b)) for name, b in
-                   {"superlu": "scipy", "multifrontal": "multifrontal"}.items()}  # fmt: skip
+HEAT: dict[str, dict[str, Any]] = {
+    "superlu": {"backend": "scipy"}, "multifrontal": {"backend": "multifrontal"}, "not compared": {"t_coef": 0.5},
+    "t_coef 1": {"t_coef": 1.0}, "t_coef 0.4": {"t_coef": 0.4}, "the paper's": {"magnitude": "unit"},
+}  # fmt: skip
+TIMED = METHODS | {f"heat, {name}": Method(ours("heat", **options)) for name, options in HEAT.items()}
 COMPARED = ["heat", "potpourri3d", "libigl heat", "MeshLab's front", "pygeodesic"]
 PEERS = ["potpourri3d", "libigl heat"]
 QUANTITIES = ("precomputation", "later", "batch", "peak")
@@ -50,12 +53,11 @@ QUANTITIES = ("precomputation", "later", "batch", "peak")
 # One run of one method, in a process of its own.
 
 
-def run(method: str, path: str, sources: list[int], is_whole: bool = True) -> tuple[Row, FloatArray]:
+def run(method: str, mesh: Mesh, sources: list[int], is_whole: bool = True) -> tuple[Row, FloatArray]:
     """Seconds of each stage and bytes at the peak, and the distance from the first source."""
     prepare = TIMED[method].prepare
     warm_up = prepare(shapes.icosphere(4))
     warm_up(0)
-    mesh = read(path)
     row: Row = {}
     with PeakMemory() as peak:
         start = time.perf_counter()
@@ -76,11 +78,6 @@ def run(method: str, path: str, sources: list[int], is_whole: bool = True) -> tu
     return row, distance
 
 
-def read(path: str) -> Mesh:
-    with np.load(path) as arrays:
-        return Mesh(arrays["V"], arrays["F"])
-
-
 def measured(
     name: str, mesh: Mesh, methods: Sequence[str], runs: int, sources: list[int], truth: FloatArray, whole: bool = True
 ) -> Iterator[Row]:
@@ -88,17 +85,14 @@ def measured(
     chosen = [m for m in methods if TIMED[m].is_there and mesh.n_vertices <= TIMED[m].most]
     found: dict[str, list[Row]] = {method: [] for method in chosen}
     rows: dict[str, Row] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        path = str(Path(folder, "mesh.npz"))
-        np.savez(path, V=mesh.V, F=mesh.F)
-        pools = {method: ProcessPoolExecutor(1, get_context("spawn")) for method in chosen}
-        for turn in range(runs):
-            for method in chosen[turn % len(chosen) :] + chosen[: turn % len(chosen)]:
-                row, distance = pools[method].submit(run, method, path, sources, whole).result()
-                found[method].append(row)
-                rows[method] = {"longest": distance.max()} | errors(distance[: len(truth)], truth)
-        for pool in pools.values():
-            pool.shutdown()
+    pools = {method: ProcessPoolExecutor(1, get_context("spawn")) for method in chosen}
+    for turn in range(runs):
+        for method in chosen[turn % len(chosen) :] + chosen[: turn % len(chosen)]:
+            row, distance = pools[method].submit(run, method, mesh, sources, whole).result()
+            found[method].append(row)
+            rows[method] = {"longest": distance.max()} | errors(distance[: len(truth)], truth)
+    for pool in pools.values():
+        pool.shutdown()
     for method, each in found.items():
         known = {key for key, value in each[0].items() if value is not None}
         rows[method] |= {key: statistics.median(one[key] for one in each) for key in known}
@@ -158,7 +152,6 @@ def at_range(options: Any) -> Iterator[Row]:
 
 def huge(options: Any) -> Iterator[Row]:
     """One query and two later ones on an icosphere of about so many vertices, or a mesh subdivided to that."""
-    TIMED["heat"] = Method(ours("heat", backend=options.backend))
     if options.meshes:
         mesh = first = read_mesh(options.meshes[0])
         while mesh.n_vertices < 0.8 * options.huge:
@@ -217,7 +210,7 @@ def ratios(peer: str) -> dict[str, str]:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    more: dict[str, Any] = {"peers": False, "range": False, "huge": 0, "backend": "auto", "methods": COMPARED}
+    more: dict[str, Any] = {"peers": False, "range": False, "huge": 0, "methods": COMPARED}
     options = parsed(__doc__, argv, "*", sizes=SIZES, runs=5, **more)
     if options.huge:
         publish(options, {"huge": Table(collected(huge(options)), COST)})

@@ -5,6 +5,7 @@
     python scripts/clouds_table.py log-maps MESH ...
     python scripts/clouds_table.py scans [--sizes 1000 5000 20000] [--sources 3]   # noise, outliers, uneven density
     python scripts/clouds_table.py warnings [--sizes 600] [--seed 10000]   # of how many random clouds, right or wrong
+    python scripts/clouds_table.py limits [--repeats 15]   # what is closed, connected or torn
 
 Random points on a sphere of radius 1, a torus of radii 1 and 0.4, a cylinder of radius 1 and height 3, and a square
 with sides of length 1, or the vertices of meshes; noise is Gaussian in all coordinates. distances: the mean of
@@ -15,7 +16,8 @@ the share of doubtful points, not counting folds, with a star where the cloud wa
 exact one of the mesh in degrees, and the mean of |v - exact| / |exact| in percent. scans: mean errors in percent of
 default / potpourri3d / the shortest path in the graph of 8 neighbours. warnings: of so many random points on random
 surfaces, how many clouds are wrong by more than 5 % in the mean from one source, and silent, and how many are right
-within 2 % and warn, other than of several parts. Needs ``bench``; see docs/clouds_theory.md.
+within 2 % and warn, other than of several parts. limits: the least and the most parts and boundaries of so many random
+clouds, and how many warn. Needs ``bench``; see docs/clouds_theory.md.
 """
 
 from __future__ import annotations
@@ -37,7 +39,21 @@ from heat_igl import GeodesicSolver, Mesh, PointCloud, VectorHeatSolver, log_map
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.zoo import FAMILIES
 
-from harness import Query, Row, Table, collected, drawn, errors, mean_error, named, on_sphere, parsed, publish, seconds
+from harness import (
+    Query,
+    Row,
+    Table,
+    collected,
+    drawn,
+    errors,
+    mean_error,
+    named,
+    on_sphere,
+    parsed,
+    publish,
+    seconds,
+    warned,
+)
 
 Points = tuple[FloatArray, Query]
 Scan = Callable[[FloatArray, np.random.Generator], tuple[FloatArray, IntArray]]
@@ -81,11 +97,8 @@ def _graph(P: FloatArray) -> Query:
 
 def _surface(P: FloatArray) -> tuple[IntArray, str]:
     """The points of a cloud that may make it warn, and a star if it warned."""
-    cloud = PointCloud(P)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        doubtful = cloud._made[1]
-    return doubtful, "*" * bool(caught)
+    made, is_warned = warned(lambda: PointCloud(P)._made)
+    return made[1], "*" * is_warned
 
 
 def _restricted(mesh: Mesh, truth: Query) -> Query:
@@ -114,11 +127,8 @@ METHODS: dict[str, Callable[[FloatArray], Query]] = {
 
 def noisy(share: float) -> Scan:
     """Gaussian noise in all coordinates, in shares of half the largest extent."""
-
-    def scan(P: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
-        return P + share * np.ptp(P, axis=0).max() / 2 * rng.standard_normal(P.shape), np.arange(len(P))
-
-    return scan
+    extent = lambda P: np.ptp(P, axis=0).max()  # noqa: E731
+    return lambda P, rng: (P + share * extent(P) / 2 * rng.standard_normal(P.shape), np.arange(len(P)))
 
 
 def with_outliers(P: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
@@ -237,7 +247,7 @@ def on_random_surface(seed: int) -> tuple[str, FloatArray, FloatArray]:
     return name, at.positions(mesh), heat_igl.geodesic_distance(mesh, first, targets=at)
 
 
-def warned(options: argparse.Namespace) -> Iterator[Row]:
+def judged(options: argparse.Namespace) -> Iterator[Row]:
     """How many random clouds of each family are wrong and right, and how many of both warn."""
     counts = {name: np.zeros(4, int) for name in [*FAMILIES, "all"]}
     for seed in range(options.seed, options.seed + options.sizes[0]):
@@ -254,6 +264,31 @@ def warned(options: argparse.Namespace) -> Iterator[Row]:
             counts[each] += [wrong, wrong and not caught, right, right and bool(caught)]
     for name, count in counts.items():
         yield {"family": name} | dict(zip(("wrong", "silent", "right", "said"), count.tolist(), strict=True))
+
+
+# Points for a value and a generator, and the values.
+LIMITS: dict[str, tuple[Callable[[float, np.random.Generator], FloatArray], Sequence[float]]] = {
+    "spheres, spacings apart": (lambda gap, rng: on_sphere(6000, rng) * (
+        1 + gap * np.sqrt(4 * np.pi / 3000) * (np.arange(6000) % 2)[:, None]), (1.5, 2, 2.5, 3)),
+    "hole, spacings across": (lambda width, rng: (
+        P := square(3000, rng)[0])[np.hypot(*P[:, :2].T - 0.5) > width / 2 / 3000**0.5], (5, 6, 7, 8)),
+    "rows, spacings apart": (lambda apart, rng: square(3000, rng)[0] / 5 + np.stack(
+        [(k := np.arange(3000)) % 100, apart * (k // 100), 0 * k], axis=1), (5, 10, 15, 20)),
+    "density, jump": (lambda jump, rng: square(30_000, rng)[0] + np.outer(
+        rng.random(30_000) < 1 / (1 + jump), [1, 0, 0]), (10, 50, 100)),
+}  # fmt: skip
+
+
+def limits(options: argparse.Namespace) -> Iterator[Row]:
+    for name, value in ((name, value) for name, (_, values) in LIMITS.items() for value in values):
+        found = []
+        for seed in range(options.seed, options.seed + options.repeats):
+            cloud = PointCloud(LIMITS[name][0](value, np.random.default_rng(seed)))
+            report, is_warned = warned(cloud.report)
+            found.append((report.n_components, report.n_boundary_loops, is_warned))
+        parts, boundaries = (f"{min(each)} to {max(each)}" for each in list(zip(*found, strict=True))[:2])
+        said = sum(is_warned for *_, is_warned in found)
+        yield {"points": name, "number": value, "parts": parts, "boundaries": boundaries, "warned": said}
 
 
 def log_maps(options: argparse.Namespace) -> Iterator[Row]:
@@ -276,11 +311,13 @@ def log_maps(options: argparse.Namespace) -> Iterator[Row]:
         yield {"vertices of": vertices} | {name: np.mean(each, axis=0).tolist() for name, each in found.items()}
 
 
+ROWS = {"distances": distances, "turns": turns, "scans": scans, "warnings": judged, "limits": limits}
+ROWS |= {"log-maps": log_maps}
+
+
 def main(argv: Sequence[str] | None = None) -> None:
     several = {"shapes": [*SHAPES], "sizes": [5000, 50000], "noise": [0.0, 0.01], "methods": [*METHODS]}
-    options = parsed(
-        __doc__, argv, "*", ("distances", "turns", "log-maps", "scans", "warnings"), sources=6, repeats=15, **several
-    )
+    options = parsed(__doc__, argv, "*", ROWS, sources=6, repeats=15, **several)
     head = {"points on": "{points on}", "number": "{number}", "noise": "{noise:g}"}
     scan = "{{{0}[default]:.2g}} / {{{0}[potpourri3d]:.2g}} / {{{0}[graph]:.2g}}{{{0}[warned]}}"
     columns = {
@@ -293,13 +330,11 @@ def main(argv: Sequence[str] | None = None) -> None:
         | {"solver and first query": "{both:.2f}", "later query": "{later:.2f}"},
         "scans": {"scan": "{scan}", "number": "{number}"} | {shape: scan.format(shape) for shape in options.shapes},
         "warnings": {key: key for key in ("family", "wrong", "silent", "right", "said")},
+        "limits": {key: key for key in ("points", "number", "parts", "boundaries", "warned")},
         "log-maps": {"vertices of": "{vertices of}"}
         | {f"{m}, degrees, %": f"{{{m}[0]:.2g}}, {{{m}[1]:.2g}}" for m in ("heat", "paths", "potpourri3d")},
     }
-    rows = {"distances": distances, "turns": turns, "scans": scans, "warnings": warned, "log-maps": log_maps}[
-        options.table
-    ](options)
-    publish(options, {options.table: Table(collected(rows), columns[options.table])})
+    publish(options, {options.table: Table(collected(ROWS[options.table](options)), columns[options.table])})
 
 
 if __name__ == "__main__":

@@ -118,7 +118,7 @@ def table(mesh: Mesh, region: BoolArray, labels: IntArray, radius: float, source
         yield {"matrix": what, "method": name, "seconds": f"~{whole:.0f}", "MB": peak, "error": error(rows)}
 
 
-def main(argv: Sequence[str] | None = None) -> dict[str, object]:
+def main(argv: Sequence[str] | None = None) -> None:
     options = parsed(__doc__, argv, vertices=32492, parcels=360, radius=20.0, sources=40)
     mesh, region = cortex(options.vertices)
     sites = heat_igl.farthest_points(heat_igl.GeodesicSolver(mesh, region=region), options.parcels, start=0)
@@ -130,7 +130,7 @@ def main(argv: Sequence[str] | None = None) -> dict[str, object]:
         f"{mesh.n_vertices} vertices, edges of {mesh.edge_lengths.mean():.1f} mm, "
         f"{int((~region).sum())} of them in the medial wall."
     )
-    return publish(options, {"cortex": Table(found, columns, text)})
+    publish(options, {"cortex": Table(found, columns, text)})
 
 
 if __name__ == "__main__":

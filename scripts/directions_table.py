@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
+import potpourri3d
 from scipy.sparse import csgraph
 
 import heat_igl
@@ -76,8 +77,6 @@ def errors(found: FloatArray, truth: AnyArray, away: BoolArray) -> dict[str, flo
 
 def log_maps(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
     """Errors of each way to the log map, means over the sources."""
-    import potpourri3d
-
     solver, peer = heat_igl.GeodesicSolver(mesh), potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
     x, y, _ = peer.get_tangent_frames()
     found: dict[str, list[dict[str, float]]] = {}
@@ -101,8 +100,6 @@ def log_maps(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
 
 def vector_heat(name: str, mesh: Mesh, sources: Sequence[int]) -> Row:
     """Mean errors of values and directions from three sources, ours and potpourri3d's."""
-    import potpourri3d
-
     ours, near = VectorHeatSolver(mesh), VectorHeatSolver(mesh, method="windows")
     theirs = potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
     x, y, _ = theirs.get_tangent_frames()
@@ -130,8 +127,6 @@ def vector_heat(name: str, mesh: Mesh, sources: Sequence[int]) -> Row:
 
 def times(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
     """Directions as a share of distance, by kind of source; log maps as a share of potpourri3d's fastest way."""
-    import potpourri3d
-
     V, F, rng = mesh.V, mesh.F, np.random.default_rng(0)
     solver, peer = heat_igl.GeodesicSolver(mesh), potpourri3d.MeshVectorHeatSolver(V, F)
     points = [SurfacePoints([face], [[0.2, 0.3, 0.5]]) for face in rng.integers(0, mesh.n_faces, len(sources))]
@@ -160,8 +155,6 @@ def times(name: str, mesh: Mesh, sources: Sequence[int]) -> Iterator[Row]:
 
 def traces(name: str, mesh: Mesh, count: int, seed: int) -> Row:
     """Seconds of one batch of geodesics a quarter as long as the mesh, and how far some end from potpourri3d's."""
-    import potpourri3d
-
     rng = np.random.default_rng(seed)
     start = SurfacePoints(rng.integers(0, mesh.n_faces, count), rng.dirichlet([1, 1, 1], count))
     length = mesh.longest_distance / 4
@@ -194,8 +187,6 @@ def edge_loop(mesh: Mesh, stops: list[int]) -> list[int]:
 
 def paths(name: str, mesh: Mesh, n_pairs: int, seed: int) -> Iterator[Row]:
     """A row for paths and one for loops."""
-    import potpourri3d
-
     rng = np.random.default_rng(seed)
     usable = np.flatnonzero(mesh.components == mesh.components[mesh.F[0, 0]])
     pairs = [rng.choice(usable, 2, replace=False).tolist() for _ in range(n_pairs)]

@@ -22,7 +22,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import Delaunay
 
 import heat_igl
 from heat_igl import Mesh, distances_within, geodesic_distance, pair_distances, shapes, write_distances_within
@@ -30,7 +29,7 @@ from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.construction import hull
+from heat_igl.validation.construction import hull, planar
 from heat_igl.windows.exact import ExactSurface
 
 from harness import METHODS, Row, Table, collected, drawn, named, on_sphere, paired, parsed, publish, seconds
@@ -51,8 +50,8 @@ def ground(n: int, roughness: float, shear: float = 0.0) -> Mesh:
     """Random heights on the Delaunay triangulation of random points; `roughness` in units of their spacing."""
     rng = np.random.default_rng(0)
     P = rng.random((n, 2))
-    heights = rng.normal(size=n) * roughness / np.sqrt(n)
-    return Mesh(np.column_stack([P[:, 0] + shear * P[:, 1], P[:, 1], heights]), Delaunay(P).simplices)
+    mesh = planar(P, rng.normal(size=n) * roughness / np.sqrt(n))
+    return mesh.with_vertices(mesh.V + shear * mesh.V[:, 1:2] * [1, 0, 0])
 
 
 def drum(n: int) -> Mesh:

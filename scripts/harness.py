@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -129,10 +130,17 @@ def environment() -> dict[str, str]:
     return found
 
 
-def as_they_are(rows: Sequence[Row]) -> Table:
-    """A column for each value of the first row; floats with three digits."""
-    shown = [{key: f"{v:.3g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows]
-    return Table(shown, {key: key for key in rows[0]})
+def as_they_are(rows: Sequence[Row], text: str = "", form: str = ".3g") -> Table:
+    """A column for each value of the first row; floats with three digits, lists with commas."""
+
+    def cell(value: Any) -> str:
+        if isinstance(value, list):
+            return ", ".join(map(str, value)) or "-"
+        return f"{value:{form}}" if isinstance(value, float) else str(value).replace("|", r"\|")
+
+    return Table(
+        [{cell(key): cell(v) for key, v in row.items()} for row in rows], {cell(k): cell(k) for k in rows[0]}, text
+    )
 
 
 def fill_in(text: str, parts: Mapping[str, str]) -> str:
@@ -145,10 +153,10 @@ def fill_in(text: str, parts: Mapping[str, str]) -> str:
     return text
 
 
-def publish(options: argparse.Namespace, tables: Mapping[str, Table | str], **facts: Any) -> dict[str, Any]:
-    """Print the environment and the tables, and write them wherever the options say; returns all as plain data.
+def publish(options: argparse.Namespace, tables: Mapping[str, Table | str]) -> None:
+    """Print the environment and the tables, and write them wherever the options say.
 
-    Tables, or paragraphs, have the name of the part of a page. The `facts` are more for JSON.
+    Tables, or paragraphs, have the name of the part of a page.
     """
     around, name = environment(), Path(sys.argv[0]).stem
     parts = {part: each if isinstance(each, str) else each.markdown() for part, each in tables.items()}
@@ -156,9 +164,9 @@ def publish(options: argparse.Namespace, tables: Mapping[str, Table | str], **fa
         [f"Environment: {', '.join(f'{key} {value}' for key, value in around.items())}", *parts.values()]
     )
     print(text, flush=True)
-    rows = {part: each.rows for part, each in tables.items() if isinstance(each, Table)}
-    result: dict[str, Any] = {"environment": around, "seed": options.seed} | rows | facts
     if options.output is not None:
+        rows = {part: each.rows for part, each in tables.items() if isinstance(each, Table)}
+        result: dict[str, Any] = {"environment": around, "seed": options.seed} | rows
         options.output.mkdir(parents=True, exist_ok=True)
         (options.output / f"{name}.md").write_text(text + "\n", encoding="utf8")
         (options.output / f"{name}.json").write_text(json.dumps(result, indent=1, default=_plain), encoding="utf8")
@@ -166,7 +174,6 @@ def publish(options: argparse.Namespace, tables: Mapping[str, Table | str], **fa
         dated = {part: f"{each}\n\nRevision {around['revision']}." for part, each in parts.items()}
         dated["environment"] = text.partition("\n")[0]
         options.docs.write_text(fill_in(options.docs.read_text(encoding="utf8"), dated), encoding="utf8")
-    return result
 
 
 def _plain(value: Any) -> Any:
@@ -197,6 +204,13 @@ def named(paths: Iterable[Path], default: str = "") -> dict[str, Mesh]:
     """Meshes of files, by the names of the files; a sample of the pymeshlab wheel where there are none."""
     found = {path.stem: read_mesh(path) for path in paths}
     return found or ({default: sample(default)} if default else {})
+
+
+def moved_inside(mesh: Mesh, rng: np.random.Generator, most: float, fixed: FloatArray | bool = False) -> Mesh:
+    """The mesh with vertices moved by up to `most` in x and y, except on the boundary and where `fixed` is true."""
+    V, inner = mesh.V.copy(), ~mesh.boundary & ~np.asarray(fixed)
+    V[inner, :2] += rng.uniform(-most, most, (int(inner.sum()), 2))
+    return Mesh(V, mesh.F)
 
 
 def on_sphere(n: int, rng: np.random.Generator) -> FloatArray:
@@ -329,6 +343,14 @@ def errors(found: FloatArray, truth: FloatArray) -> dict[str, float]:
 def mean_error(query: Callable[[Any], FloatArray], sources: Iterable[Any], truth: Callable[[Any], FloatArray]) -> float:
     """Mean of |d - truth| / truth over vertices and sources, in percent."""
     return float(np.mean([errors(query(source), truth(source))["mean"] for source in sources]))
+
+
+def warned(call: Callable[[], Any]) -> tuple[Any, bool]:
+    """What a call returns, and whether it warned of its accuracy."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = call()
+    return found, any(issubclass(each.category, heat_igl.AccuracyWarning) for each in caught)
 
 
 def geometric_mean(values: Iterable[float]) -> float:

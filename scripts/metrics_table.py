@@ -5,6 +5,7 @@
     python scripts/metrics_table.py walls [octopus.mesh ...]   # bodies with concave walls, or these files
     python scripts/metrics_table.py layers [--border 24]       # layers of metrics
     python scripts/metrics_table.py faces [--edge 20]          # a metric per face
+    python scripts/metrics_table.py images [--edge 20]         # a speed per pixel
     python scripts/metrics_table.py grids [--pixels 192] [--voxels 24]  # beside fast marching; several sides, or 0
     python scripts/metrics_table.py smooth [--rows 48]         # tensors that change smoothly in bodies
     python scripts/metrics_table.py several [--rows 24]        # several sources beside single ones
@@ -18,8 +19,9 @@ seconds to make the solver and for a query.
 walls: bodies cut out of even or random tetrahedra, against the same solver on tetrahedra halved twice, or once on more
 than 3000 vertices: "finer" is an upper bound. Edges around which paths bend; the mean of |d - finer| / finer, the
 largest differences, and how much the worst is below the straight line; milliseconds of a query, over heat in turn.
-layers and faces: Delaunay triangles of random points, rotated, against shortest ways through ``--border`` points on
-each edge of a border, or on all; mean and largest error, also with half as many points, and per face of fim-python.
+layers, faces and images: Delaunay triangles of random points, or pixels, rotated, against shortest ways through
+``--border`` points on each edge of a border, or ``--edge`` on all; mean and largest error, also with half as many
+points, and per face of fim-python; ``--count`` meshes each.
 grids: images and blocks with so many ``--pixels`` and ``--voxels`` a side, at their centres, from one of them, beside
 scikit-fmm, whose front begins as a circle of 2.5 pixels, and pykonal, if they are installed. Mean and largest error in
 percent, seconds of one query with its preparation, and memory; of ``--fields`` 0 to 3 alone, in their order.
@@ -39,8 +41,8 @@ import argparse
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
-from importlib.util import find_spec
 from itertools import pairwise, product
 from typing import Any
 
@@ -50,7 +52,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
 import heat_igl
-from heat_igl import GeodesicSolver, Mesh, PolygonMesh, metric_operators, read_polygon_mesh, shapes, speed_operators
+from heat_igl import GeodesicSolver, Mesh, metric_operators, read_polygon_mesh, shapes, speed_operators
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.mesh import PolygonFans
 from heat_igl.operators import MetricSimplices, Operators
@@ -60,15 +62,28 @@ from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine, LineEngine
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.closed_forms import around_the_edge, by_fermat, straight
-from heat_igl.validation.construction import carved, compact, tetrahedra
+from heat_igl.validation.construction import carved, compact, dual, tetrahedra
 
-from harness import Query, Row, Table, collected, mean_error, named, ours, parsed, publish, seconds
+from harness import (
+    Query,
+    Row,
+    Table,
+    collected,
+    mean_error,
+    moved_inside,
+    named,
+    ours,
+    parsed,
+    publish,
+    seconds,
+    warned,
+)
 
 Random = np.random.Generator
 Cut = Callable[[FloatArray], BoolArray]
+Faces = tuple[Mesh, FloatArray]
 Samples = Iterator[tuple[str, FloatArray]]
 METHODS = {"default": ours(), "heat": ours("heat", magnitude="unit")} | {m: ours(m) for m in ("sweep", "windows")}
-HAS_FIM = find_spec("fimpy") is not None
 Field = tuple[str, Mesh, Callable[[FloatArray], FloatArray], int, Query]
 # Cells across layers, and across a mesh with a metric per face.
 ACROSS, FINE = 30, 18
@@ -77,13 +92,6 @@ MANY = 3000
 
 
 # Closed forms in the plane.
-
-
-def moved_inside(mesh: Mesh, rng: Random, most: float, fixed: BoolArray | bool = False) -> Mesh:
-    """The mesh with vertices moved by up to `most` in x and y, except on the boundary and where `fixed` is true."""
-    V, inner = mesh.V.copy(), ~mesh.boundary & ~np.asarray(fixed)
-    V[inner, :2] += rng.uniform(-most, most, (int(inner.sum()), 2))
-    return Mesh(V, mesh.F)
 
 
 def plane(rows: int, rng: Random, border: float = np.nan) -> Mesh:
@@ -404,6 +412,17 @@ def layer_samples(n_layers: int, make: Callable[[], FloatArray], options: argpar
             yield "half", np.abs(excess(half, whole))
 
 
+def image(ratio: int, rng: Random) -> Faces:
+    """Pixels `ratio` times as long as wide, and a random speed of 1 to 10 for each, as a metric per face."""
+    domain = heat_igl.image_domain(np.ones((12, 12), bool), [ratio, 1])
+    return domain.mesh, speeds(domain.per_face(10 ** rng.random((12, 12))))
+
+
+def on_images(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
+    for ratio in (1, 2, 3, 5, 8, 20):
+        yield {"case": f"{ratio} : 1"} | summary(face_samples(partial(image, ratio, rng), options, rng))
+
+
 def on_faces(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     def centres(mesh: Mesh) -> FloatArray:
         return np.asarray(mesh.V[mesh.F][:, :, :2].mean(axis=1))
@@ -420,18 +439,22 @@ def on_faces(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     for r in (5.0, 20.0):
         cases[f"smooth fibres, 1 : {r:g}"] = lambda mesh, r=r: fibres(np.sin(3 * centres(mesh)).sum(axis=1), r)
 
-    def samples(make: Callable[[Mesh], FloatArray]) -> Samples:
-        for _ in range(options.count):
-            mesh = layered(1, FINE, rng)[0]
-            g, source = make(mesh), int(rng.integers(mesh.n_vertices))
-            half, whole = (through_edges(mesh, source, g, n) for n in (options.edge // 2, options.edge))
-            yield "default", off(mesh, source, g, whole, rng.uniform(0, np.pi))
-            g_3 = np.pad(g, ((0, 0), (0, 1), (0, 1))) + np.diag([0, 0, 1])
-            yield "fim", np.abs(excess(by_fim(mesh, g_3, source), whole)) if HAS_FIM else np.array([np.nan])
-            yield "half", np.abs(excess(half, whole))
-
     for name, make in cases.items():
-        yield {"case": name} | summary(samples(make))
+        case = lambda make=make: ((mesh := layered(1, FINE, rng)[0]), make(mesh))  # noqa: E731
+        yield {"case": name} | summary(face_samples(case, options, rng))
+
+
+def face_samples(make: Callable[[], Faces], options: argparse.Namespace, rng: Random) -> Samples:
+    """Errors from one source on each mesh."""
+    for _ in range(options.count):
+        mesh, g = make()
+        source = int(rng.integers(mesh.n_vertices))
+        half, whole = (through_edges(mesh, source, g, n) for n in (options.edge // 2, options.edge))
+        yield "default", off(mesh, source, g, whole, rng.uniform(0, np.pi))
+        g_3 = np.pad(g, ((0, 0), (0, 1), (0, 1))) + np.diag([0, 0, 1])
+        with suppress(ImportError):
+            yield "fim", np.abs(excess(by_fim(mesh, g_3, source), whole))
+        yield "half", np.abs(excess(half, whole))
 
 
 # Grids, beside fast marching.
@@ -652,12 +675,11 @@ def on_warnings(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     counts: dict[str, FloatArray] = {}
     for name, mesh, metric, _, exact in [*smooth(options.rows, rng), *rough(options.count, options.rows, rng)]:
         for source in rng.choice(mesh.n_vertices, options.sources, replace=False).tolist():
-            with warnings.catch_warnings(record=True) as said:
-                warnings.simplefilter("always")
-                found = GeodesicSolver(metric_operators(mesh, metric(mesh.V))).distance(source)
+            solver = GeodesicSolver(metric_operators(mesh, metric(mesh.V)))
+            found, said = warned(lambda solver=solver, source=source: solver.distance(source))
             error = np.abs(excess(found, exact(source)))
             wrong, right = error.mean() > 5 or error.max() > 20, error.mean() < 2 and error.max() < 10
-            now = np.array([1, wrong, wrong and not said, right, right and bool(said)], int)
+            now = np.array([1, wrong, wrong and not said, right, right and said], int)
             counts[name] = counts.get(name, 0) + now
     for name, found in counts.items():
         yield {"domain": name} | dict(zip(("n", "wrong", "silent", "right", "said"), found.tolist(), strict=True))
@@ -683,24 +705,6 @@ def on_choice(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
 
 
 # Polygons, on triangles of theirs and around virtual vertices.
-
-
-def dual(mesh: Mesh) -> PolygonMesh:
-    """A polygon around each vertex that lies inside, corners in the middles of the faces."""
-    beyond = {(a, b): f for f, (x, y, z) in enumerate(mesh.F.tolist()) for a, b in ((x, y), (y, z), (z, x))}
-    third = {(f, v): row[(row.index(v) + 2) % 3] for f, row in enumerate(mesh.F.tolist()) for v in row}
-    polygons = []
-    for v, f in dict(zip(mesh.F.ravel().tolist(), np.repeat(np.arange(mesh.n_faces), 3).tolist(), strict=True)).items():
-        ring: list[int] = []
-        at: int | None = f
-        while at is not None and at not in ring:
-            ring.append(at)
-            at = beyond.get((v, third[at, v]))
-        if at == f and len(ring) > 2:
-            polygons.append(ring)
-    used, corners = np.unique(np.concatenate(polygons), return_inverse=True)
-    ends = np.cumsum([len(ring) for ring in polygons])[:-1]
-    return PolygonMesh(mesh.V[mesh.F[used]].mean(axis=1), np.split(corners.ravel(), ends))
 
 
 def on_polygons(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
@@ -752,6 +756,7 @@ def errors_and(unit: str, **heads: str) -> dict[str, str]:
 
 
 HALF = {"half": "reference, half the points"}
+PER_FACE = mean_and_largest(default="default", fim="fim-python", **HALF)
 TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], dict[str, str]]] = {
     "metrics": (on_metrics, {"metric": "{metric}"} | {f"{method}, %": f"{{{method}:.2g}}" for method in METHODS}),
     "bodies": (in_bodies, {
@@ -768,9 +773,8 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
     "layers": (on_layers, {"layers": "{case}"} | mean_and_largest(
         border="source on the border", beside="1.5 edges away", middle="in the middle", **HALF
     )),
-    "faces": (on_faces, {"metric per face": "{case}"} | mean_and_largest(
-        default="default", fim="fim-python", **HALF
-    )),
+    "faces": (on_faces, {"metric per face": "{case}"} | PER_FACE),
+    "images": (on_images, {"pixels": "{case}"} | PER_FACE),
     "grids": (on_grids, {"grid": "{grid}"} | errors_and("s", default="default", fmm="scikit-fmm", konal="pykonal")
         | {"kB per cell": "{default[kB]:.1f}, {fmm[kB]:.1f}, {konal[kB]:.1f}"}
         | {"GiB": "{default[GiB]:.2g}, {fmm[GiB]:.2g}, {konal[GiB]:.2g}"}),

@@ -26,7 +26,7 @@ from heat_igl.heat.steps import diffuse, integrate, normalize, smallest_time_ste
 from heat_igl.operators import operators
 from heat_igl.reference import edge_paths
 
-from harness import Row, Table, parsed, publish
+from harness import Row, as_they_are, parsed, publish
 
 Rows = list[Row]
 
@@ -334,12 +334,6 @@ def draw(folder: Path, times: Rows, errors: Rows, sizes: Sequence[int]) -> None:
     figure("5_jump", rows, {name: name for name in names}, "linear", "mean error")
 
 
-def cell(value: Any) -> str:
-    if isinstance(value, list):
-        return ", ".join(map(str, value)) or "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value).replace("|", r"\|")
-
-
 def main(argv: Sequence[str] | None = None) -> None:
     # The errors of the paper's method are what is measured here.
     warnings.simplefilter("ignore", AccuracyWarning)
@@ -355,12 +349,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         "Accuracy": lambda: [accuracy(i) for i in ((5, 10, 20) if options.quick else (10, 30, 56, 100, 200))],
         "The jump at i = 56": lambda: jump(range(52, 60) if options.quick else range(10, 81)),
     }
-    tables = {}
-    for title, make in makers.items():
-        rows = make()
-        shown = [{name: cell(value) for name, value in row.items()} for row in rows]
-        tables[title] = Table(shown, {cell(name): name for name in rows[0]}, f"## {title}")
-    publish(options, tables)
+    publish(options, {title: as_they_are(make(), f"## {title}", ".4g") for title, make in makers.items()})
     if options.figures:
         errors = [accuracy(i) for i in (range(2, 21) if options.quick else range(2, 121))]
         draw(options.figures, times, errors, range(48, 60, 4) if options.quick else range(40, 71))

@@ -38,7 +38,6 @@ import igl
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import Delaunay
 
 import heat_igl
 from heat_igl import Mesh, SurfaceCurve, curve_on, exp_map, geodesic_distance, isolines, log_map, shapes, tangent_frames
@@ -49,7 +48,7 @@ from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.operators import operators
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.construction import hull
+from heat_igl.validation.construction import hull, planar
 from heat_igl.validation.shapes import lattice_faces
 from heat_igl.validation.zoo import FAMILIES
 from heat_igl.windows import ExactSurface, exact_distance
@@ -85,7 +84,7 @@ def rounding(mesh: Mesh) -> float:
 def height_field(rng: Random) -> Mesh:
     """Random heights on a Delaunay triangulation of random points."""
     P = rng.random((rng.integers(8, _COARSE), 2))
-    return Mesh(np.column_stack([P, rng.normal(size=len(P)) * rng.uniform(0, 0.5)]), Delaunay(P).simplices)
+    return planar(P, rng.normal(size=len(P)) * rng.uniform(0, 0.5))
 
 
 def needles(rng: Random) -> Mesh:
@@ -114,14 +113,8 @@ COARSE: dict[str, Callable[[Random], Mesh]] = {
     "needles": needles,
     "long tube": long_tube,
 }
-NEARLY_FLAT = (
-    "nearly flat cylinder",
-    "nearly flat cone",
-    "pipe reducer",
-    "geometrically spaced rings",
-    "nearly flat grid",
-    "grid of integers",
-)
+NEARLY_FLAT = ("nearly flat cylinder", "nearly flat cone", "pipe reducer", "geometrically spaced rings",
+               "nearly flat grid", "grid of integers")  # fmt: skip
 EXACT = *NEARLY_FLAT, *COARSE
 
 
@@ -387,10 +380,7 @@ SPREADS: dict[str, Callable[[Random], FloatArray]] = {
 def signed(seed: int) -> Member:
     rng = np.random.default_rng(seed)
     spread, exchanged = rng.choice(list(SPREADS)), rng.choice([0.0, 0.1, 0.3])
-    P = np.pad(SPREADS[spread](rng), ((0, 0), (0, 1)))
-    F = Delaunay(P[:, :2]).simplices
-    upward = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])[:, 2] > 0
-    mesh = Mesh(P, np.where(upward[:, None], F, F[:, ::-1]))
+    mesh = planar(SPREADS[spread](rng))
     centres = mesh.V[mesh.F].mean(axis=1)
     radius = np.linalg.norm(centres - centres[rng.integers(len(centres))], axis=1)
     region = (radius < np.quantile(radius, rng.uniform(0.05, 0.6))) ^ (rng.random(len(radius)) < exchanged)
@@ -402,12 +392,7 @@ def signed(seed: int) -> Member:
     return f"{spread}, {100 * exchanged:.0f} % exchanged", {"difference": off}, 0.0
 
 
-TABLES: dict[str, Callable[[int], Member]] = {
-    "exact": exact,
-    "cuts": cuts,
-    "log-maps": log_maps,
-    "signed": signed,
-}
+TABLES: dict[str, Callable[[int], Member]] = {"exact": exact, "cuts": cuts, "log-maps": log_maps, "signed": signed}
 
 
 def main(argv: Sequence[str] | None = None) -> bool:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from heat_igl import Mesh, SignedHeatSolver, SurfaceCurve, curve_on, geodesic_di
 from heat_igl.curves import sublevel_areas
 from heat_igl.typing import FloatArray
 
-from harness import Row, as_they_are, collected, geometric_mean, named, parsed, publish
+from harness import Row, as_they_are, collected, geometric_mean, moved_inside, named, parsed, publish
 
 COARSEST = 20
 # A regular grid has edges in three directions, which heat prefers; a random move of the vertices, by this share of the
@@ -45,11 +45,9 @@ def circle() -> FloatArray:
 
 def on_plane(n: int, seed: int) -> Case:
     """A circle of radius 0.3 on a unit square of n x n perturbed squares."""
-    mesh = shapes.grid(n)
-    moved = np.random.default_rng(seed).uniform(-MOVED / n, MOVED / n, (mesh.n_vertices, 2))
-    V = mesh.V + np.pad(np.where(mesh.boundary[:, None], 0, moved), ((0, 0), (0, 1)))
-    mesh, middle = Mesh(V, mesh.F), np.array([0.5, 0.5, 0])
-    truth = np.linalg.norm(V - middle, axis=1) - 0.3
+    mesh = moved_inside(shapes.grid(n), np.random.default_rng(seed), MOVED / n)
+    middle = np.array([0.5, 0.5, 0])
+    truth = np.linalg.norm(mesh.V - middle, axis=1) - 0.3
     return mesh, [curve_on(mesh, 0.3 * circle() + middle, closed=True)], truth
 
 
@@ -157,8 +155,8 @@ def pieces_and_error(mesh: Mesh, share: float, gaps: int, rng: np.random.Generat
     return pieces, lambda found: float(100 * np.abs(found - truth).mean() / size)
 
 
-def broken_rows(meshes: dict[str, Mesh], options: argparse.Namespace) -> Iterator[Row]:
-    rng = np.random.default_rng(options.seed)
+def broken_rows(options: argparse.Namespace) -> Iterator[Row]:
+    meshes, rng = named(options.meshes), np.random.default_rng(options.seed)
     solvers = {name: {way: SignedHeatSolver(m, **kept) for way, kept in WAYS.items()} for name, m in meshes.items()}
     peers = {name: Peer(mesh) for name, mesh in meshes.items()}
     for case in range(options.cases):
@@ -191,15 +189,9 @@ def summary(rows: Sequence[Row]) -> Iterator[Row]:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    names = ("circles", "broken")
-    options = parsed(__doc__, argv, "*", names, finest=160, cases=40)
-    meshes = named(options.meshes)
-    make: dict[str, Callable[[], Iterator[Row]]] = {
-        "circles": lambda: circles(options),
-        "broken": lambda: summary(collected(broken_rows(meshes, options))),
-    }
-    rows = collected(make[options.table]())
-    publish(options, {options.table: as_they_are(rows)})
+    options = parsed(__doc__, argv, "*", ("circles", "broken"), finest=160, cases=40)
+    rows = circles(options) if options.table == "circles" else summary(collected(broken_rows(options)))
+    publish(options, {options.table: as_they_are(collected(rows))})
 
 
 if __name__ == "__main__":

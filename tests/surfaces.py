@@ -12,7 +12,7 @@ from conftest import perturbed
 from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
 from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.validation.construction import joined, merged, planar, ring
+from heat_igl.validation.construction import dual, joined, merged, planar, ring
 
 
 def twice(mesh: Mesh, apart: float | np.ndarray = 5.0) -> Mesh:
@@ -163,22 +163,6 @@ def bent_pages() -> Mesh:
     x, y, _ = page.V.T
     turned = (np.column_stack([x * np.cos(a), x * np.sin(a), y]) for a in (0.0, 2.0, 4.0))
     return merged(joined(*(Mesh(V, page.F) for V in turned)))
-
-
-def dual(mesh: Mesh) -> PolygonMesh:
-    """A polygon around each vertex of a closed mesh, its corners in the middles of the faces."""
-    following = {}
-    for f, (a, b, c) in enumerate(mesh.F.tolist()):
-        following |= {(a, b): (f, c), (b, c): (f, a), (c, a): (f, b)}
-    neighbour = dict(following.keys())
-    polygons = []
-    for v in range(mesh.n_vertices):
-        polygon, there = [], neighbour[v]
-        while not polygon or there != neighbour[v]:
-            face, there = following[v, there]
-            polygon.append(face)
-        polygons.append(polygon)
-    return PolygonMesh(mesh.V[mesh.F].mean(axis=1), polygons)
 
 
 def dual_of_sphere(subdivisions: int) -> PolygonMesh:

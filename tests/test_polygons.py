@@ -5,13 +5,13 @@ import pickle
 import igl
 import numpy as np
 import pytest
-from surfaces import dual, dual_of_sphere, quads
+from surfaces import dual_of_sphere, quads
 
 import heat_igl
 from heat_igl import shapes
 from heat_igl.mesh import PolygonFans, PolygonMesh, triangulation
 from heat_igl.mesh.polygons import virtual_vertices
-from heat_igl.validation import relative_error
+from heat_igl.validation import construction, relative_error
 
 
 def cells(n: int) -> PolygonMesh:
@@ -124,7 +124,7 @@ def test_places_on_bent_polygons_stay_on_their_sides():
 
 def test_heat_on_bent_polygons_is_as_good_as_on_triangles(cow):
     """Without vertices inside the polygons it was 10 % too short here: they couple vertices with negative weights."""
-    mesh = dual(cow)
+    mesh = construction.dual(cow)
     solvers = heat_igl.HeatMethodSolver(mesh), heat_igl.HeatMethodSolver(mesh.triangles)
     errors = []
     for source in (0, 2000, 4000):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import igl
 import numpy as np
 
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, PolygonMesh
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.validation.shapes import box, grid, lattice_mesh
 
@@ -153,6 +153,23 @@ def merged(mesh: Mesh) -> Mesh:
     _, first, which = np.unique(np.round(mesh.V / scale), axis=0, return_index=True, return_inverse=True)
     F = which.reshape(-1)[mesh.F]
     return Mesh(mesh.V[first], F[(np.roll(F, 1, axis=1) != F).all(axis=1)])
+
+
+def dual(mesh: Mesh) -> PolygonMesh:
+    """A polygon around each vertex inside of a manifold mesh, with its corners in the middles of the faces."""
+    following = {}
+    for f, (a, b, c) in enumerate(mesh.F.tolist()):
+        following |= {(a, b): (f, c), (b, c): (f, a), (c, a): (f, b)}
+    neighbour = dict(following.keys())
+    polygons = []
+    for v in np.flatnonzero(mesh.referenced & ~mesh.boundary).tolist():
+        polygon, there = [], neighbour[v]
+        while not polygon or there != neighbour[v]:
+            face, there = following[v, there]
+            polygon.append(face)
+        polygons.append(polygon)
+    used, corners = np.unique(np.concatenate(polygons), return_inverse=True)
+    return PolygonMesh(mesh.V[mesh.F[used]].mean(axis=1), np.split(corners, np.cumsum([*map(len, polygons)])[:-1]))
 
 
 def hull(points: FloatArray) -> Mesh:
