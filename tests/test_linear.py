@@ -132,7 +132,7 @@ def test_dissection_keeps_fill_low():
     domain = operators(shapes.grid(100))
     A = (domain.M - domain.L).tocsc()
     minimum_degree = spl.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    assert factorize(A, "multifrontal").nonzeros < 1.15 * minimum_degree.L.nnz
+    assert analyse(A, "multifrontal").nonzeros < 1.15 * minimum_degree.L.nnz
 
 
 def test_the_order_does_not_depend_on_threads():

@@ -64,8 +64,6 @@ class Diagnostics:
         The most that was added to an edge length because of degenerate triangles; 0 on other meshes.
     backend : str
         Storage of the factors.
-    factor_nonzeros, factor_bytes : int
-        Entries of all factors, and the memory that a query reads twice, indices included.
     check : AnswerCheck or None
         Of a `HeatSolution`, by how much the distance left bounds that need no reference. None for the solver.
     compared : Comparison or None
@@ -88,8 +86,6 @@ class Diagnostics:
     n_flips: int
     lengthening: float
     backend: str
-    factor_nonzeros: int
-    factor_bytes: int
     check: AnswerCheck | None = None
     compared: Comparison | None = None
 
@@ -318,7 +314,6 @@ def prepare(
         poisson, heat_flow, divergence = in_order(lambda make: make(), makers, threads)
     assembler = SourceAssembler(domain, step, heat_flow.mean_mass, plain=not damped)
     triangulation = None if domain.surface is None else domain.surface.triangulation
-    factors = [*heat_flow.factors, poisson.factor]
     diagnostics = Diagnostics(
         t=_of_largest(step, domain),
         t_requested=_of_largest(requested, domain),
@@ -328,8 +323,6 @@ def prepare(
         n_flips=triangulation.n_flips if triangulation else 0,
         lengthening=triangulation.lengthening if triangulation else 0.0,
         backend=heat_flow.backend,
-        factor_nonzeros=sum(factor.nonzeros for factor in factors),
-        factor_bytes=sum(factor.n_bytes for factor in factors),
     )
     is_comparable = domain.surface is not None or domain.simplices is not None
     return SolverParts(

@@ -225,11 +225,6 @@ class HeatFlow:
             self._boundary_diagonal = matrix.diagonal()[operators.boundary]
             self._on_boundary = operators.boundary
 
-    @property
-    def factors(self) -> list[Factorization]:
-        """The factored matrices, for their sizes."""
-        return [part for part in (self._neumann, self._dirichlet) if part is not None]
-
     def solve(self, b: FloatArray) -> FloatArray:
         """Heat u (n,) or (n, k) after the time step, for initial heat `b` in units of `mean_mass`."""
         solutions = [] if self._neumann is None else [self._neumann.solve(b)]

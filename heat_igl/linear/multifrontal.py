@@ -263,9 +263,8 @@ class MultifrontalFactorization:
         check_finite(A)
         self._arguments = analysis, A, free
         self._fronts = fronts = analysis.fronts
-        self.nonzeros = int(fronts.end_entry[-1])
         self._held = fronts.place[:0] if free is None else fronts.place[~free]
-        entries = np.empty(self.nonzeros)
+        entries = np.empty(analysis.nonzeros)
         # Rows that are not free become those of the identity.
         is_free = np.ones(A.shape[0], np.uint8) if free is None else free.astype(np.uint8)
         data = A.data.astype(np.float64, copy=False)
@@ -274,7 +273,6 @@ class MultifrontalFactorization:
             raise_caught()
             raise FactorizationError(f"the matrix ({A.shape[0]} rows) is singular or not positive definite")
         self._kernel, self._above = _solves.TriangularSolves(fronts, entries), np.flatnonzero(fronts.above >= 0)
-        self.n_bytes = entries.nbytes + fronts.rows.nbytes + fronts.first_row.nbytes + fronts.first_entry.nbytes
         check_probe(self, A, free)
 
     def solve(self, b: FloatArray) -> FloatArray:

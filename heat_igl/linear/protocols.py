@@ -18,15 +18,9 @@ class Factorization(Protocol):
     ----------
     backend : str
         Storage of the factor.
-    nonzeros : int
-        Entries of the factor.
-    n_bytes : int
-        Memory that a solve reads twice: entries and their indices.
     """
 
     backend: str
-    nonzeros: int
-    n_bytes: int
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Solve A x = b on the free vertices for one right-hand side (n,) or several (n, k); 0 on the others."""

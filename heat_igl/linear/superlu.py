@@ -56,8 +56,6 @@ class SuperLUFactorization:
             raise FactorizationError(
                 f"the matrix ({restricted.shape[0]} rows) could not be factored: {error}"
             ) from None
-        self.nonzeros = int(self._factor.nnz)
-        self.n_bytes = 12 * self.nonzeros
         check_probe(self, A, free, indefinite=True)
 
     def solve(self, b: FloatArray) -> FloatArray:
