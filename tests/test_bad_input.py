@@ -39,13 +39,18 @@ from heat_igl import (
     geodesic_distance,
     geodesic_path,
     karcher_mean,
+    plots,
     shortest_paths,
     straighten,
     tangent_frames,
     trace_geodesic,
 )
+from heat_igl.drawing.plots import plot_labels, write_line_drawing
 from heat_igl.io.by_nibabel import FREESURFER_SUFFIXES
 from heat_igl.io.files import MESH_SUFFIXES
+from heat_igl.sampling import dual_triangulation, farthest_cells
+from heat_igl.sources import source_set, vertex_sources
+from heat_igl.validation import closed_forms, metrics
 
 EXTENSIONS = ("off", "obj", "ply", "stl", "mesh", "msh", "vtu")
 
@@ -73,6 +78,11 @@ def changed(array: np.ndarray, at: tuple[int, int | slice], value: Any) -> np.nd
     array = array.copy()
     array[at] = value
     return array
+
+
+def changed_in(n: int, i: int, matrix: np.ndarray) -> np.ndarray:
+    """Unit matrices (n, 3, 3), and `matrix` in place of one of them."""
+    return np.where((np.arange(n) == i)[:, None, None], matrix, np.eye(3))
 
 
 def mesh_case(name: str, V: Any, F: Any, *patterns: str) -> Case:
@@ -231,6 +241,9 @@ def argument_cases() -> Iterator[Case]:
     yield from choice_cases()
     for ask, pattern in REFUSED:
         yield argument_case(pattern, ask, pattern, error=ERRORS)
+    for error, refused in REFUSED_BY_ERROR.items():
+        for ask, pattern in refused:
+            yield argument_case(pattern, ask, pattern, error=error)
     for name, ask in ACCEPTED.items():
         yield argument_case(f"{name}, neighbour", ask)
 
@@ -240,6 +253,10 @@ def segments(faces: list[int], closed: bool = False) -> SurfaceCurve:
     return SurfaceCurve(faces, [[1, 0, 0]] * len(faces), [[0, 1, 0]] * len(faces), closed)
 
 
+def plot_field(mesh: heat_igl.Mesh, values: Any = None, **options: Any) -> Any:
+    return plots.plot_field(mesh, mesh.V[:, 0] if values is None else values, label="heat", **options)
+
+
 RAGGED = [[1.0, 2.0], [3.0]]
 CURVE = SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0], [0.2, 0.2, 0.6]])
 CENTRE = [[1 / 3] * 3]
@@ -247,7 +264,7 @@ GRID = heat_igl.shapes.grid(4)
 TRIANGLE, SQUARE, ROW = [[0, 1, 2]], V4[[0, 1, 3, 2]], np.outer(np.arange(30), [1.0, 2, 3])
 BY_LENGTHS = GeodesicSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]])
 SPHERE, BOX, BOOK = heat_igl.shapes.icosphere(4), heat_igl.shapes.box(1), heat_igl.shapes.book(3, 2)
-TWISTED, TWO = moebius_strip(8, 1), twice(BALL)
+TWISTED, TWO, TORUS = moebius_strip(8, 1), twice(BALL), heat_igl.shapes.torus(20, 60)
 TURNED = heat_igl.Mesh(GRID.V, np.where(np.arange(32)[:, None] == 5, GRID.F[:, ::-1], GRID.F))
 LOOSE = heat_igl.Mesh([*GRID.V, [5, 5, 5]], GRID.F)
 VECTORS = heat_igl.VectorHeatSolver(BALL)
@@ -534,10 +551,10 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: heat_igl.reference.exact(BOX, 0), r"closed_forms\.convex_solid"),
     (lambda m: heat_igl.reference.exact(m, 0, solver="magic"), "one of windows, pygeodesic, gdist, igl"),
     (lambda m: heat_igl.reference.measured("magic", m, 0), "'magic' is unknown"),
-    (lambda _: heat_igl.validation.closed_forms.sphere(GRID, 0), "distance from the center varies"),
-    (lambda m: heat_igl.validation.closed_forms.cylinder(m, 0), "distance from the z axis varies"),
-    (lambda m: heat_igl.validation.closed_forms.cone(m, 0, apex=(0, 0, 9)), "angle to the axis varies"),
-    (lambda m: heat_igl.validation.closed_forms.convex_solid(m, 0), "holds no tetrahedra"),
+    (lambda _: closed_forms.sphere(GRID, 0), "distance from the center varies"),
+    (lambda m: closed_forms.cylinder(m, 0), "distance from the z axis varies"),
+    (lambda m: closed_forms.cone(m, 0, apex=(0, 0, 9)), "angle to the axis varies"),
+    (lambda m: closed_forms.convex_solid(m, 0), "holds no tetrahedra"),
     # Unknown arguments, and the argument that holds the offender.
     (lambda m: geodesic_distance(m, 0, cut_off=1.0), r"geodesic_distance\(\) .* Did you mean 'cutoff'\?"),
     (lambda m: geodesic_distance(m, source=0), r"'source'. Did you mean 'sources'\?"),
@@ -565,6 +582,97 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: heat_igl.exp_map(m, 0, np.empty((0, 2))), r"^vectors must be one vector or more.* \(0, 2\)"),
     (lambda m: tangent_frames(m).from_angles("1"), "^angles must be real numbers, not '?"),
 )
+REFUSED_BY_ERROR: dict[str, tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...]] = {
+    "MeshError": (
+        (lambda _: geodesic_path(BOX, [0, 1]), "tetrahedral"),
+        (lambda _: straighten(BOX, edge_curve(GRID, [0, 1])), "tetrahedral"),
+        (lambda _: dual_triangulation(TORUS, farthest_cells(TORUS, 6)), "sample more densely"),
+        (lambda _: dual_triangulation(TORUS, farthest_cells(TORUS, 2)), "no three cells meet"),
+        (lambda m: dual_triangulation(m, farthest_cells(GRID, 2)), "cells have 25 vert.* and the mesh 42"),
+        (lambda _: GeodesicSolver(CLOUD, region=RING), "not of PointCloud: pass a mesh of triangles, or of a cloud"),
+        (lambda _: heat_igl.as_mesh((V4[[0, 1, 2, 1]], [[1, 3, 2]]), merge="vertices"), "none is left"),
+        (lambda m: heat_igl.as_mesh(m, m.F), "F is given beside a Mesh"),
+        (lambda m: m.with_vertices(m.V[:3]), "V has 3 rows, but the mesh has 42 vertices"),
+        (lambda m: m.with_vertices(np.where([False, True, False], np.nan, m.V)), r"V\[0, 1\] = nan"),
+    ),
+    "SourceError": (
+        (lambda _: source_set([0, INSIDE], 5, None), "lie on triangles, and this domain has none: name vert"),
+        (lambda _: vertex_sources(INSIDE, 5), "here, not SurfacePoints"),
+        (lambda m: heat_igl.distance_matrix(m, [4, 2, 4]), "indices must be distinct, but vertex 4 is there twice"),
+        (lambda _: heat_igl.shortest_path(GRID, 4, 0, region=WEST), r"targets\[0\]: vertex 4 lies outside the region"),
+        (lambda m: heat_igl.shortest_path(m, [0, 1], 2), "a must be one place, not 2"),
+        (lambda _: SOLVER.iter_distances(5), "source_sets must be an iterable of sets of sources, not 5: try distance"),
+        *(
+            (lambda _, sites=sites: heat_igl.activation_times(GRID, np.eye(3), sites), f"^{said}")
+            for sites, said in (
+                ([2.0, 2, 0], r"sites\[0\] is 1.41 away"),
+                ([0, np.nan, 0], r"sites\[0\] = \[0.0, nan, 0.0\] must be finite"),
+                ([SurfacePoints([0], AT), [25]], r"sites\[1\]: sites\[0\] = 25 is no vertex"),
+                (np.ones(25, int), "sites are 25 integers 0 and 1"),
+            )
+        ),
+        (lambda _: heat_igl.activation_times(BOX, np.eye(3), [8]), r"sites\[0\] = 8 is no vertex"),
+    ),
+    "ValueError": (
+        (lambda _: heat_igl.farthest_points(LOOSE, 26), "k must be an integer from 1"),
+        (lambda m: heat_igl.farthest_points(m, 1, start=[20, 0]), "k must be an integer from 2"),
+        (lambda m: heat_igl.diameter(m, rounds=0), "rounds must be a positive integer"),
+        (lambda m: plots.plot(m, m.V[1:, 0]), r"distance must have shape \(42,\)"),
+        (lambda m: plots.plot(m, np.where(np.arange(42) == 3, np.nan, 1)), r"distance\[3\] is NaN"),
+        (lambda m: plots.plot(m, np.full(42, np.inf)), "infinite everywhere"),
+        (lambda m: plot_labels(m, np.arange(42), distance=[1.0]), r"distance must have shape \(42,\), one per vertex"),
+        (lambda m: plot_field(m, limits=(1, 0)), "limits must be two numbers, the lower one first"),
+        (lambda m: plot_field(m, view=(30, 20, 10)), "view must be two angles in degrees"),
+        (lambda m: plot_field(m, np.where(np.arange(42) == 2, np.nan, 1)), r"values\[2\] is NaN"),
+        (lambda m: write_line_drawing("a.png", m, []), r"a\.png: line drawings go to \.svg files"),
+        (
+            lambda m: write_line_drawing("a.svg", m, [], hidden="grey"),
+            "hidden must be one of 'dotted', 'omitted', not 'grey'",
+        ),
+        (lambda m: heat_igl.isolines(m, m.V[:, 0], 0), "levels must be a positive number of levels"),
+        (lambda m: heat_igl.drawing.page(m, m.V[:, 0], fields=[m.V]), "fields must be a dictionary"),
+        (lambda _: heat_igl.validate(GRID, 0, reference=np.ones((2, 25))), r"have shape \(1, 25\), not \(2, 25\)"),
+        (lambda _: metrics.relative_error([1, 2], [1, 2, 3]), r"one shape, not \(2,\) and \(3,\)"),
+        (
+            lambda m: metrics.error_summary(m, *np.ones((2, 42)), [0]),
+            r"shape \(1, 42\), one row per set .* not \(42,\)",
+        ),
+        (lambda m: heat_igl.as_mesh(m, merge="all"), "merge must be one of 'seams', 'vertices'"),
+        (
+            lambda _: heat_igl.image_domain(SOLID).per_face(np.ones((2, 3, 2))),
+            r"image must have shape \(2, 2, 2\), with further axes .* not \(2, 3, 2\)",
+        ),
+        (lambda m: HeatMethodSolver(m, magnitude="log"), "must be one of 'auto', 'unit', 'damped', not 'log'"),
+        *(
+            (lambda _, D=D, times=times: heat_igl.activation_times(BOX, D, 0, times), said)
+            for D, times, said in (
+                (changed_in(6, 3, np.diag([1, 1, -1])), 0, r"D\[3\] .* definite \(1 of 6"),
+                (np.full((3, 3), np.nan), 0, r"D\[0\] = .* must be finite"),
+                (np.diag([1, np.inf, 1]), 0, r"D\[0\] = .* must be finite"),
+                (1e200 * np.eye(3), 0, r"D\[0\] = .* take another unit"),
+                (np.eye(3), np.inf, r"times\[0\] = inf must be finite"),
+                (np.eye(3), [0, 1], r"times must be one number, or 1, one for each of the sites, not of shape \(2,\)"),
+                (np.eye(3), [-1e308, 1e308], r"times\[1\] = 1e\+308 must be finite, also after the first \(1 of 2"),
+                (np.triu(np.ones((3, 3))), 0, r"D\[0\] = .* must be symmetric"),
+            )
+        ),
+        *(
+            (lambda _, mesh=mesh, g=g: heat_igl.metric_operators(mesh, g), said)
+            for mesh, g, said in (
+                (BOX, changed_in(8, 5, -np.eye(3)), r"metric\[5\] = .* must be positive definite"),
+                (GRID, changed_in(32, 4, np.diag([1, -1, 1])), r"metric\[4\] = .* positive definite \(1 of 32 are not"),
+                (GRID, changed_in(32, 5, np.diag([1, 0, 1])), r"metric\[5\] = .* must be positive definite"),
+                (GRID, np.ones((31, 3, 3)), r"must have shape \(32, 3, 3\) or \(25, 3, 3\) or \(32, 2, 2\), .* \(31"),
+            )
+        ),
+        (lambda _: GeodesicSolver(BOX).distance_vjp(0)[1].by_metric(np.ones(8)), "no metric to change: make it on m"),
+    ),
+    "TypeError": ((lambda m: write_line_drawing("a.svg", m, 3), "curves must be a SurfaceCurve or a list of su"),),
+    "ReferenceSolverError": (
+        (lambda m: closed_forms.plane(m, 0), "does not lie in a plane"),
+        (lambda m: closed_forms.flat_torus(m.V, 0), r"coordinates of shape \(n, 2\)"),
+    ),
+}
 ACCEPTED: dict[str, Callable[[heat_igl.Mesh], Any]] = {
     "far positions": lambda m: heat_igl.closest_points(m, [[0, 1e149, 0]]),
     "long lines": lambda _: heat_igl.exp_map(heat_igl.shapes.cylinder(3, 1, 1e6), 0, [[9, 4e5], [4e5, 9]]),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import perturbed
 
-from heat_igl import HeatMethodSolver, Mesh, MeshError, SourceError, shapes
+from heat_igl import HeatMethodSolver, Mesh, SourceError, shapes
 from heat_igl.geodesic import SolverChoice
 from heat_igl.runtime import PeakMemory, over_rows, threads
 
@@ -158,8 +158,6 @@ def test_a_bad_set_is_named_when_it_is_reached(solver):
     assert next(rows)[4] == 0
     with pytest.raises(SourceError, match=r"source_sets\[2\]: sources\[0\] = 99999 is no vertex"):
         next(rows)
-    with pytest.raises(SourceError, match="source_sets must be an iterable of sets of sources, not 5: try distance"):
-        solver.iter_distances(5)
 
 
 def test_memory_does_not_grow_with_the_number_of_sets(solver):
@@ -204,7 +202,3 @@ def test_a_mesh_that_moves_shares_what_its_faces_say(cow):
     np.testing.assert_allclose(moved.edge_lengths, Mesh(cow.V + 1, cow.F).edge_lengths, rtol=1e-12)
     copy = pickle.loads(pickle.dumps(moved))
     assert (copy.V == moved.V).all()
-    with pytest.raises(MeshError, match="V has 3 rows, but the mesh has 2904 vertices"):
-        cow.with_vertices(cow.V[:3])
-    with pytest.raises(MeshError, match=r"V\[0, 1\] = nan"):
-        cow.with_vertices(np.where([False, True, False], np.nan, cow.V))

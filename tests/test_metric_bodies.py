@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 from surfaces import nearest_vertex
 
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, activation_times, shapes
-from heat_igl.errors import AccuracyWarning, SourceError
+from heat_igl.errors import AccuracyWarning
 from heat_igl.mesh.rasters import image_domain
 from heat_igl.operators import MetricSimplices, Operators, fibre_metric, metric_operators, speed_operators
 from heat_igl.operators.metric_simplices import inverse_root, symmetric
@@ -438,8 +438,6 @@ def test_derivatives_have_the_degrees_of_lengths(name):
     assert (pull_back.by_metric(weight) * g).sum() == pytest.approx(weight @ phi / 2, rel=1e-9)
     assert pull_back.by_offsets(weight) == pytest.approx([weight.sum()], rel=1e-9)
     assert pull_back([weight, phi])[1] == pytest.approx(pull_back(phi))
-    with pytest.raises(ValueError, match="no metric to change: make it on metric_operators"):
-        GeodesicSolver(mesh).distance_vjp(40)[1].by_metric(phi)
 
 
 @pytest.mark.filterwarnings("ignore:the metric changes farther")
@@ -485,40 +483,13 @@ def test_the_value_of_a_derivative_is_the_distance(at):
     assert (pull_back.by_lengths(phi) * domain.surface.faces.l).sum() == pytest.approx(phi @ phi)
 
 
-@pytest.mark.parametrize(
-    ("D", "times", "message"),
-    [
-        (np.eye(3) - np.diag([0, 0, 2]) * (np.arange(48) == 3)[:, None, None], 0, r"D\[3\] .* definite \(1 of 48"),
-        (np.full((3, 3), np.nan), 0, r"D\[0\] = .* must be finite"),
-        (np.diag([1, np.inf, 1]), 0, r"D\[0\] = .* must be finite"),
-        (1e200 * np.eye(3), 0, r"D\[0\] = .* take another unit"),
-        (np.eye(3), np.inf, r"times\[0\] = inf must be finite"),
-        (np.eye(3), [0, 1], r"times must be one number, or 1, one for each of the sites, not of shape \(2,\)"),
-        (np.eye(3), [-1e308, 1e308], r"times\[1\] = 1e\+308 must be finite, also after the first \(1 of 2"),
-        (np.triu(np.ones((3, 3))), 0, r"D\[0\] = .* must be symmetric"),
-    ],
-)
-def test_wrong_tissue_is_refused(D, times, message):
+def test_activation_of_stretched_tissue_is_straight():
     mesh = shapes.box(2)
     long = np.linalg.norm((mesh.V - mesh.V[0]) * [1, 1, 1e7], axis=1)
     assert activation_times(mesh, np.diag([1, 1, 1e-14]), 0) == pytest.approx(long, rel=1e-12)
-    with pytest.raises(ValueError, match=message):
-        activation_times(mesh, D, 0, times)
-    with pytest.raises(ValueError, match=r"metric\[5\] = .* must be positive definite"):
-        metric_operators(mesh, np.eye(3) * np.where(np.arange(27) == 5, -1, 1)[:, None, None])
-    with pytest.raises(SourceError, match=r"sites\[0\] = 27 is no vertex"):
-        activation_times(mesh, np.eye(3), [27])
     square, place = shapes.grid(4), np.array([0.3, 0.6, 0])
     times = activation_times(square, np.diag([4.0, 1, 1]), place, 2.0)
     assert times == pytest.approx(2 + np.linalg.norm((square.V - place) * [0.5, 1, 1], axis=1))
-    for sites, wrong in (
-        ([2.0, 2, 0], r"sites\[0\] is 1.41 away"),
-        ([0, np.nan, 0], r"sites\[0\] = \[0.0, nan, 0.0\] must be finite"),
-        ([SurfacePoints([0], [[1, 0, 0]]), [25]], r"sites\[1\]: sites\[0\] = 25 is no vertex"),
-        (np.ones(25, int), "sites are 25 integers 0 and 1"),
-    ):
-        with pytest.raises(SourceError, match=f"^{wrong}"):
-            activation_times(square, np.eye(3), sites)
 
 
 @pytest.mark.parametrize(

@@ -124,34 +124,9 @@ def test_distance_scales_with_the_unit_of_the_metric_and_of_positions(mesh, rati
                     assert distance(domain, 5, method) == pytest.approx(unit * expected, rel=1e-9)
 
 
-GOOD = np.tile(np.eye(3), (18, 1, 1))
-
-
-def changed(face: int, value: Any) -> FloatArray:
-    metric = GOOD.copy()
-    metric[face] = value
-    return metric
-
-
-@pytest.mark.parametrize(
-    ("metric", "message"),
-    [
-        (
-            GOOD[:17],
-            r"metric must have shape \(18, 3, 3\) or \(16, 3, 3\) or \(18, 2, 2\), one per face or vertex, not \(17",
-        ),
-        (
-            changed(4, np.diag([1, -1, 1])),
-            r"metric\[4\] = .* must be positive definite \(1 of 18 are not\)",
-        ),
-        (changed(5, np.diag([1, 0, 1])), r"metric\[5\] = .* must be positive definite"),
-    ],
-)
-def test_wrong_metrics_are_refused(metric, message):
-    with pytest.raises(ValueError, match=message):
-        metric_operators(shapes.grid(3), metric)
-    # What is orthogonal to a flat mesh plays no part.
-    assert metric_operators(shapes.grid(3), changed(4, np.diag([1, 1, -1]))).n_given == 16
+def test_what_is_orthogonal_to_a_flat_mesh_plays_no_part():
+    metric = np.where((np.arange(18) == 4)[:, None, None], np.diag([1, 1, -1]), np.eye(3))
+    assert metric_operators(shapes.grid(3), metric).n_given == 16
 
 
 def test_flips_that_would_join_a_vertex_with_itself():

@@ -63,17 +63,6 @@ def test_triangles_come_as_they_are(given):
     np.testing.assert_array_equal(mesh.F, F)
 
 
-@pytest.mark.parametrize(
-    ("name", "remedy"),
-    [("Scene", r"pass \.to_mesh\(\)"), ("MultiBlock", r"pass \.combine"), ("SurfaceImage", "mesh.parts")],
-)
-def test_what_holds_several_meshes_is_refused_by_name(name, remedy):
-    with pytest.raises(MeshError, match=rf"mesh is .*{name}.*: .*{remedy}"):
-        as_mesh(type(name, (), {})())
-    with pytest.raises(MeshError, match=r"strips of triangles: pass mesh.triangulate\(\)"):
-        as_mesh(SimpleNamespace(points=V, faces=np.empty(0, int), n_points=len(V), n_strips=2))
-
-
 POLYGONS = {
     "vertices and faces": SimpleNamespace(vertices=SQUARES, faces=TWO_QUADS),
     "vertices and cells": SimpleNamespace(vertices=SQUARES, cells=TRIANGLE_AND_QUAD),
@@ -94,7 +83,7 @@ def test_polygons_stay_polygons(given):
 
 @pytest.mark.parametrize("kind", ["tetra", 10])
 def test_tetrahedra_come_without_the_triangles_around_them(kind):
-    cells = {"triangle": TETRAHEDRA[:, :3], kind: TETRAHEDRA}
+    cells = {"triangle": TETRAHEDRA[:, :3], kind: TETRAHEDRA, "line3": np.zeros((5, 3), int), "vertex": [[0]]}
     mesh = as_mesh(SimpleNamespace(points=CORNERS, cells_dict=cells))
     assert isinstance(mesh, Mesh)
     np.testing.assert_array_equal(mesh.F, TETRAHEDRA)
@@ -134,6 +123,38 @@ WRONG = {
     "no file": ("missing.ply", "missing.ply: no such file"),
     "no surface": (Gifti(V, F[:0]), "holds no surface"),
     "faces out of range": (SimpleNamespace(vertices=V, faces=F + 1), "is no vertex"),
+    "strips": (
+        SimpleNamespace(points=V, faces=np.empty(0, int), n_points=len(V), n_strips=2),
+        r"strips of triangles: pass mesh.triangulate\(\)",
+    ),
+    "lines": (SimpleNamespace(points=CORNERS, cells_dict={"line": F[:, :2]}), "the mesh has no faces"),
+    # Beside tetrahedra, hexahedra that are left out would be a hole.
+    **{
+        f"cells of kind {kind}": (
+            SimpleNamespace(points=CORNERS, cells_dict={"tetra": TETRAHEDRA, kind: np.zeros((5, 8), int)}),
+            f"holds 5 cells of kind {name};.*convert the cells",
+        )
+        for kind, name in (("hexahedron", "hexahedron"), (12, "12 of VTK"), ("tetra10", "tetra10"))
+    },
+    # Several meshes, and what does not store its cells.
+    **{
+        name: (type(name, (), {})(), f"mesh is .*{name}.*: .*{remedy}")
+        for name, remedy in (
+            ("Scene", r"pass \.to_mesh\(\)"),
+            ("MultiBlock", r"pass \.combine"),
+            ("SurfaceImage", "mesh.parts"),
+            ("StructuredGrid", r"pass .cast_to_unstructured_grid\(\).triangulate\(\)"),
+        )
+    },
+    # On tetrahedra, the type of operators is a private one.
+    **{
+        f"operators of {len(mesh.F)} faces": (
+            heat_igl.speed_operators(mesh, np.ones(mesh.n_faces)),
+            r"\.Operators: GeodesicSolver and HeatMethodSolver take operators",
+        )
+        for mesh in (SPHERE, shapes.box(1))
+    },
+    "a solver": (heat_igl.HeatMethodSolver(SPHERE), "HeatMethodSolver: a solver is asked itself"),
 }
 
 
@@ -199,34 +220,6 @@ def test_points_of_the_libraries_themselves(library):
     else:
         made = module.geometry.PointCloud(module.utility.Vector3dVector(V.copy()))
     np.testing.assert_allclose(as_mesh(made).P, V, atol=1e-7)
-
-
-def test_cells_of_other_kinds_are_refused():
-    """Beside tetrahedra, hexahedra that are left out would be a hole."""
-    for kind, name in (("hexahedron", "hexahedron"), (12, "12 of VTK"), ("tetra10", "tetra10")):
-        cells = {"tetra": TETRAHEDRA, kind: np.zeros((5, 8), int)}
-        with pytest.raises(MeshError, match=f"holds 5 cells of kind {name};.*convert the cells"):
-            as_mesh(SimpleNamespace(points=CORNERS, cells_dict=cells))
-    cells = {"tetra": TETRAHEDRA, "line3": np.zeros((5, 3), int), "vertex": np.zeros((5, 1), int)}
-    assert as_mesh(SimpleNamespace(points=CORNERS, cells_dict=cells)).is_tetrahedral
-    with pytest.raises(MeshError, match="the mesh has no faces"):
-        as_mesh(SimpleNamespace(points=CORNERS, cells_dict={"line": F[:, :2]}))
-
-
-def test_operators_and_solvers_are_refused_by_name():
-    for mesh in (SPHERE, shapes.box(1)):  # on tetrahedra, the type is a private one
-        with pytest.raises(MeshError, match=r"\.Operators: GeodesicSolver and HeatMethodSolver take operators"):
-            as_mesh(heat_igl.speed_operators(mesh, np.ones(mesh.n_faces)))
-    with pytest.raises(MeshError, match=r"HeatMethodSolver: a solver is asked itself"):
-        as_mesh(heat_igl.HeatMethodSolver(SPHERE))
-
-
-def test_grids_of_pyvista_name_the_way_to_cells():
-    class StructuredGrid:
-        """As that of pyvista, whose cells are not stored."""
-
-    with pytest.raises(MeshError, match=r"StructuredGrid: pass .cast_to_unstructured_grid\(\).triangulate\(\)"):
-        as_mesh(StructuredGrid())
 
 
 def test_faces_beside_a_mesh_are_refused():

@@ -142,8 +142,6 @@ def test_plane_is_exact():
     mesh = Mesh(square.V * [2, 1, 1], square.F)
     for sources in (0, [3, 50, 77]):
         np.testing.assert_allclose(closed_forms.plane(mesh, sources), reference.exact(mesh, sources), atol=1e-9)
-    with pytest.raises(ReferenceSolverError, match="does not lie in a plane"):
-        closed_forms.plane(shapes.icosphere(0), 0)
     with pytest.raises(ReferenceSolverError, match=r"fills .*% of its convex hull"):
         closed_forms.plane(Mesh(mesh.V, mesh.F[20:]), 0)
 
@@ -154,8 +152,6 @@ def test_flat_torus_is_exact():
     for sources in (0, [40, 111]):
         closed = closed_forms.flat_torus(cells / [6, 12], sources, periods=(2, 1))
         np.testing.assert_allclose(closed, reference.exact(mesh, sources), atol=1e-9)
-    with pytest.raises(ReferenceSolverError, match=r"coordinates of shape \(n, 2\)"):
-        closed_forms.flat_torus(mesh.V, 0)
 
 
 @pytest.mark.parametrize(

@@ -51,16 +51,12 @@ def test_every_component_gets_a_point_first_and_loose_vertices_none():
     points = heat_igl.farthest_points(solver, mesh.n_vertices - 1)
     assert mesh.components[points[0]] != mesh.components[points[1]]
     assert mesh.n_vertices - 1 not in points
-    with pytest.raises(ValueError, match="k must be an integer from 1"):
-        heat_igl.farthest_points(solver, mesh.n_vertices)
 
 
 def test_several_starting_points_come_first(square):
     _, solver = square
     points = heat_igl.farthest_points(solver, 4, start=[20, 0])
     assert points[:2].tolist() == [0, 20]
-    with pytest.raises(ValueError, match="k must be an integer from 2"):
-        heat_igl.farthest_points(solver, 1, start=[20, 0])
 
 
 def test_cells_come_with_the_sampling():
@@ -139,17 +135,6 @@ def test_islands_and_zigzag_borders_leave_the_dual_alone():
     assert {tuple(face) for face in noisy.F.tolist()} == {tuple(face) for face in dual.F.tolist()}
 
 
-def test_too_few_sites_have_no_dual(square):
-    mesh = shapes.torus(20, 60)
-    solver = heat_igl.HeatMethodSolver(mesh)
-    with pytest.raises(heat_igl.MeshError, match="sample more densely"):
-        sampling.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 6))
-    with pytest.raises(heat_igl.MeshError, match="no three cells meet"):
-        sampling.dual_triangulation(mesh, heat_igl.farthest_cells(solver, 2))
-    with pytest.raises(heat_igl.MeshError, match="the cells have 1200 vertices and the mesh 441"):
-        sampling.dual_triangulation(square[0], heat_igl.farthest_cells(solver, 2))
-
-
 def every_vertex_a_site(mesh: Mesh) -> sampling.VoronoiCells:
     """Cells whose dual is the mesh itself."""
     every = np.arange(mesh.n_vertices)
@@ -160,15 +145,14 @@ def test_dual_must_be_a_manifold_with_every_site():
     sphere = shapes.icosphere(1)
     dual = sampling.dual_triangulation(sphere, every_vertex_a_site(sphere))
     assert {tuple(sorted(face)) for face in dual.F.tolist()} == {tuple(sorted(face)) for face in sphere.F.tolist()}
-    loose = Mesh(np.concatenate([sphere.V, np.ones((2, 3))]), sphere.F)
-    with pytest.raises(heat_igl.MeshError, match=r"cell 42 has no triangle \(2 of 44 cells have none\)"):
-        sampling.dual_triangulation(loose, every_vertex_a_site(loose))
-    book = shapes.book(3, 2)
-    with pytest.raises(heat_igl.MeshError, match=r"between cells 0 and 1 has more than two triangles \(2 edges have\)"):
-        sampling.dual_triangulation(book, every_vertex_a_site(book))
     bow_tie = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]])
-    with pytest.raises(heat_igl.MeshError, match=r"the triangles at cell 0 are not one fan \(1 cells"):
-        sampling.dual_triangulation(bow_tie, every_vertex_a_site(bow_tie))
+    for mesh, said in (
+        (Mesh([*sphere.V, *np.ones((2, 3))], sphere.F), r"cell 42 has no triangle \(2 of 44 cells have none\)"),
+        (shapes.book(3, 2), r"between cells 0 and 1 has more than two triangles \(2 edges have\)"),
+        (bow_tie, r"the triangles at cell 0 are not one fan \(1 cells"),
+    ):
+        with pytest.raises(heat_igl.MeshError, match=said):
+            sampling.dual_triangulation(mesh, every_vertex_a_site(mesh))
 
 
 def test_diameter_of_a_square_and_a_sphere(square):
@@ -179,8 +163,6 @@ def test_diameter_of_a_square_and_a_sphere(square):
     sphere = shapes.icosphere(4)
     distance, first, second = heat_igl.diameter(heat_igl.GeodesicSolver(sphere, method="exact"))
     assert distance == pytest.approx(np.pi, rel=5e-3)
-    with pytest.raises(ValueError, match="rounds must be a positive integer"):
-        heat_igl.diameter(square[1], rounds=0)
 
 
 def test_diameter_stays_in_the_component_of_the_start():
@@ -201,5 +183,3 @@ def test_distance_matrix_is_symmetric_and_the_mean_of_both_ways():
     assert not np.diag(matrix).any()
     assert np.isinf(matrix[0, 200])
     assert matrix[3, 90] == pytest.approx((solver.distance(3)[90] + solver.distance(90)[3]) / 2, rel=1e-9)
-    with pytest.raises(heat_igl.SourceError, match="indices must be distinct, but vertex 4 is there twice"):
-        heat_igl.distance_matrix(solver, [4, 2, 4])

@@ -91,13 +91,6 @@ def test_offsets_add_up_through_nested_sources():
     assert (twice.vertices.tolist(), twice.vertex_offset.tolist(), twice.vertex_label.tolist()) == ([2], [0.25], [1])
 
 
-def test_only_triangles_hold_points():
-    with pytest.raises(SourceError, match="points and curves lie on triangles, and this domain has none: name vert"):
-        source_set([0, SurfacePoints([0], CENTRE)], 5, None)
-    with pytest.raises(SourceError, match="here, not SurfacePoints"):
-        vertex_sources(SurfacePoints([0], CENTRE), 5)
-
-
 @pytest.mark.parametrize("method", ["exact", "sweep", "heat"])
 def test_offsets_from_which_distances_cannot_be_told_are_refused(method):
     mesh = shapes.grid(8)

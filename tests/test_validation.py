@@ -238,8 +238,6 @@ def test_references_of_ones_own():
     assert report.rows[0].errors is not None
     assert "works on triangles" in str(report.rows[1].failure)
     assert report.plot().axes
-    with pytest.raises(ValueError, match=r"reference must have shape \(1, 121\), not \(2, 121\)"):
-        validate(mesh, 0, ["heat"], reference=known)
 
 
 def test_rows_of_other_domains():
@@ -304,8 +302,6 @@ def test_command_prints_and_writes_the_report(folder, capsys):
 def test_relative_error_entry_by_entry():
     error = metrics.relative_error([0, 1, 2, np.inf, 7, np.nan], [0, 2, 2, 3, np.inf, 4])
     np.testing.assert_array_equal(error, [np.nan, 0.5, 0, np.inf, np.nan, np.inf])
-    with pytest.raises(ValueError, match=r"one shape, not \(2,\) and \(3,\)"):
-        metrics.relative_error([1, 2], [1, 2, 3])
 
 
 def test_a_distance_too_long_by_one_percent():
@@ -371,8 +367,6 @@ def test_wrong_reach_is_counted():
     assert found.n_wrong_reach == 1
     assert found.mean == found.maximum == found.l1 == found.l_infinity == np.inf
     assert found.median == 0
-    with pytest.raises(ValueError, match=r"shape \(1, 18\), one row per set of sources, not \(18,\)"):
-        metrics.error_summary(mesh, truth, truth, [0])
 
 
 def test_eikonal_residual_of_a_linear_function_is_its_slope_less_one():
