@@ -57,6 +57,16 @@ def test_metrics_of_bent_bars_converge(a):
     assert per_vertex[1] < 0.01
 
 
+def test_speeds_in_a_plane_are_the_same_however_it_lies_in_space():
+    """Velocities are fitted around vertices: across a plane, centres differ by rounding alone."""
+    mesh, turn = shapes.grid(20), np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+    x, y, _ = mesh.V[mesh.F].mean(axis=1).T
+    metric = np.eye(3) / (2 + np.sin(2 * x + y))[:, None, None] ** 2
+    found = [MetricSimplices.in_metric(Mesh(V, mesh.F), metric, 0.3) for V in (mesh.V, mesh.V @ turn + 5)]
+    flat, turned = (simplices.velocity[simplices.rows] for simplices in found)
+    assert turned == pytest.approx(flat, abs=1e-8)
+
+
 def test_layers_and_smooth_speeds_of_tetrahedra():
     """Tensors that jump stay as they are given; those of a speed from 1 to 20 are carried to the corners."""
     mesh = shapes.box(12)

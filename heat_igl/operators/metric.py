@@ -165,8 +165,7 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     largest = _LARGEST**0.5
     outside = (s < 1 / largest) | (s > largest)
     raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
-    first, group = equal_runs(s)
-    each = s[first, None, None]
+    each, group = equal_runs(s[:, None, None])
     least, root = 1 / float(s.max()), (each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None)
     # A metric without a name here does not outlive its use there.
     if mesh.is_tetrahedral:
@@ -505,8 +504,7 @@ def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, Any, Any]:
     if g.shape[1] == 2:
         axes = plane_axes(mesh)
         symmetric = np.swapaxes(axes, 1, 2) @ symmetric @ axes
-    first, group = equal_runs(symmetric) if p == 3 else (slice(None), slice(None))
-    symmetric = symmetric[first]
+    symmetric, group = equal_runs(symmetric) if p == 3 else (symmetric, slice(None))
     root = inverse_root(symmetric, mesh)
     return symmetric, float(np.sqrt(least_eigenvalue("metric", root[2][group, 0], g))), root, group
 

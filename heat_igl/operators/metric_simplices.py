@@ -49,6 +49,8 @@ class MetricSimplices:
     is_given : bool
         Whether tensors, or positions without tensors, are those that the user gave in space: then distance has
         derivatives by them.
+    incident : (n + 1,) and (m (p + 1),) int32, or None
+        The corners at each vertex, as of `corners_by_vertex`, if they are known.
     """
 
     corners: AnyArray
@@ -61,6 +63,7 @@ class MetricSimplices:
     velocity: FloatArray | None = None
     rows: AnyArray | None = None
     is_given: bool = False
+    incident: tuple[AnyArray, AnyArray] | None = None
 
     @classmethod
     def in_space(cls, mesh: Mesh) -> MetricSimplices:
@@ -90,10 +93,9 @@ class MetricSimplices:
         group = np.arange(len(corners), dtype=np.int32) if group is None else group
         incident = incidence.corners_by_vertex(corners, mesh.n_vertices)
         at_vertex, share = fits_around(corners, mesh.V, velocity, group, *incident)
-        del incident
         if not (share > _ROUNDING).any():
             g = np.linalg.matrix_power(symmetric(velocity), -2) if g is None else g
-            return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3)
+            return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3, incident=incident)
         smallest, largest = inverse_root(at_vertex)[2].T
         share[smallest <= 0] = 0
         share[share >= 1 - _ROUNDING] = 1
@@ -101,7 +103,7 @@ class MetricSimplices:
         faces = corners if p == 2 else np.empty((0, 3), np.int32)
         velocity, rows, _ = velocities_at_corners(corners, at_vertex, velocity, group, share, faces, mesh.V, False)
         least = min(least, float(1 / largest.max()))
-        return cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows)
+        return cls(corners, mesh.n_vertices, mesh.V, least, velocity=velocity, rows=rows, incident=incident)
 
     @classmethod
     def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
@@ -187,7 +189,7 @@ def inverse_root(
     Of triangles, those of each in its plane, or at each of its corners; else one for each metric. The roots are those
     of |g| where g is not positive definite.
     """
-    above = np.ascontiguousarray(g[:, *_ABOVE]) if g.ndim == 3 else g
+    above = g.reshape(-1, 9).take(np.ravel_multi_index(_ABOVE, (3, 3)), axis=1) if g.ndim == 3 else g
     corners, faces, V = np.arange(len(g), dtype=np.int32)[:, None], np.empty((0, 3), np.int32), np.empty((0, 3))
     if mesh is not None and not mesh.is_tetrahedral:
         faces, V = mesh.F.astype(np.int32), mesh.V
@@ -204,8 +206,9 @@ def symmetric(above: FloatArray) -> FloatArray:
     return full
 
 
-def equal_runs(values: AnyArray) -> tuple[IntArray, AnyArray]:
-    """The first (k,) of each run of equal rows (m, ...), as of the simplices of a voxel, and the run (m,) int32."""
+def equal_runs(values: FloatArray) -> tuple[FloatArray, AnyArray]:
+    """The value (k, ...) of each run of equal rows (m, ...), as of the simplices of a voxel, and the run (m,) int32."""
     is_new = np.ones(len(values), bool)
-    is_new[1:] = (values[1:] != values[:-1]).reshape(len(values) - 1, -1).any(axis=1)
-    return np.flatnonzero(is_new), np.cumsum(is_new, dtype=np.int32) - np.int32(1)
+    is_new[1:] = reduce(np.logical_or, (values[1:] != values[:-1]).reshape(len(values) - 1, -1).T)
+    each = values if is_new.all() else values[is_new]
+    return each, np.cumsum(is_new, dtype=np.int32) - np.int32(1)

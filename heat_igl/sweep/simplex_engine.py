@@ -30,7 +30,8 @@ class SimplexEngine(Engine):
     def __init__(self, simplices: MetricSimplices) -> None:
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
-        self._first, self._incident = incidence.corners_by_vertex(self._corners, simplices.n)
+        known: Any = simplices.incident
+        self._first, self._incident = known or incidence.corners_by_vertex(self._corners, simplices.n)
 
     @abstractmethod
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:

@@ -41,6 +41,10 @@ cdef inline void cross(const double* a, const double* b, double* into) noexcept 
     for x in range(3):
         into[x] = a[(x + 1) % 3] * b[(x + 2) % 3] - a[(x + 2) % 3] * b[(x + 1) % 3]
 
+cdef inline int simplex_of(int at, int size) noexcept nogil:
+    # Of a corner ``simplex * size + corner``; divisions by a constant take a tenth of the time.
+    return at // 4 if size == 4 else at // 3
+
 cdef inline int pair(int i, int j) noexcept nogil:
     # The number of the pair of two corners, as np.tril_indices counts them below the diagonal.
     return i * (i - 1) // 2 + j if i > j else j * (j - 1) // 2 + i

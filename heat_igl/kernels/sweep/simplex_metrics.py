@@ -10,6 +10,7 @@ from cython.cimports.heat_igl.kernels.sweep.facets import (
     invert,
     mean_velocity,
     pair,
+    simplex_of,
     squares_of,
 )
 from cython.cimports.libc.float import DBL_MIN
@@ -39,6 +40,7 @@ def lengths_in_velocity(
         How far the lengths of edges of triangles differ between the metrics of the corners, mean square of the share.
     """
     size: cython.int = corners.shape[1]
+    per: cython.double = 1.0 / size
     n_pairs: cython.int = size * (size - 1) // 2
     m = corners.shape[0]
     found = np.empty_like(velocity), np.empty((m, n_pairs)), np.zeros(m), np.zeros(m), np.zeros(m)
@@ -71,7 +73,7 @@ def lengths_in_velocity(
                         e[3 * pair(i, j) + x] = V[corners[s, j], x] - V[corners[s, i], x]
                     E[3 * i + x] = V[corners[s, 0], x] - V[corners[s, i], x]
                 for k in range(6):
-                    W[k] += at[i][k] / size
+                    W[k] += per * at[i][k]
                 rise[i] = mean_velocity(at[0]) - mean_velocity(at[i])
                 fastest = max(fastest, mean_velocity(at[i]))
             invert(W, I)
@@ -119,7 +121,7 @@ def velocities_at_corners(
     else (0, 3), they are those in the plane, and across it the mean: trust in slopes asks it. Third are the smallest
     and largest eigenvalue (n, 2) there, if they were asked for.
     """
-    # Of the first array, which has room for all corners, only the rows that are written to are kept.
+    # The first array has room for all corners; if most of it stays empty, only the rows that are written to are kept.
     found, sizes = np.empty((corners.size, 6)), np.tile([np.inf, 0.0], (len(at_vertex), 1))
     number, last = np.empty_like(corners), np.full(len(at_vertex), -1, np.int32)
     velocity: cython.double[:, ::1] = found
@@ -134,46 +136,49 @@ def velocities_at_corners(
     work: cython.double[288]
     with cython.nogil:
         for begin in range(0, corners.shape[0], 4):
-            n: cython.int = cython.cast(cython.int, min(4, corners.shape[0] - begin)) * size
+            n: cython.int = cython.cast(cython.int, min(4, corners.shape[0] - begin))
             block = cython.address(velocity[count, 0])
             for i in range(n):
-                s: cython.Py_ssize_t = begin + i // size
-                W = block + 6 * i
-                for k in range(6):
-                    W[k] = share[s] * at_vertex[corners[s, i % size], k]
-                    if share[s] < 1.0:
-                        W[k] += (1.0 - share[s]) * own[group[s], k]
+                s: cython.Py_ssize_t = begin + i
+                axis = base + 9 * i
                 if in_plane:
-                    axis = base + 9 * (i // size)
-                    if i % size == 0:
-                        _lay_axes(V, faces, s, axis)
-                    _turn(W, axis, 1, 3)
-                    W[2] = W[4] = W[5] = 0.0
-                for k in range(9 if is_metric else 0):
-                    work[18 * i + k] = W[entry(k // 3, k % 3)]
-            if is_metric:
-                diagonalize(work, n)
-            for i in range(n):
-                s = begin + i // size
-                v: cython.int = corners[s, i % size]
-                W = block + 6 * i
-                if is_metric:
-                    _root(work + 18 * i, 2 if in_plane else 3, W, cython.address(extremes[v, 0]))
-                if in_plane:
-                    W[5] = 0.5 * (W[0] + W[3])
-                    _turn(W, base + 9 * (i // size), 3, 1)
-                width: cython.double = 0.0
-                change: cython.double = INFINITY if row_at[v] < 0 else 0.0
-                for k in range(6 if row_at[v] >= 0 else 0):
-                    width = max(width, fabs(velocity[row_at[v], k]))
-                    change = max(change, fabs(W[k] - velocity[row_at[v], k]))
-                if change > _SAME * width:
+                    _lay_axes(V, faces, s, axis)
+                for c in range(size):
+                    W = block + 6 * (size * i + c)
                     for k in range(6):
-                        velocity[count, k] = W[k]
-                    row_at[v] = count
-                    count += 1
-                row[s, i % size] = row_at[v]
-    return found[:count].copy(), number, sizes
+                        W[k] = share[s] * at_vertex[corners[s, c], k]
+                    for k in range(6 if share[s] < 1.0 else 0):
+                        W[k] += (1.0 - share[s]) * own[group[s], k]
+                    if in_plane:
+                        _turn(W, axis, 1, 3)
+                        W[2] = W[4] = W[5] = 0.0
+                    for k in range(9 if is_metric else 0):
+                        work[18 * (size * i + c) + k] = W[entry(k // 3, k % 3)]
+            if is_metric:
+                diagonalize(work, n * size)
+            for i in range(n):
+                s = begin + i
+                for c in range(size):
+                    v: cython.int = corners[s, c]
+                    W = block + 6 * (size * i + c)
+                    if is_metric:
+                        of = work + 18 * (size * i + c)
+                        _root(of, 2 if in_plane else 3, W, cython.address(extremes[v, 0]))
+                    if in_plane:
+                        W[5] = 0.5 * (W[0] + W[3])
+                        _turn(W, base + 9 * i, 3, 1)
+                    width: cython.double = 0.0
+                    change: cython.double = INFINITY if row_at[v] < 0 else 0.0
+                    for k in range(6 if row_at[v] >= 0 else 0):
+                        width = max(width, fabs(velocity[row_at[v], k]))
+                        change = max(change, fabs(W[k] - velocity[row_at[v], k]))
+                    if change > _SAME * width:
+                        for k in range(6):
+                            velocity[count, k] = W[k]
+                        row_at[v] = count
+                        count += 1
+                    row[s, c] = row_at[v]
+    return found[:count] if 2 * count > len(found) else found[:count].copy(), number, sizes
 
 
 @cython.cfunc
@@ -276,24 +281,26 @@ def _sum_products(
     origin: cython.double[::1],
     at: cython.double[:, ::1],
 ) -> cython.void:
-    """Add up over the simplices at each vertex, in a row of `at` (n, 35), or (n, 41) for triangles.
+    """Add up over the simplices at each vertex, in a row of `at` (n, 36), or (n, 42) for triangles, the last one 0.
 
     These are the products of 1, x, y, z with 1, x, y, z and the velocity at the centre, each pair once; the square of
     the velocity; and products of the unit normal. Positions are from the `origin` (3,), velocities from `level` (6,).
     """
     size: cython.int = corners.shape[1]
+    per: cython.double = 1.0 / size
     n_columns: cython.int = cython.cast(cython.int, at.shape[1])
     row: cython.double[10]
     side: cython.double[6]
     normal: cython.double[3]
-    mean: cython.double[41]
+    mean: cython.double[42]
     row[0] = 1.0
     for s in range(corners.shape[0]):
         for k in range(9):
             row[1 + k] = W[group[s], k - 3] - level[k - 3] if k > 2 else 0.0
-        for k in range(3 * size):
-            row[1 + k % 3] += (X[corners[s, k // 3], k % 3] - origin[k % 3]) / size
-        if n_columns == 41:
+        for c in range(size):
+            for k in range(3):
+                row[1 + k] += per * (X[corners[s, c], k] - origin[k])
+        if size == 3:
             for k in range(6):
                 side[k] = X[corners[s, 1 + k // 3], k % 3] - X[corners[s, 0], k % 3]
             cross(side, side + 3, normal)
@@ -305,18 +312,19 @@ def _sum_products(
             for k in range(j, 10):
                 mean[i] = row[j] * row[k]
                 i += 1
-        mean[34] = 0.0
+        mean[34] = mean[n_columns - 1] = 0.0
         for k in range(6):
             mean[34] += _OFTEN[k] * row[4 + k] * row[4 + k]
         i = 35
-        for j in range(3 if n_columns == 41 else 0):
+        for j in range(3 if size == 3 else 0):
             for k in range(j, 3):
                 mean[i] = normal[j] * normal[k]
                 i += 1
         for c in range(size):
             to = cython.address(at[corners[s, c], 0])
-            for k in range(n_columns):
-                to[k] += mean[k]
+            for j in range(0, n_columns, 6):
+                for k in range(6):
+                    to[j + k] += mean[j + k]
 
 
 def fits_around(
@@ -334,7 +342,7 @@ def fits_around(
     3/4 of the variance there. Of triangles, what varies since projections on their normals do, counts as not explained.
     """
     size: cython.int = corners.shape[1]
-    n_columns: cython.int = 35 if size == 4 else 41
+    n_columns: cython.int = 36 if size == 4 else 42
     # As `_sum_products` adds them up.
     sums, found, shares = np.zeros((len(X), n_columns)), np.zeros((len(X), 6)), np.zeros(len(X))
     at: cython.double[:, ::1] = sums
@@ -346,19 +354,20 @@ def fits_around(
     level: cython.double[::1] = np.bincount(group) @ W / len(group)
     # Far from the origin, digits of products of positions are lost.
     origin: cython.double[::1] = np.mean(X, axis=0)
-    mean: cython.double[41]
-    work: cython.double[18]
+    mean: cython.double[42]
+    spread: cython.double[9]
+    away: cython.double[3]
     slope: cython.double[18]
     i: cython.int
     with cython.nogil:
         _sum_products(corners, X, W, group, level, origin, at)
         for v in range(X.shape[0]):
             others: cython.double = -1.0
-            for k in range(41):
+            for k in range(42):
                 mean[k] = 0.0
             n_met: cython.int = 0
             for i in range(first[v], first[v + 1]):
-                t: cython.int = incident[i] // size
+                t: cython.int = simplex_of(incident[i], size)
                 for c in range(size):
                     u: cython.int = corners[t, c]
                     # Overwritten by the next one, if it was met before.
@@ -370,48 +379,58 @@ def fits_around(
                 others += cython.cast(cython.double, first[u + 1] - first[u]) / size
                 times: cython.double = met[u]
                 of = cython.address(at[u, 0])
-                for k in range(n_columns):
-                    mean[k] += times * of[k]
+                for j in range(0, n_columns, 6):
+                    for k in range(6):
+                        mean[j + k] += times * of[j + k]
                 met[u] = 0
             total: cython.double = max(mean[0], 1.0)
             for k in range(n_columns):
                 mean[k] /= total
             i = 10
             for j in range(3):
+                away[j] = X[v, j] - origin[j] - mean[1 + j]
                 for k in range(j, 9):
                     about: cython.double = mean[i] - mean[1 + j] * mean[1 + k]
                     if k > 2:
                         slope[6 * j + k - 3] = about
                     else:
-                        work[3 * j + k] = work[3 * k + j] = about
+                        spread[3 * j + k] = spread[3 * k + j] = about
                     i += 1
             variance: cython.double = mean[34]
             square: cython.double = mean[34]
             whole: cython.double = 0.0
-            turned: cython.double = 1.0 if n_columns == 41 else 0.0
+            turned: cython.double = 1.0 if size == 3 else 0.0
             for k in range(6):
                 result[v, k] = level[k] + mean[4 + k]
                 variance -= _OFTEN[k] * mean[4 + k] * mean[4 + k]
                 square += _OFTEN[k] * level[k] * level[k]
                 whole += _OFTEN[k] * result[v, k] * result[v, k]
                 turned -= _OFTEN[k] * mean[35 + k] * mean[35 + k]
-            diagonalize(work)
             explained: cython.double = -turned * whole
             free: cython.double = others
-            for i in range(3):
-                # Centres do not differ in this direction but for rounding.
-                if fabs(work[4 * i]) <= 1e-15 * max(fabs(work[0]), fabs(work[4]), fabs(work[8])):
-                    continue
+            # Of x^2, y^2 and z^2.
+            largest: cython.double = max(mean[10], mean[19], mean[27])
+            for _ in range(3):
+                i = 0
+                for j in range(1, 3):
+                    i = j if fabs(spread[4 * j]) > fabs(spread[4 * i]) else i
+                # Centres do not differ in other directions but for rounding.
+                if fabs(spread[4 * i]) <= 1e-15 * largest:
+                    break
                 free -= 1.0
-                away: cython.double = 0.0
-                for j in range(3):
-                    away += work[9 + 3 * i + j] * (X[v, j] - origin[j] - mean[1 + j])
+                per: cython.double = 1.0 / spread[4 * i]
                 for k in range(6):
-                    rise: cython.double = 0.0
-                    for j in range(3):
-                        rise += work[9 + 3 * i + j] * slope[6 * j + k]
-                    explained += _OFTEN[k] * rise * rise / fabs(work[4 * i])
-                    result[v, k] += away * rise / fabs(work[4 * i])
+                    explained += _OFTEN[k] * slope[6 * i + k] * slope[6 * i + k] * fabs(per)
+                    result[v, k] += away[i] * slope[6 * i + k] * fabs(per)
+                # What is left of the other coordinates, when what they share with this one is taken from them.
+                for turn in range(1, 4):
+                    j = (i + turn) % 3
+                    share_of: cython.double = spread[3 * j + i] * per
+                    away[j] -= share_of * away[i]
+                    for k in range(6):
+                        slope[6 * j + k] -= share_of * slope[6 * i + k]
+                    for k in range(3):
+                        spread[3 * j + k] -= share_of * spread[3 * i + k]
             # Adjusted: of no more simplices than it has coefficients, a function explains all.
             if variance > _ROUNDING * square and free > 0.0:
                 share[v] = min(max(1.0 - 4.0 * (1.0 - explained / variance) * others / free, 0.0), 1.0)
