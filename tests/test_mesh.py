@@ -201,7 +201,7 @@ def test_edges_facets_and_components_against_sets(given_faces):
     for face in faces:
         for pair in itertools.combinations(sorted(face), 2):
             holders[pair] = holders.get(pair, 0) + 1
-    assert [tuple(row) for row in connectivity.edges(F, n).tolist()] == sorted(holders)
+    assert [tuple(row) for row in connectivity.edge_middles(F, n)[0].tolist()] == sorted(holders)
     found = connectivity.facets(F, n)
     assert dict(zip(map(tuple, found.vertices.tolist()), found.n_faces.tolist(), strict=True)) == holders
     for face, row in zip(faces, found.of_face.tolist(), strict=True):

@@ -11,8 +11,6 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec, source_hash
 from pathlib import Path
 
-__all__ = ["builds"]
-
 
 def _require_extensions() -> None:
     """Refuse to go on if the kernels have not been compiled from the sources that stand here.

@@ -5,7 +5,6 @@ A *facet* is a face of a simplex: an edge of a triangle, a triangle of a tetrahe
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -107,15 +106,8 @@ def first_copies(V: FloatArray) -> IntArray:
     return first[inverse]
 
 
-def edges(F: IntArray, n: int) -> IntArray:
-    """The distinct edges (k, 2) of triangles or tetrahedra `F`, each ascending, in lexicographic order."""
-    pairs = np.concatenate([F[:, pair] for pair in combinations(range(F.shape[1]), 2)])
-    pairs.sort(axis=1)
-    return pairs[unique_rows(pairs, n)[0]]
-
-
 def edge_middles(corners: AnyArray, n: int) -> tuple[IntArray, IntArray]:
-    """The ends (e, 2) of each edge, and the edge of each side of the simplices."""
+    """The ends (e, 2) of each edge, ascending, in lexicographic order, and the edge of each side of the simplices."""
     sides = np.stack(np.tril_indices(corners.shape[1], -1), axis=1)
     pairs = np.sort(corners[:, sides].reshape(-1, 2).astype(np.int64), axis=1)
     first, edge, _ = unique_rows(pairs, n)

@@ -294,7 +294,7 @@ class Mesh:
         """The distinct edges (k, 2), each ascending."""
         if not self.is_tetrahedral:
             return self.facets.vertices
-        return _frozen(connectivity.edges(self.F, self.n_vertices))
+        return _frozen(connectivity.edge_middles(self.F, self.n_vertices)[0])
 
     @cached_property
     def edge_lengths(self) -> FloatArray:

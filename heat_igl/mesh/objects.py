@@ -205,12 +205,12 @@ def _converted(mesh: MeshLike, F: ArrayLike | None) -> Mesh | PolygonMesh | Poin
     raise MeshError(f"mesh is {_named(mesh)}, which is not understood: pass {_UNDERSTOOD}")
 
 
-def as_simplices(mesh: MeshLike, F: ArrayLike | None = None) -> Mesh:
+def as_simplices(mesh: MeshLike) -> Mesh:
     """A mesh of any library as triangles or tetrahedra: `as_mesh`, with the triangles of polygons and of point clouds.
 
-    The vertices are those of `as_mesh`. Arguments and errors are those of `as_mesh`, too.
+    The vertices are those of `as_mesh`, and so are the errors.
     """
-    found = as_mesh(mesh, F)
+    found = as_mesh(mesh)
     return found if isinstance(found, Mesh) else found.triangles
 
 

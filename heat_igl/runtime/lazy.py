@@ -10,8 +10,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 
-__all__ = ["attached"]
-
 
 def attached(
     package: str, file: str, other_words: Mapping[str, str] = MappingProxyType({})

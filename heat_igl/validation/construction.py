@@ -157,13 +157,14 @@ def merged(mesh: Mesh) -> Mesh:
 
 def dual(mesh: Mesh) -> PolygonMesh:
     """A polygon around each vertex inside of a manifold mesh, with its corners in the middles of the faces."""
-    following = {}
+    following: dict[tuple[int, int], tuple[int, int]] = {}
     for f, (a, b, c) in enumerate(mesh.F.tolist()):
         following |= {(a, b): (f, c), (b, c): (f, a), (c, a): (f, b)}
     neighbour = dict(following.keys())
     polygons = []
     for v in np.flatnonzero(mesh.referenced & ~mesh.boundary).tolist():
-        polygon, there = [], neighbour[v]
+        polygon: list[int] = []
+        there = neighbour[v]
         while not polygon or there != neighbour[v]:
             face, there = following[v, there]
             polygon.append(face)

@@ -18,8 +18,6 @@ from heat_igl.validation import construction as build
 from heat_igl.validation.construction import Generator
 from heat_igl.validation.shapes import grid, icosphere, lattice_mesh
 
-__all__ = ["FAMILIES"]
-
 
 def _bounded(outline: FloatArray, points: FloatArray) -> BoolArray:
     """Whether points (k, 2) lie inside a polygon (e, 2)."""

@@ -193,7 +193,6 @@ def on_one_side(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _sees_the_same(
     i: cython.Py_ssize_t,

@@ -40,7 +40,6 @@ def fitting_triangles(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _find_sector(
     P: cython.const[cython.double][:, ::1],
@@ -64,7 +63,6 @@ def _find_sector(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _direction(
     P: cython.const[cython.double][:, ::1],
@@ -84,7 +82,6 @@ def _direction(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _overlaps(
     f: cython.Py_ssize_t,

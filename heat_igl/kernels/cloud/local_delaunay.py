@@ -172,14 +172,12 @@ def _triangles(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _square(star: cython.double[:, ::1], a: cython.Py_ssize_t) -> cython.double:
     return star[a, X] * star[a, X] + star[a, Y] * star[a, Y]
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _is_hidden(
     star: cython.double[:, ::1], p: cython.Py_ssize_t, q: cython.Py_ssize_t, r: cython.Py_ssize_t

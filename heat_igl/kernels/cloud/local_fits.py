@@ -93,7 +93,6 @@ def _around(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _along(axis: cython.double[::1], term: cython.double[::1]) -> cython.double:
     """The component of a way, see `_around`, along an axis."""
@@ -101,7 +100,6 @@ def _along(axis: cython.double[::1], term: cython.double[::1]) -> cython.double:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _moments(local: cython.double[:, ::1], n: cython.int, moment: cython.p_double) -> cython.void:
     """Weighted sums of products of the first n columns: the upper half of a matrix (n, n)."""

@@ -132,7 +132,6 @@ class _Gaps:
     link: cython.int[:, ::1]
 
     @cython.cfunc
-    @cython.inline
     @cython.nogil
     def at_end(self, end: cython.Py_ssize_t) -> cython.int:
         """The point at end 2 h + d of side h."""
@@ -203,7 +202,6 @@ class _Gaps:
                     self.fans[2, i] = self.fans[2, first]
 
     @cython.cfunc
-    @cython.inline
     @cython.nogil
     def square(self, a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.double:
         """Squared distance of two points."""

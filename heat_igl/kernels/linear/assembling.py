@@ -53,7 +53,6 @@ def laplacian(F: cython.const[cython.int][:, ::1], weight: cython.const[cython.d
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _column(F: cython.const[cython.int][:, ::1], entry: cython.Py_ssize_t) -> cython.int:
     """The column of an entry: entry 2 h of side h is in that of its tail, 2 h + 1 in that of its head."""

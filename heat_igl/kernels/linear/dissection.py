@@ -135,7 +135,6 @@ class Dissecting:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _push(
     d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, above: cython.Py_ssize_t, number: cython.int
@@ -343,7 +342,6 @@ def _assign(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, cut:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _side(code: cython.int, cut: Cut) -> cython.int:
     """The side of a vertex by bucket, or by part; a separator is on the side that gives it."""

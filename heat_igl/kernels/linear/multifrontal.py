@@ -146,7 +146,6 @@ def _front(e: Elimination, b: cython.Py_ssize_t) -> cython.Py_ssize_t:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _add_child(
     e: Elimination,
@@ -178,7 +177,6 @@ def _add_child(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _eliminate_columns(panel: numbers, columns: cython.Py_ssize_t, size: cython.Py_ssize_t) -> cython.bint:
     """LDL^T of the columns of a front in place; false if a pivot is not positive.
@@ -207,7 +205,6 @@ def _eliminate_columns(panel: numbers, columns: cython.Py_ssize_t, size: cython.
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _divide(column: numbers, n: cython.Py_ssize_t) -> cython.bint:
     """Divide a column by the pivot on top of it; false if that is not positive."""
@@ -220,7 +217,6 @@ def _divide(column: numbers, n: cython.Py_ssize_t) -> cython.bint:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _subtract_from_update(
     update: numbers, left: cython.Py_ssize_t, panel: entries, columns: cython.Py_ssize_t
@@ -243,7 +239,6 @@ def _subtract_from_update(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _sum_of_eight(a: cython.pointer(entries), f: entries, i: cython.Py_ssize_t) -> cython.double:
     """Row i of eight columns times their factors, in an order that suits vectors."""

@@ -171,7 +171,6 @@ class TriangularSolves:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _all_zero(x: entries, n: cython.Py_ssize_t) -> cython.bint:
     for i in range(n):
@@ -181,7 +180,6 @@ def _all_zero(x: entries, n: cython.Py_ssize_t) -> cython.bint:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _subtract_row(target: numbers, entry: cython.double, row: entries) -> cython.void:
     """Subtract a row, times an entry of the factor, from another."""
@@ -191,7 +189,6 @@ def _subtract_row(target: numbers, entry: cython.double, row: entries) -> cython
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _add_below(
     panel: entries, columns: cython.Py_ssize_t, left: cython.Py_ssize_t, own: entries, below: numbers
@@ -221,7 +218,6 @@ def _add_below(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _subtract_below(column: entries, left: cython.Py_ssize_t, below: entries, own: numbers) -> cython.void:
     """Subtract the rows below one column of a front, times `below`, from `own`; four rows per turn."""

@@ -73,7 +73,6 @@ def front_rows(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _append(
     rows: cython.int[::1],

@@ -161,7 +161,6 @@ class EdgePaths:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def lower(d: cython.p_double, label: cython.p_longlong, v: cython.int, w: cython.int, way: cython.double) -> cython.int:
     """The end of an edge of the length `way` that was lowered to the path along it; -1 if that is not shorter."""
@@ -176,7 +175,6 @@ def lower(d: cython.p_double, label: cython.p_longlong, v: cython.int, w: cython
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def is_longer(near: cython.double, far: cython.double, length: cython.double) -> cython.bint:
     """Whether the farther of two distances is longer than the way over the nearer one."""

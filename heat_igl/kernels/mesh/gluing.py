@@ -172,7 +172,6 @@ def breadth_first(edges, n: cython.int, start: cython.int):
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _meet(f: cython.int, place: cython.int[::1], face: cython.int[::1], n_met: cython.int) -> cython.int:
     """Number face f unless it has a number; returns how many have one."""

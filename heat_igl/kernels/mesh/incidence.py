@@ -119,7 +119,6 @@ def _number(above: cython.longlong[::1]) -> cython.void:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _join(above: cython.longlong[::1], a: cython.longlong, b: cython.longlong) -> cython.void:
     """Put the component of the higher lowest vertex below that of the other; paths are halved on the way."""

@@ -489,7 +489,6 @@ class Shortener:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _angle(ax: cython.double, ay: cython.double, bx: cython.double, by: cython.double) -> cython.double:
     """Angle between two directions, 0 to pi."""

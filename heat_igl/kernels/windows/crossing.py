@@ -48,7 +48,6 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _arrive(
     s: cython.pointer(Search),
@@ -70,7 +69,6 @@ def _arrive(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _straight(w: cython.pointer(Window), x: cython.double, y: cython.double) -> cython.double:
     """Length of the straight line from the root of a window to a point of the face, also outside of the window."""
@@ -80,7 +78,6 @@ def _straight(w: cython.pointer(Window), x: cython.double, y: cython.double) -> 
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _may_reach(
     w: cython.pointer(Window), apex: cython.pointer(Apex), x: cython.double, m: cython.double, off: cython.double
@@ -265,7 +262,6 @@ def _is_behind(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
     """Prefetch the data for windows over half-edge t."""

@@ -270,7 +270,6 @@ def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> c
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _key(
     s: cython.pointer(Search), w: cython.pointer(Window), length: cython.double, bulge: cython.double
@@ -291,7 +290,6 @@ def _key(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _mirrored(w: Window, length: cython.double) -> Window:
     """A window in the frame whose origin is the other end of its half-edge."""

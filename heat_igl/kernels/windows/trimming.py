@@ -31,7 +31,6 @@ from cython.cimports.libc.string import memmove
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
     """Derivative along the half-edge of `reached`, the length that a window adds to its offset."""
@@ -39,7 +38,6 @@ def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double)
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _change(
     u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, a: cython.double, b: cython.double
@@ -92,7 +90,6 @@ def _meeting(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _is_farther(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
     """Whether u reaches the root of w no later than w begins there, so u is nearer everywhere."""
@@ -185,7 +182,6 @@ def _gives_way(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
     """Whether two windows overlap by too little of both to be worth a comparison, or not at all.
@@ -302,7 +298,6 @@ def _goes_on(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _is_next(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
     """Whether w has another root, follows u and hardly overlaps it: then `_insert` would append it unchanged."""
@@ -363,7 +358,6 @@ def _insert(
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double) -> cython.double:
     """The distance at an end of a half-edge that paths over this end have: that of vertex v, with slack for rounding.

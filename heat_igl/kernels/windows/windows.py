@@ -397,7 +397,6 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
     """Process a queue entry unless it is outdated: a list crosses its face, or a vertex or source emits windows."""
@@ -422,7 +421,6 @@ def _carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _first(s: cython.pointer(Search)) -> Entry:
     """Pop the first entry of the queue, and prefetch the data of the next one."""
@@ -533,7 +531,6 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
 
 
 @cython.cfunc
-@cython.inline
 @cython.nogil
 def _load(s: cython.pointer(Search)) -> cython.longlong:
     """Estimated amount of work on the front, as a number of windows; 0 if there is none."""
