@@ -45,9 +45,15 @@ from heat_igl import (
     tangent_frames,
     trace_geodesic,
 )
+from heat_igl.compat import potpourri3d, pygeodesic
 from heat_igl.drawing.plots import plot_labels, write_line_drawing
+from heat_igl.heat.steps import fitted_laplacian
+from heat_igl.intrinsic import delaunay_refinement, intrinsic_triangulation
 from heat_igl.io.by_nibabel import FREESURFER_SUFFIXES
+from heat_igl.io.curves import read_polylines
 from heat_igl.io.files import MESH_SUFFIXES
+from heat_igl.linear import analyse
+from heat_igl.operators import operators
 from heat_igl.sampling import dual_triangulation, farthest_cells
 from heat_igl.sources import source_set, vertex_sources
 from heat_igl.validation import closed_forms, metrics
@@ -257,6 +263,10 @@ def plot_field(mesh: heat_igl.Mesh, values: Any = None, **options: Any) -> Any:
     return plots.plot_field(mesh, mesh.V[:, 0] if values is None else values, label="heat", **options)
 
 
+def carrier(mesh: heat_igl.Mesh) -> Any:
+    return potpourri3d.MeshVectorHeatSolver(mesh.V, mesh.F)
+
+
 RAGGED = [[1.0, 2.0], [3.0]]
 CURVE = SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0], [0.2, 0.2, 0.6]])
 CENTRE = [[1 / 3] * 3]
@@ -264,6 +274,7 @@ GRID = heat_igl.shapes.grid(4)
 TRIANGLE, SQUARE, ROW = [[0, 1, 2]], V4[[0, 1, 3, 2]], np.outer(np.arange(30), [1.0, 2, 3])
 BY_LENGTHS = GeodesicSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]])
 SPHERE, BOX, BOOK = heat_igl.shapes.icosphere(4), heat_igl.shapes.box(1), heat_igl.shapes.book(3, 2)
+PYGEODESIC = pygeodesic.PyGeodesicAlgorithmExact(twice(BALL).V, twice(BALL).F)
 TWISTED, TWO, TORUS = moebius_strip(8, 1), twice(BALL), heat_igl.shapes.torus(20, 60)
 TURNED = heat_igl.Mesh(GRID.V, np.where(np.arange(32)[:, None] == 5, GRID.F[:, ::-1], GRID.F))
 LOOSE = heat_igl.Mesh([*GRID.V, [5, 5, 5]], GRID.F)
@@ -592,12 +603,25 @@ REFUSED_BY_ERROR: dict[str, tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ..
         (lambda _: GeodesicSolver(CLOUD, region=RING), "not of PointCloud: pass a mesh of triangles, or of a cloud"),
         (lambda _: heat_igl.as_mesh((V4[[0, 1, 2, 1]], [[1, 3, 2]]), merge="vertices"), "none is left"),
         (lambda m: heat_igl.as_mesh(m, m.F), "F is given beside a Mesh"),
+        (lambda _: pygeodesic.PyGeodesicAlgorithmExact(V4, TRIANGLES[:, :2]), "must have shape"),
+        (lambda m: potpourri3d.GeodesicTracer(m.V, [*m.F, [3, 3, 8]]), "repeats a vertex"),
+        (lambda _: BY_LENGTHS.distance_vjp(0)[1](np.ones(3)), "no vertices to move: use by_lengths"),
         (lambda m: m.with_vertices(m.V[:3]), "V has 3 rows, but the mesh has 42 vertices"),
         (lambda m: m.with_vertices(np.where([False, True, False], np.nan, m.V)), r"V\[0, 1\] = nan"),
     ),
     "SourceError": (
         (lambda _: source_set([0, INSIDE], 5, None), "lie on triangles, and this domain has none: name vert"),
         (lambda _: vertex_sources(INSIDE, 5), "here, not SurfacePoints"),
+        (
+            lambda m: geodesic_distance(m, np.outer([1, 2], m.V[5])),
+            r"sources\[1\] is \S+ away from the surface \(1 of 2 are .*closest_points",
+        ),
+        (lambda _: geodesic_distance(BOX, [0.0, 0.0, 0.0]), "for positions in space, pass the nearest vertices"),
+        (lambda m: heat_igl.validation.draw_sources(m, 0), "0 sources cannot be drawn from a component of 42"),
+        (lambda m: heat_igl.validation.draw_sources(m, 43), "43 sources cannot be drawn from a component of 42"),
+        (lambda _: PYGEODESIC.geodesicDistance(0, 84), r"targetIndex\[0\] = 84 is no vertex"),
+        (lambda _: PYGEODESIC.geodesicDistance(0, 50), "no source can be reached"),
+        (lambda _: PYGEODESIC.geodesicDistances([-1]), r"source_indices\[0\] = -1 is no vertex"),
         (lambda m: heat_igl.distance_matrix(m, [4, 2, 4]), "indices must be distinct, but vertex 4 is there twice"),
         (lambda _: heat_igl.shortest_path(GRID, 4, 0, region=WEST), r"targets\[0\]: vertex 4 lies outside the region"),
         (lambda m: heat_igl.shortest_path(m, [0, 1], 2), "a must be one place, not 2"),
@@ -616,6 +640,20 @@ REFUSED_BY_ERROR: dict[str, tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ..
     "ValueError": (
         (lambda _: heat_igl.farthest_points(LOOSE, 26), "k must be an integer from 1"),
         (lambda m: heat_igl.farthest_points(m, 1, start=[20, 0]), "k must be an integer from 2"),
+        (lambda _: delaunay_refinement(intrinsic_triangulation(GRID), 100), "take the tufted cover"),
+        (lambda _: fitted_laplacian(operators(BOX), 1.0), "fitted to the lengths of edges, which this domain does not"),
+        (lambda _: analyse(operators(GRID).L.tocsr()), r"must be a scipy\.sparse\.csc_matrix, not csr_matrix"),
+        (lambda m: heat_igl.write_curves("a.svg", m, edge_curve(m, [0, 12])), "needs a flat mesh.*pass a projection"),
+        (
+            lambda m: heat_igl.write_curves("a.svg", m, [], projection=np.eye(3)),
+            r"projection must be a finite array of shape \(2, 3\)",
+        ),
+        (
+            lambda m: carrier(m).compute_log_map(7, "Affine"),
+            "strategy must be one of 'VectorHeat', 'AffineLocal', 'AffineAdaptive'",
+        ),
+        (lambda m: carrier(m).extend_scalar([1, 22], [0.0]), "values must be one number for each of the 2 sources"),
+        (lambda m: potpourri3d.EdgeFlipGeodesicSolver(m.V, m.F).find_geodesic_path(4, 4), "are the same vertex, 4"),
         (lambda m: heat_igl.diameter(m, rounds=0), "rounds must be a positive integer"),
         (lambda m: plots.plot(m, m.V[1:, 0]), r"distance must have shape \(42,\)"),
         (lambda m: plots.plot(m, np.where(np.arange(42) == 3, np.nan, 1)), r"distance\[3\] is NaN"),
@@ -738,13 +776,15 @@ def filled(extension: str, **tokens: str) -> bytes:
     return TEMPLATES[extension].format(**{"x": "0", "i": base, "n": "4", "m": "2", **tokens}).encode()
 
 
-def file_case(name: str, file: str, content: bytes, *patterns: str) -> Case:
+def file_case(
+    name: str, file: str, content: bytes, *patterns: str, read: Callable[[Path], Any] = heat_igl.read_mesh
+) -> Case:
     """Read a file; every message must name it."""
 
-    def run(directory: Path) -> heat_igl.Mesh:
+    def run(directory: Path) -> Any:
         path = directory / file
         path.write_bytes(content)
-        return heat_igl.read_mesh(path)
+        return read(path)
 
     return Case(f"{file}: {name}", run, patterns and (re.escape(file), *patterns))
 
@@ -839,6 +879,8 @@ def whole_file_cases() -> Iterator[Case]:
     tets = TEMPLATES["msh"].replace("1 2 2 0 0 {i} 2 3\n2 2 2 0 0 1 2 4\n", "1 4 2 0 0 1 2 3 4\n").encode()
     tets = tets.replace(b"{n}", b"4").replace(b"{x}", b"0").replace(b"{m}", b"1")
     yield file_case("tetrahedra, neighbour", "tet.msh", tets)
+    no_polygons = "the file holds tetrahedra, not polygons"
+    yield file_case("tetrahedra for polygons", "tet.msh", tets, no_polygons, read=heat_igl.read_polygon_mesh)
     whole = b"1 4 2 0 0 1 2 3 4"
     for name, old, new, says in (
         ("hexahedra", b"1 4 2", b"1 5 2", "meshio cannot read"),
@@ -857,6 +899,9 @@ def whole_file_cases() -> Iterator[Case]:
     yield file_case("edge as face", "a.off", filled("off").replace(b"3 0 1 3", b"2 0 1"), "line 8.*2 corners")
     yield file_case("face without index", "a.off", filled("off").replace(b"3 0 1 3", b"4 0 1 3"), "line 8.*4 corners")
     yield file_case("vertex of two numbers", "a.off", filled("off").replace(b"1 0 0", b"1 0"), "line 4.*three coord")
+    for face in ("4 0 1 2 1", "4 0 1 0 2", "5 0 1 2 3 1"):
+        says = rf"line 8 \({face}\): a face repeats a vertex \(1 of 2 faces do\)"
+        yield file_case(f"face {face}", "a.off", filled("off").replace(b"3 0 1 3", face.encode()), says)
     yield file_case("index 0", "a.obj", filled("obj", i="0"), "line 5 .*counts vertices from 1")
     yield file_case("index -5", "a.obj", filled("obj", i="-5"), r"line 5 \(f -5 2 3\)")
     yield file_case("index -4, neighbour", "a.obj", filled("obj", i="-4"))
@@ -902,6 +947,28 @@ def whole_file_cases() -> Iterator[Case]:
     attribute = b'<PointData><DataArray type="Float64" Name="d" format="ascii">1 2</DataArray></PointData></Piece>'
     yield file_case("short attribute", "a.vtu", vtu.replace(b"</Piece>", attribute), r"len\(point_data")
     yield file_case("other grid", "a.vtu", vtu.replace(b"UnstructuredGrid", b"PolyData"), "PolyData")
+
+
+def points_and_curves_cases() -> Iterator[Case]:
+    for file, text, says in (
+        ("a.xyz", "0 0 0\n1 0 0\n1 2\n", r"line 3 \(1 2\): a point has 3 numbers, or 6 with a normal"),
+        ("a.xyz", "0 0 0\n1 0 x\n", "line 2 .*'x' is not a number"),
+        ("a.xyz", "0 0 0\n1 0 0\n", "a.xyz: P has 2 points"),
+        ("a.obj", "v 0 0\n", "line 1 .*a vertex needs three coordinates"),
+        ("a.obj", "vn 0 0 1\n", "the file has no points"),
+        ("a.npy", "no array", "not an array in the format of numpy.save"),
+        ("a.ply", "ply\nformat ascii 1.0\nend_header\n", "no element 'vertex'"),
+        ("a.pcd", "", "pass open3d.io.read_point_cloud"),
+        ("a.las", "", "unknown extension '.las'; the formats are .ply, .obj, .xyz, .npy"),
+    ):
+        yield file_case(f"points, {says}", file, text.encode(), says, read=heat_igl.read_point_cloud)
+    for text, says in (
+        ("v 0 0 0\nv 1 0 0\n", "holds no curve"),
+        ("v 0 0 0\nl 1 2\n", r"line 2 \(l 1 2\): no such vertex is among the 1 in the file"),
+        ("v 0 zero 0\nl 1 1\n", r"line 1 \(v 0 zero 0\): 'zero' is not a number"),
+        ("v 0 0 0\nl 1\n", r"line 2 \(l 1\): a curve needs two vertices or more"),
+    ):
+        yield file_case(f"curves, {says}", "bad.obj", text.encode(), says, read=read_polylines)
 
 
 # --- paths and writing ------------------------------------------------------------------------------------------------
@@ -1009,6 +1076,7 @@ GENERATORS: tuple[Callable[[], Iterator[Case]], ...] = (
     source_cases,
     token_cases,
     whole_file_cases,
+    points_and_curves_cases,
     path_cases,
     write_cases,
     argument_cases,

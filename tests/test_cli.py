@@ -15,7 +15,7 @@ from conftest import ENVIRONMENT, run_python
 from surfaces import twice
 
 import heat_igl
-from heat_igl import MeshError, cli, drawing, io, shapes
+from heat_igl import cli, drawing, io, shapes
 from heat_igl.cli import demo, distances, views
 from heat_igl.cli.program import EXAMPLES, application
 from heat_igl.io import read_attributes, read_mesh, read_polylines, write_curves, write_mesh
@@ -398,21 +398,6 @@ def test_polylines_are_those_that_were_written(folder):
     for line, curve in zip(found, [curves[0][0], curves[1][0], path], strict=True):
         expected = curve.positions(sphere)
         np.testing.assert_array_equal(line.positions, expected[:-1] if line.is_closed else expected)
-
-
-@pytest.mark.parametrize(
-    ("text", "match"),
-    [
-        ("v 0 0 0\nv 1 0 0\n", "holds no curve"),
-        ("v 0 0 0\nl 1 2\n", r"line 2 \(l 1 2\): no such vertex is among the 1 in the file"),
-        ("v 0 zero 0\nl 1 1\n", r"line 1 \(v 0 zero 0\): 'zero' is not a number"),
-        ("v 0 0 0\nl 1\n", r"line 2 \(l 1\): a curve needs two vertices or more"),
-    ],
-)
-def test_files_without_curves(tmp_path, text, match):
-    (tmp_path / "bad.obj").write_text(text)
-    with pytest.raises(MeshError, match=match):
-        read_polylines(tmp_path / "bad.obj")
 
 
 @pytest.mark.usefixtures("folder")

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from surfaces import arcs, bumpy, twice
 
 import heat_igl
-from heat_igl import Mesh, MeshError, SourceError, shapes
+from heat_igl import Mesh, MeshError, shapes
 from heat_igl.compat import gdist, pygeodesic
 from heat_igl.compat import igl as drop_in
 from heat_igl.compat import potpourri3d as pp3d
@@ -146,8 +146,6 @@ def test_a_larger_time_step_is_larger_in_proportion(ball):
 def test_faces_that_repeat_a_vertex_are_left_out(ball):
     faces = np.concatenate([ball.F, [[3, 3, 8]]])
     assert np.array_equal(pp3d.compute_distance(ball.V, faces, 5), pp3d.compute_distance(ball.V, ball.F, 5))
-    with pytest.raises(MeshError, match="repeats a vertex"):
-        pp3d.GeodesicTracer(ball.V, faces)
 
 
 def test_transport_agrees_in_space(peer, ball):
@@ -187,8 +185,6 @@ def test_affine_log_maps_follow_shortest_paths(ball):
     for strategy in ("AffineLocal", "AffineAdaptive"):
         assert np.allclose(solver.compute_log_map(7, strategy), near_exact, atol=1e-3)
     assert np.array_equal(solver.compute_log_map(7, "VectorHeat"), heat_igl.log_map(ball, 7, method="vector-heat"))
-    with pytest.raises(ValueError, match="strategy must be one of 'VectorHeat', 'AffineLocal', 'AffineAdaptive'"):
-        solver.compute_log_map(7, "Affine")
 
 
 @pytest.mark.parametrize("intrinsic", [False, True])
@@ -203,8 +199,6 @@ def test_connection_laplacian_is_positive(intrinsic):
 def test_scalars_are_extended(ball):
     found = pp3d.MeshVectorHeatSolver(ball.V, ball.F).extend_scalar([1, 22], [0.0, 6.0])
     assert (found.min(), found.max()) >= (0.0, 5.9)
-    with pytest.raises(ValueError, match="values must be one number for each of the 2 sources"):
-        pp3d.MeshVectorHeatSolver(ball.V, ball.F).extend_scalar([1, 22], [0.0])
 
 
 def test_paths_are_no_longer_than_theirs(peer, torus):
@@ -224,8 +218,6 @@ def test_paths_are_no_longer_than_theirs(peer, torus):
     assert lengths(loop) <= lengths(theirs.find_geodesic_loop(outer)) * (1 + 1e-9)
     around = torus.F[0].tolist()
     assert lengths(ours.find_geodesic_loop(around)) == 0  # which contracts to a point
-    with pytest.raises(ValueError, match="v_start and v_end are the same vertex, 4"):
-        ours.find_geodesic_path(4, 4)
 
 
 def test_traced_geodesics_end_where_theirs_do(peer, torus):
@@ -535,19 +527,6 @@ def test_pygeodesic_path(mesh):
         assert lengths(path) == pytest.approx(length, rel=1e-12)
         np.testing.assert_allclose(path[[0, -1]], their_path[[0, -1]], atol=1e-12)
     assert algorithm.geodesicDistance(3, 3)[1].tolist() == mesh.V[[3]].tolist()
-
-
-def test_pygeodesic_raises_instead_of_printing():
-    V, F = arrays(two_parts())
-    algorithm = pygeodesic.PyGeodesicAlgorithmExact(V, F)
-    with pytest.raises(SourceError, match=r"targetIndex\[0\] = 50 is no vertex"):
-        algorithm.geodesicDistance(0, 50)
-    with pytest.raises(SourceError, match="no source can be reached"):
-        algorithm.geodesicDistance(0, 30)
-    with pytest.raises(SourceError, match=r"source_indices\[0\] = -1 is no vertex"):
-        algorithm.geodesicDistances([-1])
-    with pytest.raises(MeshError, match="must have shape"):
-        pygeodesic.PyGeodesicAlgorithmExact(V, F[:, :2])
 
 
 def test_pygeodesic_reads_its_files(tmp_path):

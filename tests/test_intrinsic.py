@@ -301,11 +301,6 @@ def test_a_sharp_cone_keeps_its_angle():
     assert delaunay_refinement(intrinsic_delaunay(intrinsic_triangulation(mesh)), 10**4).n < 200
 
 
-def test_a_boundary_is_refused():
-    with pytest.raises(ValueError, match="take the tufted cover"):
-        delaunay_refinement(intrinsic_triangulation(shapes.grid(3)), 100)
-
-
 def test_closed_cover_is_the_tufted_cover():
     for mesh in (shapes.grid(4), shapes.icosphere(1), shapes.cylinder(5, 7)):
         found, expected = closed_cover(intrinsic_triangulation(mesh)), tufted_cover(mesh)

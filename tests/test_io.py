@@ -136,13 +136,6 @@ def test_variants_of_off_are_read_alike(tmp_path, content):
     assert same(read_mesh(save(tmp_path / "a.off", content)), V4, F4)
 
 
-@pytest.mark.parametrize("face", ["4 0 1 2 1", "4 0 1 0 2", "5 0 1 2 3 1"])
-def test_polygon_that_repeats_a_vertex(tmp_path, face):
-    path = save(tmp_path / "a.off", "OFF\n4 2 0\n" + VERTICES + "3 0 1 2\n" + face + "\n")
-    with pytest.raises(MeshError, match=rf"a.off, line 8 \({face}\): a face repeats a vertex \(1 of 2 faces do\)"):
-        read_mesh(path)
-
-
 # --- OBJ --------------------------------------------------------------------------------------------------------------
 
 OBJ_VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"

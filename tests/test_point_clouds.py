@@ -499,26 +499,6 @@ def test_colours_are_no_normals(tmp_path, kind):
     np.testing.assert_array_equal(heat_igl.read_point_cloud(written(tmp_path, kind, P, upwards)).normals, upwards)
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "message"),
-    [
-        ("a.xyz", "0 0 0\n1 0 0\n1 2\n", r"line 3 \(1 2\): a point has 3 numbers, or 6 with a normal"),
-        ("a.xyz", "0 0 0\n1 0 x\n", "line 2 .*'x' is not a number"),
-        ("a.xyz", "0 0 0\n1 0 0\n", "a.xyz: P has 2 points"),
-        ("a.obj", "v 0 0\n", "line 1 .*a vertex needs three coordinates"),
-        ("a.obj", "vn 0 0 1\n", "the file has no points"),
-        ("a.npy", "no array", "not an array in the format of numpy.save"),
-        ("a.ply", "ply\nformat ascii 1.0\nend_header\n", "no element 'vertex'"),
-        ("a.pcd", "", "pass open3d.io.read_point_cloud"),
-        ("a.las", "", "unknown extension '.las'; the formats are .ply, .obj, .xyz, .npy"),
-    ],
-)
-def test_bad_files(tmp_path, name, text, message):
-    (tmp_path / name).write_text(text)
-    with pytest.raises(MeshError, match=message):
-        heat_igl.read_point_cloud(tmp_path / name)
-
-
 def test_attributes_of_points_go_to_ply(tmp_path):
     cloud = PointCloud(sphere(40), sphere(40))
     heat_igl.write_point_cloud(tmp_path / "a.ply", cloud, distance=np.append(np.inf, np.arange(39.0)))

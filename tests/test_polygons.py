@@ -8,7 +8,6 @@ import pytest
 from surfaces import dual_of_sphere, quads
 
 import heat_igl
-from heat_igl import shapes
 from heat_igl.mesh import PolygonFans, PolygonMesh, triangulation
 from heat_igl.mesh.polygons import virtual_vertices
 from heat_igl.validation import construction, relative_error
@@ -220,13 +219,6 @@ def test_polygons_are_read_from_files(tmp_path):
         assert np.array_equal(found.V, MIXED.V)
         assert [p.tolist() for p in found.polygons] == [p.tolist() for p in MIXED.polygons]
         assert np.array_equal(heat_igl.read_mesh(path).F, found.triangles.F)
-
-
-def test_tetrahedra_are_no_polygons(tmp_path):
-    path = tmp_path / "box.mesh"
-    heat_igl.write_mesh(path, shapes.box(1))
-    with pytest.raises(heat_igl.MeshError, match="the file holds tetrahedra, not polygons"):
-        heat_igl.read_polygon_mesh(path)
 
 
 L_SHAPE = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0.0]])

@@ -417,7 +417,3 @@ def test_positions_beside_the_surface_are_its_closest_points(sphere: Mesh) -> No
     one, other = (SurfacePoints(points.faces[[k]], points.barycentric[[k]]) for k in (0, 1))
     path = shortest_path(sphere, *points.positions(sphere)[:2])
     assert path.length == pytest.approx(shortest_path(sphere, one, other).length, rel=1e-9)
-    with pytest.raises(SourceError, match=r"sources\[1\] is \S+ away from the surface \(1 of 2 are .*closest_points"):
-        geodesic_distance(sphere, np.array([1.0, 2.0])[:, None] * sphere.V[5])
-    with pytest.raises(SourceError, match="for positions in space, pass the nearest vertices"):
-        geodesic_distance(shapes.box(2), [0.0, 0.0, 0.0])
