@@ -16,7 +16,7 @@ from heat_igl.sweep import SweepEngine
 from heat_igl.sweep.sweep import numbered_spokes
 from heat_igl.windows import MeshTriangles
 from heat_igl.windows.exact import exact_distance
-from heat_igl.windows.guards import raise_to_lines
+from heat_igl.windows.invariants import raise_to_lines
 
 
 def swept(mesh: Mesh, sources: object) -> np.ndarray:

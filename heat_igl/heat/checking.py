@@ -17,7 +17,7 @@ from heat_igl.sources import SourceSet
 from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows import Engine, OperatorTriangles, WindowEngine
-from heat_igl.windows.guards import raise_to_lines, source_places
+from heat_igl.windows.invariants import raise_to_lines, source_places
 
 # Mean shortfall from which on all distances are raised to straight lines. On 95 shapes 0.002 and 0.01 give the same.
 _RAISED = 0.005

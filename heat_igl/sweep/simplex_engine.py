@@ -11,7 +11,7 @@ from heat_igl.kernels.mesh import incidence
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine
-from heat_igl.windows.guards import raise_to_lines
+from heat_igl.windows.invariants import raise_to_lines
 
 if TYPE_CHECKING:
     from heat_igl.operators import MetricSimplices

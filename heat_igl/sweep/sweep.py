@@ -22,7 +22,7 @@ from heat_igl.sources import SourcePoints, SourceSet, samples
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 from heat_igl.windows.engine import Query, TriangleEngine, Triangles
 from heat_igl.windows.exact import ExactSolution
-from heat_igl.windows.guards import raise_to_lines
+from heat_igl.windows.invariants import raise_to_lines
 
 _SPOKE = np.dtype(
     [(name, "f8") for name in ("length", "along", "height", "base", "beyond_along", "beyond_depth")]

@@ -11,9 +11,9 @@ from heat_igl.windows.exact import ExactSurface as ExactSurface
 from heat_igl.windows.exact import Origin as Origin
 from heat_igl.windows.exact import exact_distance as exact_distance
 from heat_igl.windows.guards import GuardedEngine as GuardedEngine
-from heat_igl.windows.guards import Invariants as Invariants
 from heat_igl.windows.guards import contradicted as contradicted
 from heat_igl.windows.guards import guarded_windows as guarded_windows
+from heat_igl.windows.invariants import Invariants as Invariants
 from heat_igl.windows.local import blocks_within as blocks_within
 from heat_igl.windows.local import distances_within as distances_within
 from heat_igl.windows.local import nearest_vertices as nearest_vertices

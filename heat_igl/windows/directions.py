@@ -26,7 +26,7 @@ from heat_igl.operators import Surface
 from heat_igl.sources import SourcePoints, SourceSet, source_set
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.exact import ExactSolution, Origin, search
-from heat_igl.windows.guards import Invariants
+from heat_igl.windows.invariants import Invariants
 from heat_igl.windows.tables import Tables, from_mesh
 
 _WHOLE = 2 * np.pi

@@ -20,7 +20,8 @@ from heat_igl.runtime import TimeLeft, available_memory, n_threads, over_rows
 from heat_igl.sources import Sources, named_vertices
 from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray, IntArray
 from heat_igl.windows.exact import TOLERANCE, Found, Leaving, require_memory
-from heat_igl.windows.guards import ROUNDING, distances_instead
+from heat_igl.windows.guards import distances_instead
+from heat_igl.windows.invariants import ROUNDING
 from heat_igl.windows.tables import Tables, from_mesh
 
 # Peak memory per stored distance while a sparse array is assembled, in bytes: 26 on a sphere; reordered rows take more.
