@@ -21,6 +21,7 @@ from surfaces import (
 
 from heat_igl import AccuracyWarning, GeodesicSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
 from heat_igl.intrinsic import HalfEdges, intrinsic_delaunay, intrinsic_triangulation
+from heat_igl.sampling import farthest_points
 from heat_igl.windows.exact import ExactSurface, exact_distance
 from heat_igl.windows.tables import MARGIN, from_mesh
 
@@ -393,3 +394,6 @@ def test_a_search_that_would_not_end_is_replaced():
     with pytest.warns(AccuracyWarning, match="the search did not end"):
         found = GeodesicSolver(tube, method="exact").distance(7)
     assert found[along > 0] == pytest.approx(along[along > 0], rel=1e-9)
+    with pytest.warns(AccuracyWarning, match="the search did not end"):
+        farthest = farthest_points(GeodesicSolver(tube, method="exact"), 3, start=7)
+    assert (farthest // 5).tolist() == [1, 9, 5]  # of ten rings at equal distances

@@ -49,8 +49,12 @@ class GuardedEngine(Engine):
 
     def nearer(self, sources: SourceSet, than: FloatArray, threads: int = 1) -> FloatArray:
         """Distance (n,) where it is smaller than `than`, see `WindowEngine`."""
-        found = self.windows.nearer(sources, than, threads)
-        if self._invariants.contradiction(found, sources, np.inf, than) is not None:
+        try:
+            found = self.windows.nearer(sources, than, threads)
+            is_wrong = self._invariants.contradiction(found, sources, np.inf, than) is not None
+        except EndlessSearchError:
+            is_wrong = True
+        if is_wrong:
             found = self.distance(sources, float(than.max()), threads)
             found[found >= than] = np.inf
         return found

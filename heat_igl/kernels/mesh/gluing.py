@@ -1,7 +1,6 @@
 """Triangles by their edge lengths, made from positions: glued along the edges that they share, and numbered.
 
-Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corner has the same number. This module
-serves a single query on a mesh; `heat_igl.intrinsic` glues with numpy.
+Half-edge ``3 f + c`` is the side of face f opposite its corner c, and that corner has the same number.
 """
 
 import cython
