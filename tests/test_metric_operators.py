@@ -83,6 +83,12 @@ def test_a_piecewise_constant_metric_that_fits_together():
     assert mean_error(distance(domain, 100), exact) < 0.015
 
 
+@pytest.mark.parametrize("V", [np.eye(3), np.eye(4, 3)], ids=["triangle", "tetrahedron"])
+def test_a_speed_in_a_single_simplex(V):
+    domain = heat_igl.speed_operators((V, [range(len(V))]), [2.0])
+    np.testing.assert_allclose(distance(domain, 0, "auto"), np.linalg.norm(V - V[0], axis=1) / 2, rtol=1e-14)
+
+
 def test_points_are_sources_in_a_metric():
     """Of windows, also where distance from vertices is that of the Hopf-Lax formula."""
     mesh, A = flat_perturbed(shapes.grid(12), 0.25), stretch(5.0)

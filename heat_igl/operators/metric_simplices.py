@@ -209,6 +209,6 @@ def symmetric(above: FloatArray) -> FloatArray:
 def equal_runs(values: FloatArray) -> tuple[FloatArray, AnyArray]:
     """The value (k, ...) of each run of equal rows (m, ...), as of the simplices of a voxel, and the run (m,) int32."""
     is_new = np.ones(len(values), bool)
-    is_new[1:] = reduce(np.logical_or, (values[1:] != values[:-1]).reshape(len(values) - 1, -1).T)
+    is_new[1:] = reduce(np.logical_or, (values[1:] != values[:-1]).reshape(len(values) - 1, values[0].size).T)
     each = values if is_new.all() else values[is_new]
     return each, np.cumsum(is_new, dtype=np.int32) - np.int32(1)
