@@ -78,6 +78,12 @@ def test_copies_are_neighbours_on_edges_and_are_smoothed_cut_and_stored(torn, tm
     values = np.random.default_rng(0).normal(size=whole.n_vertices)
     smoothed = heat_igl.smooth(whole, values, 0.8)[was]
     np.testing.assert_allclose(heat_igl.smooth(joined, values[was], 0.8), smoothed, atol=1e-9)
+    labels = np.arange(whole.n_vertices) % 3
+    for statistic in ("mean", "centre"):
+        parcels = [
+            heat_igl.parcel_distances(m, of, statistic=statistic) for m, of in ((whole, labels), (joined, labels[was]))
+        ]
+        np.testing.assert_allclose(*parcels, rtol=1e-12)
 
     pieces = heat_igl.cut(joined, heat_igl.isolines(joined, joined.V[:, 2], [0.05])).mesh
     distance = heat_igl.geodesic_distance(pieces, len(was) - 1)[: len(was)]

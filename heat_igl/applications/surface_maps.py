@@ -45,7 +45,7 @@ def parcel_distances(
     mesh : mesh
         Triangles on n vertices: whatever `as_mesh` takes.
     labels : (n,) array_like of int
-        The parcel of each vertex. A negative label is no parcel; 0 is one.
+        The parcel of each vertex. A negative label is no parcel; 0 is one. Of merged copies of a vertex, one counts.
     statistic : {"mean", "min", "centre"}
         "mean" is the mean distance over all pairs of a vertex of one parcel and a vertex of the other, by one query for
         each vertex. "min" is the distance between the nearest vertices, by one query for each parcel. "centre" is the
@@ -80,7 +80,7 @@ def parcel_distances(
     """
     require_choice("statistic", statistic, get_args(Statistic))
     triangles, part = triangles_inside(mesh, region, "maps on a surface need")
-    names, vertices, parcel = _parcels(labels, triangles.n_vertices, part)
+    names, vertices, parcel = _parcels(labels, triangles.originals, part)
     p, n = len(names), triangles.n_vertices
     solver = GeodesicSolver(triangles, method=method)
     if statistic == "min":
@@ -102,9 +102,9 @@ def parcel_distances(
     return np.asarray((found + found.T) / 2)
 
 
-def _parcels(labels: ArrayLike, n: int, part: MeshPart | None) -> tuple[IntArray, IntArray, IntArray]:
+def _parcels(labels: ArrayLike, originals: IntArray, part: MeshPart | None) -> tuple[IntArray, IntArray, IntArray]:
     """The labels (p,) of the parcels, the vertices (k,) of the part in parcels, and the index of each one's parcel."""
-    given = as_array("labels", labels)
+    given, n = as_array("labels", labels), len(originals)
     if given.dtype.kind not in "iu" or given.shape != (n,):
         raise ValueError(f"labels must be integers of shape ({n},), not {given.dtype} of shape {given.shape}")
     names = np.unique(given[given >= 0])
@@ -118,7 +118,9 @@ def _parcels(labels: ArrayLike, n: int, part: MeshPart | None) -> tuple[IntArray
             f"labels: no vertex of parcel {names[np.argmax(lost)]} lies in the region ({int(lost.sum())} of "
             f"{len(names)} parcels): give these vertices a negative label"
         )
-    return names, vertices, parcel
+    # Of copies of a vertex, one counts in each parcel.
+    first = np.sort(np.unique(originals[vertices] * len(names) + parcel, return_index=True)[1])
+    return names, vertices[first], parcel[first]
 
 
 def _centre(mesh: Mesh, vertices: IntArray) -> int:
