@@ -10,6 +10,7 @@ import heat_igl
 from heat_igl import Mesh, VectorHeatSolver, exp_map, shapes, tangent_frames
 from heat_igl.heat.steps import VectorHeatFlow
 from heat_igl.operators import connection_laplacian, edge_rotations, operators
+from heat_igl.validation.construction import planar
 
 SHAPES = {
     "sphere": perturbed(shapes.icosphere(3)),
@@ -271,3 +272,14 @@ def test_a_source_that_no_face_uses_gets_no_advice_to_raise_t():
     apart = VectorHeatSolver(Mesh(np.append(ball.V, [[3.0, 0.0, 0.0]], axis=0), ball.F))
     with pytest.warns(heat_igl.AccuracyWarning, match="vertex 42 first: they get 0; no face uses them"):
         assert apart.extend([0, 42], [2.0, 5.0]) == pytest.approx(np.append(np.full(42, 2.0), 0.0))
+
+
+@pytest.mark.parametrize("sources", [[700], [700, 250, 4]])
+def test_parallel_vectors_stay_parallel_on_obtuse_triangles_at_the_boundary(sources):
+    """Their negative weights make heat negative behind them, and turned a quarter of the vectors round."""
+    mesh = planar(np.random.default_rng(3).random((1000, 2)))
+    solver = heat_igl.VectorHeatSolver(mesh)
+    vector = np.array([0.8, 0.6, 0.0])
+    given = solver.frames.from_world(np.tile(vector, (len(sources), 1)), sources)
+    found = solver.frames.to_world(solver.transport(sources, given), np.arange(mesh.n_vertices))
+    np.testing.assert_allclose(found, np.broadcast_to(vector, mesh.V.shape), atol=1e-6)

@@ -388,7 +388,8 @@ class HeatTransport:
         largest = float(np.abs(vectors).max())
         np.add.at(b, vertices, vectors / largest if largest > 0 else vectors)
         most = np.bincount(vertices).max()
-        Y = self._vector_flow.solve(b * (SOURCE_HEAT / most))
+        b *= SOURCE_HEAT / most
+        Y = self._vector_flow.solve(b) * self._vector_flow.sign(b)
         size = np.abs(Y)
         # The diagonal is in every row, so that none is empty.
         nearby = np.maximum.reduceat(size[self._pattern.indices], self._pattern.indptr[:-1])
