@@ -53,12 +53,12 @@ VECTORS = {"avx2": "-mavx2 -mfma", "avx512": "-mavx512f -mavx512dq -mavx512vl -m
 VECTORS_MSVC = {"avx2": "/arch:AVX2", "avx512": "/arch:AVX512"}
 # The same bits on every processor: no fused multiplications. Square roots set no errno, so they are one instruction.
 # -O3, and the lines of C in tracebacks, took 13 % more of the compiler's time, and no less at run time but in `WIDE`
-# and `UNROLLED`, which has many loops over a few numbers.
+# and `UNROLLED`, which have many loops over a few numbers.
 OPTIONS = (
     "-O2 -g0 -DCYTHON_CLINE_IN_TRACEBACK=0 -fno-math-errno -fno-trapping-math -ffp-contract=off "
     "-Wno-unused-function -Wno-sign-compare"
 )
-UNROLLED = ("sweep/simplex_metrics",)
+UNROLLED = ("sweep/facets", "sweep/simplex_metrics", "sweep/simplex_updates")
 ANY_ORDER = "-O3 -fassociative-math -fno-signed-zeros -ffp-contract=fast"
 OPTIONS_MSVC = "/O2 /fp:precise"
 

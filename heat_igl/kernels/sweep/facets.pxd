@@ -46,8 +46,8 @@ cdef inline int simplex_of(int at, int size) noexcept nogil:
     return at // 4 if size == 4 else at // 3
 
 cdef inline int pair(int i, int j) noexcept nogil:
-    # The number of the pair of two corners, as np.tril_indices counts them below the diagonal.
-    return i * (i - 1) // 2 + j if i > j else j * (j - 1) // 2 + i
+    # The number of the pair of two of four corners, as np.tril_indices counts them below the diagonal.
+    return i + j - 1 + (i == 3) + (j == 3)
 
 cdef inline void squares_of(const double* I, const double* e, int n, double* into) noexcept nogil:
     # The squares of |I e| for n vectors e.

@@ -44,6 +44,9 @@ cdef class HopfLax:
     cdef int[::1] roots, order, stack
     cdef unsigned char[::1] state
     cdef double[::1] sum
+    # Of each vertex, the velocities at both ends of the last edge that it was asked along.
+    cdef long long[::1] asked
+    cdef long long n_asked
     # By how much each distance may be wrong, and by how much of that at its last step.
     cdef double[::1] doubt, own
 

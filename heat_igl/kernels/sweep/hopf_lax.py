@@ -22,7 +22,7 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
-from cython.cimports.heat_igl.kernels.sweep.facets import pair
+from cython.cimports.heat_igl.kernels.sweep.facets import pair, simplex_of
 from cython.cimports.heat_igl.kernels.sweep.hopf_lax import CLOSE, RISEN, SETTLED
 from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, SimplexUpdate, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
@@ -60,6 +60,7 @@ class HopfLax:
         self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
         self.doubt, self.own = np.zeros(n), np.zeros(n)
+        self.asked, self.n_asked = np.full(n, -1, np.int64), 0
         update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
         update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
         self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
@@ -166,8 +167,10 @@ class HopfLax:
         """One of the vertices that v has its distance from: the corner i of its facet, or the one beyond the facet."""
         size: cython.int = self.corners.shape[1]
         if self.beyond[v] >= 0:
-            return self.corners[self.beyond[v] // size, self.beyond[v] % size]
-        return self.corners[self.facet[v] // size, i if i < self.facet[v] % size else i + 1]
+            s: cython.int = simplex_of(self.beyond[v], size)
+            return self.corners[s, self.beyond[v] - size * s]
+        s = simplex_of(self.facet[v], size)
+        return self.corners[s, i if i < self.facet[v] - size * s else i + 1]
 
     def share(self, v: cython.int, i: cython.int) -> cython.double:
         """The share of `support` i in the distance of v."""
@@ -260,12 +263,26 @@ class HopfLax:
     def reach(self, v: cython.int) -> cython.void:
         """Lower distances around v to those along edges from v, where vertices were not visited."""
         size: cython.int = self.corners.shape[1]
+        row: cython.int = -1
         for k in range(self.first[v], self.first[v + 1]):
-            s: cython.int = self.incident[k] // size
-            c: cython.int = self.incident[k] % size
+            s: cython.int = simplex_of(self.incident[k], size)
+            c: cython.int = self.incident[k] - size * s
+            if self.update.q > 1 and self.update.rows[s, c] != row:
+                row = self.update.rows[s, c]
+                self.n_asked += 1
             for i in range(size):
                 u: cython.int = self.corners[s, i]
-                if self.facet[u] < 0 and self.d[v] < self.d[u]:
+                gap: cython.double = self.d[u] - self.d[v]
+                if self.facet[u] < 0 and gap > 0.0:
+                    # The simplices around an edge know the same of it, if velocities at its ends are the same in them.
+                    if self.update.q > 1:
+                        ask: cython.longlong = self.n_asked * self.update.inverses.shape[0] + self.update.rows[s, i]
+                        if self.asked[u] == ask:
+                            continue
+                        self.asked[u] = ask
+                    least: cython.double = self.update.slack[s] * self.update.slack[s]
+                    if gap * gap <= least * self.update.mean[s, pair(c, i)]:
+                        continue
                     far: cython.double = self.d[v] + edge_length(self.update, s, c, i)
                     # Not by rounding, which would pass along many edges.
                     if far < self.d[u] * (1 - 1e-12):
@@ -311,26 +328,28 @@ class HopfLax:
     def hand_on(self, v: cython.int, old: cython.double, change: cython.double) -> cython.void:
         """Request visits to the vertices around v after its value, which was `old`, or its slope has changed."""
         size: cython.int = self.corners.shape[1]
+        at = cython.address(self.update.V[v, 0])
+        x: cython.double = self.turn[0]
+        y: cython.double = self.turn[1]
+        z: cython.double = self.turn[2]
+        is_new: cython.bint = change == INFINITY or self.d[v] < old
         for k in range(self.first[v], self.first[v + 1]):
-            s: cython.int = self.incident[k] // size
+            s: cython.int = simplex_of(self.incident[k], size)
             most: cython.double = change
             # T changes by an eighth, in the middle of an edge, of how far a slope changes along it.
             for c in range(size if change < INFINITY else 0):
+                to = cython.address(self.update.V[self.corners[s, c], 0])
+                most = max(most, fabs(x * (to[0] - at[0]) + y * (to[1] - at[1]) + z * (to[2] - at[2])))
+            for c in range(size if most > self.settled else 0):
                 u: cython.int = self.corners[s, c]
-                by: cython.double = 0.0
-                for i in range(3):
-                    by += self.turn[i] * (self.update.V[u, i] - self.update.V[v, i])
-                most = max(most, fabs(by))
-            for c in range(size):
-                u = self.corners[s, c]
-                if u == v or self.facet[u] < 0 or not most > self.settled:
+                if u == v or self.facet[u] < 0:
                     continue
                 # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
                 if (
                     most <= self.pending[u]
                     or self.d[v] < self.d[u]
-                    or self.facet[u] // size == s
-                    or ((change == INFINITY or self.d[v] < old) and self.update.gains(s, c, self.incident[k] % size))
+                    or simplex_of(self.facet[u], size) == s
+                    or (is_new and self.update.gains(s, c, self.incident[k] - size * s))
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
                     if self.left > 0:
@@ -372,8 +391,8 @@ class HopfLax:
                 at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
                 if at < 0 or (k >= self.first[v] and (at == self.facet[v] or not (asks_all or self.changed[at]))):
                     continue
-                s: cython.int = at // size
-                c: cython.int = at % size
+                s: cython.int = simplex_of(at, size)
+                c: cython.int = at - size * s
                 has_open: cython.bint = not is_open
                 for i in range(size if is_open else 0):
                     has_open |= i != c and self.known[self.corners[s, i]] == INFINITY

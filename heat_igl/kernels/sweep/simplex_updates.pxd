@@ -19,8 +19,8 @@ cdef extern from *:
 cdef class SimplexUpdate(Facet):
     cdef const int[:, ::1] corners, rows
     cdef const double[:, ::1] mean, velocity, inverses, V
-    # The corners of the facet in the simplex, and distance at these.
-    cdef int side[3]
+    # The corners of the facet in the simplex, their vertices, and distance at these.
+    cdef int side[3], at[3]
     cdef double level[3]
     cdef double* d
     # What bounds the values through each simplex.

@@ -81,7 +81,7 @@ class SimplexUpdate(Facet):
         self.face(s, c)
         for i in range(self.p):
             where[i] = 0
-            while self.corners[other, where[i]] != self.corners[s, self.side[i]]:
+            while self.corners[other, where[i]] != self.at[i]:
                 where[i] += 1
             far -= where[i]
         self.q, self.start = 1, 0.0
@@ -98,15 +98,14 @@ class SimplexUpdate(Facet):
         return length if length < along * (1.0 - EQUAL) else INFINITY
 
     def face(self, s: cython.int, c: cython.int) -> cython.double:
-        """Look at the facet opposite corner c of simplex s: sets `side` and `level`, returns the least distance."""
-        k: cython.int = 0
+        """Look at the facet opposite corner c of s: sets `side`, `at` and `level`, returns the least distance."""
         nearest: cython.double = INFINITY
-        for i in range(self.p + 1):
-            if i != c:
-                self.side[k] = i
-                self.level[k] = self.d[self.corners[s, i]]
-                nearest = min(nearest, self.level[k])
-                k += 1
+        of = cython.address(self.corners[s, 0])
+        for k in range(self.p):
+            self.side[k] = k + (k >= c)
+            self.at[k] = of[k + (k >= c)]
+            self.level[k] = self.d[self.at[k]]
+            nearest = min(nearest, self.level[k])
         return nearest
 
     def linear(self, s: cython.int, c: cython.int, room: cython.double) -> cython.double:
@@ -204,7 +203,7 @@ class SimplexUpdate(Facet):
         sq = cython.address(self.mean[s, 0])
         d: cython.double = self.d[self.corners[s, c]]
         may: cython.bint = (self.d[self.corners[s, far]] - d) * (d - self.start) < 0.5 * self.widest[s]
-        for i in range(self.p + 1):
+        for i in range(0 if may else self.p + 1):
             may |= i != c and i != far and sq[pair(c, far)] + sq[pair(c, i)] < sq[pair(i, far)]
         return may and self.through(s, c, d) < d
 
@@ -231,9 +230,11 @@ class SimplexUpdate(Facet):
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """What `Facet` knows of s and its metric, after `face`."""
+        near = cython.address(self.V[self.corners[s, c], 0])
         for i in range(self.p):
+            to = cython.address(self.V[self.at[i], 0])
             for k in range(3):
-                self.E[i][k] = self.V[self.corners[s, self.side[i]], k] - self.V[self.corners[s, c], k]
+                self.E[i][k] = to[k] - near[k]
         if self.q == 1:
             sq = cython.address(self.mean[s, 0])
             m = cython.address(self.product[0])
@@ -303,21 +304,19 @@ class SimplexUpdate(Facet):
         more, trusted
             By how much the slope at i is trusted more than that at j, and the smaller trust of both.
         """
-        v: cython.int = self.corners[s, self.side[i]]
-        u: cython.int = self.corners[s, self.side[j]]
+        v: cython.int = self.at[i]
+        u: cython.int = self.at[j]
         if not (self.is_sloped[v] and self.is_sloped[u]):
             return 0.0
         Di: cython.double = self.D[i]
         Dj: cython.double = self.D[j]
-        at_i: cython.double = 0.0
-        at_j: cython.double = 0.0
+        x = cython.address(self.V[v, 0])
+        y = cython.address(self.V[u, 0])
         e: cython.double[3]
-        for k in range(3):
-            e[k] = self.V[u, k] - self.V[v, k]
-            at_i += self.slope[v, k] * e[k]
-            at_j += self.slope[u, k] * e[k]
-        at_i *= 2.0 * Di
-        at_j *= 2.0 * Dj
+        e[0], e[1], e[2] = y[0] - x[0], y[1] - x[1], y[2] - x[2]
+        x, y = cython.address(self.slope[v, 0]), cython.address(self.slope[u, 0])
+        at_i: cython.double = 2.0 * Di * (x[0] * e[0] + x[1] * e[1] + x[2] * e[2])
+        at_j: cython.double = 2.0 * Dj * (y[0] * e[0] + y[1] * e[1] + y[2] * e[2])
         rise: cython.double = Dj * Dj - Di * Di
         # A slope of another metric is replaced by what the other end says, unless T would fall below both ends.
         if more > 0.0:
@@ -329,20 +328,23 @@ class SimplexUpdate(Facet):
         doubt: cython.double = rise - 0.5 * (at_i + at_j)
         if fabs(doubt) >= fabs(sag):
             return 0.0
-        sag -= fabs(doubt) * max(doubt / sag, -doubt / sag, 1.0 - trusted) * (1.0 if sag > 0.0 else -1.0)
+        sag -= fabs(doubt) * max(fabs(doubt / sag), 1.0 - trusted) * (1.0 if sag > 0.0 else -1.0)
         # T above that of first order makes distances longer: if both slopes say so, or one of this very metric, as at a
         # border between two metrics, where the wave at the other end came through the border.
         if sag < 0.0 and trusted + fabs(more) < 1.0 - EQUAL:
             sag *= trusted
-        square_i: cython.double = self.mean[s, pair(self.side[i], self.side[j])]
-        square_j: cython.double = square_i
+        # Twice the length of the edge; at no corner is its square less than half of that in the mean with the slack.
+        one: cython.double = 2.0 * sqrt(self.mean[s, pair(self.side[i], self.side[j])])
+        two: cython.double = one
         if self.q > 1:
-            squares_of(cython.address(self.inverses[self.rows[s, self.side[i]], 0]), e, 1, cython.address(square_i))
-            squares_of(cython.address(self.inverses[self.rows[s, self.side[j]], 0]), e, 1, cython.address(square_j))
-        from_i: cython.double = 2.0 * Di * sqrt(square_i)
-        from_j: cython.double = 2.0 * Dj * sqrt(square_j)
-        most: cython.double = min(rise + from_i, from_j - rise) - level
-        least: cython.double = max(rise - from_i, -from_j - rise) - level
+            one *= sqrt(0.5) * self.slack[s]
+            if max(rise - Di * one, -Dj * one - rise) <= sag + level <= min(rise + Di * one, Dj * one - rise):
+                return sag
+            squares_of(cython.address(self.inverses[self.rows[s, self.side[i]], 0]), e, 1, cython.address(one))
+            squares_of(cython.address(self.inverses[self.rows[s, self.side[j]], 0]), e, 1, cython.address(two))
+            one, two = 2.0 * sqrt(one), 2.0 * sqrt(two)
+        most: cython.double = min(rise + Di * one, Dj * two - rise) - level
+        least: cython.double = max(rise - Di * one, -Dj * two - rise) - level
         return max(min(sag, most), least)
 
     def trust(self, s: cython.int, i: cython.int) -> cython.double:
@@ -350,7 +352,7 @@ class SimplexUpdate(Facet):
 
         With the square of the logarithm, distances have a derivative where metrics begin to differ.
         """
-        v: cython.int = self.corners[s, self.side[i]]
+        v: cython.int = self.at[i]
         if not self.is_sloped[v]:
             return 0.0
         row: cython.int = self.rows[s, self.side[i]] if self.q > 1 else s
