@@ -44,6 +44,7 @@ from heat_igl import (
     straighten,
     tangent_frames,
     trace_geodesic,
+    validate,
 )
 from heat_igl.compat import potpourri3d, pygeodesic
 from heat_igl.drawing.plots import plot_labels, write_line_drawing
@@ -301,7 +302,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: HeatMethodSolver(m).distances([0], dtype="float16"), "dtype must be float64 or"),
     (lambda m: HeatMethodSolver(m).distances([0], out=3), r"out must be an array .*, not "),
     (lambda m: HeatMethodSolver(m).distances(3), "source_sets must be .*: try distance"),
-    (lambda m: heat_igl.validate(m, 0, methods="heat"), "methods must be a sequence of methods"),
+    (lambda m: validate(m, 0, methods="heat"), "methods must be a sequence of methods"),
     (lambda m: PolygonMesh(m.V, 3), "polygons must be .*, not "),
     (lambda _: PolygonMesh(SQUARE, []), "polygons is empty"),
     (
@@ -466,10 +467,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: heat_igl.fibre_metric(X, 0, 2), r"along\[0\] = 0.0 must be positive and finite"),
     (lambda _: heat_igl.metric_operators(LINE, np.tile(np.eye(3), (len(LINE.F), 1, 1))), r"F\[0\] .* has no area"),
     (lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=X[:, ::-1]), "sheets and normal go together"),
-    (
-        lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=2 * X, normal=1),
-        r"sheets\[0\] .* direction of its fibre",
-    ),
+    (lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=2 * X, normal=1), r"sheets\[0\] .* direction of its fibre"),
     (lambda _: heat_igl.fibre_metric(X, 1, 2, sheets=0 * X, normal=1), r"sheets\[0\] .* is no direction"),
     # Curves and waypoints.
     (lambda m: SignedHeatSolver(m).distance([]), "curves is empty"),
@@ -493,9 +491,9 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda m: heat_igl.curve_through(m, [[0, 0, 1], [0, 0, 3.0]]), r"points\[1\] is \S+ away from .* \(1 of 2"),
     (lambda m: heat_igl.curve_through(m, [0, 1], closed=True), "points must be 3 places or more for a closed curve"),
     (lambda m: heat_igl.curve_through(m, [0, 99]), r"points\[1\] = 99 is no vertex"),
-    (lambda m: heat_igl.validate(m, 0, ["magic"]), "'magic' is unknown: choose from heat, sweep, meshlab"),
-    (lambda m: heat_igl.validate(m, 0, ["heat"], reference="magic"), "'magic' is unknown"),
-    (lambda m: heat_igl.validate(m, 0, []), "methods is empty: choose from heat, sweep"),
+    (lambda m: validate(m, 0, ["magic"]), "'magic' is unknown: choose from heat, sweep, meshlab"),
+    (lambda m: validate(m, 0, ["heat"], reference="magic"), "'magic' is unknown"),
+    (lambda m: validate(m, 0, []), "methods is empty: choose from heat, sweep"),
     # Values, labels and images.
     *(
         (lambda _, ask=ask, bad=bad: ask(GRID, bad, 0.5), said)
@@ -669,18 +667,15 @@ REFUSED_BY_ERROR: dict[str, tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ..
         ),
         (lambda m: heat_igl.isolines(m, m.V[:, 0], 0), "levels must be a positive number of levels"),
         (lambda m: heat_igl.drawing.page(m, m.V[:, 0], fields=[m.V]), "fields must be a dictionary"),
-        (lambda _: heat_igl.validate(GRID, 0, reference=np.ones((2, 25))), r"have shape \(1, 25\), not \(2, 25\)"),
+        (lambda _: validate(GRID, 0, reference=np.eye(2, 25)), r"reference must have shape \(1, 25\), not \(2, 25\)"),
         (lambda _: metrics.relative_error([1, 2], [1, 2, 3]), r"one shape, not \(2,\) and \(3,\)"),
-        (
-            lambda m: metrics.error_summary(m, *np.ones((2, 42)), [0]),
-            r"shape \(1, 42\), one row per set .* not \(42,\)",
-        ),
+        (lambda m: metrics.error_summary(m, *np.eye(2, 42), [0]), r"shape \(1, 42\), one row per set .* not \(42,\)"),
         (lambda m: heat_igl.as_mesh(m, merge="all"), "merge must be one of 'seams', 'vertices'"),
         (
             lambda _: heat_igl.image_domain(SOLID).per_face(np.ones((2, 3, 2))),
             r"image must have shape \(2, 2, 2\), with further axes .* not \(2, 3, 2\)",
         ),
-        (lambda m: HeatMethodSolver(m, magnitude="log"), "must be one of 'auto', 'unit', 'damped', not 'log'"),
+        (lambda m: HeatMethodSolver(m, magnitude="log"), "magnitude must be one of 'auto', 'unit', 'damped', not 'l"),
         *(
             (lambda _, D=D, times=times: heat_igl.activation_times(BOX, D, 0, times), said)
             for D, times, said in (
@@ -705,7 +700,9 @@ REFUSED_BY_ERROR: dict[str, tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ..
         ),
         (lambda _: GeodesicSolver(BOX).distance_vjp(0)[1].by_metric(np.ones(8)), "no metric to change: make it on m"),
     ),
-    "TypeError": ((lambda m: write_line_drawing("a.svg", m, 3), "curves must be a SurfaceCurve or a list of su"),),
+    "TypeError": (
+        (lambda m: write_line_drawing("a.svg", m, 3), "curves must be a SurfaceCurve or a list of such, not int"),
+    ),
     "ReferenceSolverError": (
         (lambda m: closed_forms.plane(m, 0), "does not lie in a plane"),
         (lambda m: closed_forms.flat_torus(m.V, 0), r"coordinates of shape \(n, 2\)"),
@@ -724,7 +721,7 @@ ACCEPTED: dict[str, Callable[[heat_igl.Mesh], Any]] = {
         np.testing.assert_allclose(karcher_mean(POINTED, [12, 12, 30], p=1).positions(POINTED), [BALL.V[0]], atol=1e-6),
         heat_igl.log_map(POINTED, 0),
         GeodesicSolver(heat_igl.speed_operators(LINE, 1 + np.arange(80) % 2)).distance(0),
-        heat_igl.validate(LINE, 0, methods=["sweep"]),
+        validate(LINE, 0, methods=["sweep"]),
     ),
     "curve in small units": lambda m: SignedHeatSolver((1e-45 * m.V, m.F)).distance(CURVE, level="constant"),
     "curve far away": lambda m: geodesic_distance((m.V + 1e13, m.F), CURVE),

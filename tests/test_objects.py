@@ -222,10 +222,8 @@ def test_points_of_the_libraries_themselves(library):
     np.testing.assert_allclose(as_mesh(made).P, V, atol=1e-7)
 
 
-def test_faces_beside_a_mesh_are_refused():
+def test_two_arrays_are_a_mesh():
     np.testing.assert_array_equal(as_mesh(V, F).F, F)
-    with pytest.raises(MeshError, match="F is given beside a Mesh"):
-        as_mesh(SPHERE, F)
 
 
 @pytest.mark.parametrize("suffix", ["xyz", "ply", "obj", "npy"])

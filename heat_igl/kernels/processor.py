@@ -1,7 +1,6 @@
 """The vector instructions of this processor."""
 
 import cython  # noqa: F401 - makes this a module of Cython's pure Python mode
-from cython.cimports.heat_igl.kernels.processor import wide_vectors
 
 
 def vectors():

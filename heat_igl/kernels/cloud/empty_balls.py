@@ -2,7 +2,6 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.empty_balls import LANES, ROUNDS, TINY
 from cython.cimports.libc.math import sqrt
 
 

@@ -2,7 +2,6 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.fitting_triangles import ROUNDING, TURN
 from cython.cimports.libc.math import fabs
 
 

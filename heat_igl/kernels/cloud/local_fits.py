@@ -2,7 +2,6 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.local_fits import DIAGONAL, LEAST_WEIGHT, TINY
 from cython.cimports.heat_igl.kernels.rotation import diagonalize
 from cython.cimports.libc.math import sqrt
 

@@ -2,7 +2,6 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.cloud.loop_filling import BEYOND, POINT
 from cython.cimports.libc.math import INFINITY, sqrt
 
 from heat_igl.kernels.mesh.incidence import corners_by_vertex
