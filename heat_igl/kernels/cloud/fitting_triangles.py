@@ -4,6 +4,10 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import fabs
 
+# What measures angles grows by so much in a turn, and by half in half a turn.
+_TURN = cython.declare(cython.double, 4.0)
+_ROUNDING = cython.declare(cython.double, 1e-9)
+
 
 def fitting_triangles(
     P: cython.const[cython.double][:, ::1],
@@ -54,11 +58,11 @@ def _find_sector(
     end: cython.double = _direction(P, axes, at, triangles[f, (c + 2) % 3])
     width: cython.double = end - begin
     if width < 0.0:
-        width += TURN
-    if width > 0.5 * TURN:
-        begin, width = end, TURN - width
+        width += _TURN
+    if width > 0.5 * _TURN:
+        begin, width = end, _TURN - width
     sector[f, c, 0], sector[f, c, 1] = begin, width
-    return width > ROUNDING and width < 0.5 * TURN - ROUNDING
+    return width > _ROUNDING and width < 0.5 * _TURN - _ROUNDING
 
 
 @cython.cfunc
@@ -97,8 +101,8 @@ def _overlaps(
         e: cython.Py_ssize_t = other % 3
         ahead: cython.double = sector[g, e, 0] - sector[f, c, 0]
         if ahead < 0.0:
-            ahead += TURN
-        if ahead < sector[f, c, 1] - ROUNDING or TURN - ahead < sector[g, e, 1] - ROUNDING:
+            ahead += _TURN
+        if ahead < sector[f, c, 1] - _ROUNDING or _TURN - ahead < sector[g, e, 1] - _ROUNDING:
             return True
         other = following[g, e]
     return False

@@ -5,10 +5,3 @@ cdef enum:
     Y = 2
     # The star of so many nearest neighbours rules out most of the others. 6 and 16: 1 and 3 % more time for a cloud.
     FEW = 10
-
-cdef extern from *:
-    """
-    // Squared distance, in shares of that of the largest circle, beyond which a point is outside of it beyond doubt.
-    #define OUTSIDE (1 + 2e-9)
-    """
-    double OUTSIDE

@@ -4,6 +4,9 @@ import cython
 import numpy as np
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
+# Squared distance, in shares of that of the largest circle, beyond which a point is outside of it beyond doubt.
+_OUTSIDE = cython.declare(cython.double, 1 + 2e-9)
+
 
 def delaunay_stars(
     P: cython.const[cython.double][:, ::1],
@@ -141,7 +144,7 @@ def _reach(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.in
         dx: cython.double = star[q, X] - star[p, X]
         dy: cython.double = star[q, Y] - star[p, Y]
         largest = max(largest, (dx * dx + dy * dy) / (turn * turn))
-    return OUTSIDE * largest
+    return _OUTSIDE * largest
 
 
 @cython.cfunc

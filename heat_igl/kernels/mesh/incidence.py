@@ -5,11 +5,7 @@ import numpy as np
 
 
 def unique_rows(columns: cython.const[cython.int][:, ::1], n: cython.Py_ssize_t):
-    """Distinct rows (r, d) of integers in ``range(n)``: the first copy (k,) of each, the inverse (r,) and counts (k,).
-
-    ``rows == rows[first][inverse]``, and rows are in lexicographic order. Linear time, with a temporary array of n
-    integers.
-    """
+    """As `heat_igl.mesh.connectivity.unique_rows`, of rows that are given by columns (d, r)."""
     size: cython.Py_ssize_t = columns.shape[1]
     ascending, sorted_once, inverses = (
         np.arange(size, dtype=np.int32),
