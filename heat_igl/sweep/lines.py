@@ -12,6 +12,7 @@ from heat_igl.intrinsic.frames import unit_vectors
 from heat_igl.kernels.bodies.bends import bend_around
 from heat_igl.kernels.bodies.rays import Body
 from heat_igl.kernels.bodies.sight import look_around
+from heat_igl.kernels.mesh import incidence
 from heat_igl.mesh.connectivity import unique_rows
 from heat_igl.operators import MetricSimplices
 from heat_igl.plan import SMALL_BODY
@@ -37,11 +38,18 @@ class LineEngine(SimplexEngine):
 
     A body bends lines at edges with more than half a turn inside: once its ends know their distances, such an edge is a
     source itself. Tetrahedra that `is_halved` says were halved are not halved again.
+
+    Inside, vertices are in an `_order` (n,) in which neighbours are near each other in memory as well.
     """
 
     def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
         super().__init__(simplices)
-        self._V = simplices.place
+        # A query takes .89 to .97 of the time on 13 bodies of 10 000 vertices.
+        self._order = along_curve(simplices.place)
+        self._number = np.argsort(self._order).astype(np.int32)
+        self._V, corners = simplices.place[self._order], self._number[self._corners]
+        self._corners = corners[np.argsort(corners.min(axis=1), kind="stable")]
+        self._first, self._incident = incidence.corners_by_vertex(self._corners, simplices.n)
         self._is_small = simplices.n <= SMALL_BODY
         is_refined = self._is_small and not is_halved and len(self.reflex_edges[0]) > 0
         self._finer = LineEngine(simplices.halved(), is_halved=True) if is_refined else None
@@ -86,7 +94,7 @@ class LineEngine(SimplexEngine):
         fan = csgraph.connected_components(sp.coo_array((np.ones(pairs.shape[1]), pairs), shape=2 * (walls.size,)))[1]
         n_fans = np.bincount(walls.ravel()[np.unique(fan, return_index=True)[1]])
         touching = np.setdiff1d(np.flatnonzero(n_fans > 1), edges[counts > 2])
-        found = np.concatenate([edges[bends], np.stack([touching, touching], axis=1)]).astype(np.int32)
+        found = self._order[np.concatenate([edges[bends], np.stack([touching, touching], axis=1)])].astype(np.int32)
         cosine = np.einsum("ij,ij->i", along_wall[one], outward)[bends]
         return found, np.pad(outward[bends], ((0, len(touching)), (0, 0))), np.pad(cosine, (0, len(touching)))
 
@@ -127,7 +135,7 @@ class LineEngine(SimplexEngine):
         """Distances and source vertices (n,) by number, lengths of ways (n,), and their slopes (n, 3 n)."""
         distance, label, (edges, way) = self._solved(sources)
         ends = np.where(label >= 0, sources.vertices[label], np.arange(len(label)))
-        length, slopes = line_slopes(self._V, ends, edges, way, distance)
+        length, slopes = line_slopes(self._simplices.place, ends, edges, way, distance)
         length += np.append(sources.vertex_offset, 0)[label]
         if self._finer is not None:
             n = len(distance)
@@ -150,22 +158,31 @@ class LineEngine(SimplexEngine):
         """
         # Values are compared by shares of them.
         least = offset.min()
-        distance -= least
-        offset = offset - least
+        vertices, offset = self._number[vertices], offset - least
+        d, labels = distance[self._order] - least, label[self._order]
         order, nearest = self._from_near(vertices, offset)
         edges, outward, wall = self.reflex_edges
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
-        before = distance.copy()
-        look_around(order, self._body, vertices, offset, edges, nearest, distance, label)
-        way[distance < before] = _STRAIGHT
-        bend_around(edges, outward, wall, self._body, vertices, offset, distance, label, way)
-        distance += least
-        return edges, way
+        before, numbered = d.copy(), self._number[edges]
+        look_around(order, self._body, vertices, offset, numbered, nearest, d, labels)
+        way[d < before] = _STRAIGHT
+        bend_around(numbered, outward, wall, self._body, vertices, offset, d, labels, way)
+        distance[self._order], label[self._order] = d + least, labels
+        return edges, way[self._number]
 
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         """As of all engines, without a list of edges: voxels have seven times as many as vertices."""
-        self._body.along_edges(distance, label)
+        d, labels = distance[self._order], label[self._order]
+        self._body.along_edges(d, labels)
+        distance[self._order], label[self._order] = d, labels
+
+
+def along_curve(places: FloatArray) -> IntArray:
+    """The order (n,) of places (n, 3) along a curve through all space (Morton 1966), which stays near each for long."""
+    low, size = places.min(axis=0), max(float(np.ptp(places, axis=0).max()), 1e-300)
+    cell = ((places - low) / size * (2**20 - 1)).astype(np.int64)
+    return np.argsort(sum((cell >> b & 1) @ [4 << 3 * b, 2 << 3 * b, 1 << 3 * b] for b in range(20)), kind="stable")
 
 
 def nearest_in_value(V: FloatArray, places: FloatArray, offset: FloatArray) -> tuple[FloatArray, IntArray]:
