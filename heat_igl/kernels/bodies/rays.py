@@ -128,8 +128,13 @@ class Body:
                 count -= 1
                 for k in range(self.first_neighbour[v], self.first_neighbour[v + 1]):
                     u: cython.int = self.neighbours[k]
-                    # Not by rounding, which would pass along many edges.
-                    if d[v] < d[u] and d[v] + self.apart(v, u) < d[u] * (1 - 1e-12):
+                    # Not by rounding, which would pass along many edges. It holds of few, so no root is taken before.
+                    gap: cython.double = d[u] * (1 - 1e-12) - d[v]
+                    squared: cython.double = 0.0
+                    for i in range(3):
+                        off: cython.double = self.positions[v, i] - self.positions[u, i]
+                        squared += off * off
+                    if gap * fabs(gap) > squared:
                         d[u], label[u] = d[v] + self.apart(v, u), label[v]
                         if not is_waiting[u]:
                             is_waiting[u] = True
