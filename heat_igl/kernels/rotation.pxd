@@ -36,16 +36,18 @@ cdef inline bint rotate(double* work, int p, int q) noexcept nogil:
 cdef inline void diagonalize(double* work, int n = 1) noexcept nogil:
     # Eigenvalues in the diagonal of the matrix in the first three rows of `work` (6, 3), eigenvectors in the others.
     # Of n matrices (n, 6, 3) in turn: each waits long for its roots and quotients.
-    cdef int i, k, p, q
+    cdef int i, k
     cdef bint is_turned
     for i in range(n):
         for k in range(9):
             work[18 * i + 9 + k] = k % 4 == 0
     for _ in range(MOST_SWEEPS):
         is_turned = False
-        for k in range(3):
-            p, q = k // 2, 1 + (k + 1) // 2
-            for i in range(n):
-                is_turned |= rotate(work + 18 * i, p, q)
+        for i in range(n):
+            is_turned |= rotate(work + 18 * i, 0, 1)
+        for i in range(n):
+            is_turned |= rotate(work + 18 * i, 0, 2)
+        for i in range(n):
+            is_turned |= rotate(work + 18 * i, 1, 2)
         if not is_turned:
             break

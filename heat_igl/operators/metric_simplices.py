@@ -99,7 +99,6 @@ class MetricSimplices:
         smallest, largest = inverse_root(at_vertex)[2].T
         share[smallest <= 0] = 0
         share[share >= 1 - _ROUNDING] = 1
-        share = reduce(np.minimum, (share[corner] for corner in corners.T))
         faces = corners if p == 2 else np.empty((0, 3), np.int32)
         velocity, rows, _ = velocities_at_corners(corners, at_vertex, velocity, group, share, faces, mesh.V, False)
         least = min(least, float(1 / largest.max()))
@@ -194,7 +193,7 @@ def inverse_root(
     if mesh is not None and not mesh.is_tetrahedral:
         faces, V = mesh.F.astype(np.int32), mesh.V
         corners = faces if at_vertices else corners
-    group, share = np.zeros(len(corners), np.int32), np.ones(len(corners))
+    group, share = np.zeros(len(corners), np.int32), np.ones(len(above))
     found: Any = velocities_at_corners(corners, above, above, group, share, faces, V, True)
     return tuple(found)
 

@@ -51,13 +51,15 @@ def corners_by_vertex(corners: cython.const[cython.int][:, ::1], n: cython.Py_ss
     place: cython.int[::1] = begins
     incident: cython.int[::1] = found
     with cython.nogil:
-        for i in range(incident.shape[0]):
-            place[corners[i // size, i % size] + 2] += 1
+        for i in range(corners.shape[0]):
+            for c in range(size):
+                place[corners[i, c] + 2] += 1
         for i in range(n):
             place[i + 2] += place[i + 1]
-        for i in range(incident.shape[0]):
-            incident[place[corners[i // size, i % size] + 1]] = i
-            place[corners[i // size, i % size] + 1] += 1
+        for i in range(corners.shape[0]):
+            for c in range(size):
+                incident[place[corners[i, c] + 1]] = i * size + c
+                place[corners[i, c] + 1] += 1
     return begins[:-1], found
 
 

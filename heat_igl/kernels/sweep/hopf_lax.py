@@ -73,12 +73,14 @@ class HopfLax:
         with cython.nogil:
             # Only along edges that may be shorter than the difference of distances.
             for s in range(self.corners.shape[0]):
+                of = cython.address(self.corners[s, 0])
+                sq = cython.address(self.update.mean[s, 0])
+                least: cython.double = self.update.slack[s] * self.update.slack[s]
                 for i in range(self.corners.shape[1]):
                     for j in range(i):
-                        gap: cython.double = d[self.corners[s, i]] - d[self.corners[s, j]]
-                        least: cython.double = self.update.slack[s] * self.update.slack[s]
-                        if gap * gap > least * self.update.mean[s, pair(i, j)]:
-                            u: cython.int = self.corners[s, j if gap > 0.0 else i]
+                        gap: cython.double = d[of[i]] - d[of[j]]
+                        if gap * gap > least * sq[pair(i, j)]:
+                            u: cython.int = of[j if gap > 0.0 else i]
                             if self.pending[u] == 0.0 and fabs(gap) > edge_length(self.update, s, i, j):
                                 self.reach(u)
             self.march()

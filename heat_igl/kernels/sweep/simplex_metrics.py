@@ -116,10 +116,10 @@ def velocities_at_corners(
 ):
     """Velocities (r, 6) of simplices at their corners, equal ones at a vertex once, and the row (m, p + 1) of each.
 
-    They are a `share` (m,) of what is known `at_vertex` (n, 6), and else that of the `group` (m,) of the simplex, its
-    `own` (k, 6): both are velocities, or metrics. Of triangles, whose `faces` (m, 3) on vertices at V (n, 3) are given,
-    else (0, 3), they are those in the plane, and across it the mean: trust in slopes asks it. Third are the smallest
-    and largest eigenvalue (n, 2) there, if they were asked for.
+    They are the least `share` (n,) at the corners of what is known `at_vertex` (n, 6), and else that of the `group`
+    (m,) of the simplex, its `own` (k, 6): both are velocities, or metrics. Of triangles, whose `faces` (m, 3) on
+    vertices at V (n, 3) are given, else (0, 3), they are those in the plane, and across it the mean: trust in slopes
+    asks it. Third are the smallest and largest eigenvalue (n, 2) there, if they were asked for.
     """
     # The first array has room for all corners; if most of it stays empty, only the rows that are written to are kept.
     found, sizes = np.empty((corners.size, 6)), np.tile([np.inf, 0.0], (len(at_vertex), 1))
@@ -143,12 +143,15 @@ def velocities_at_corners(
                 axis = base + 9 * i
                 if in_plane:
                     _lay_axes(V, faces, s, axis)
+                least: cython.double = 1.0
+                for c in range(size):
+                    least = min(least, share[corners[s, c]])
                 for c in range(size):
                     W = block + 6 * (size * i + c)
                     for k in range(6):
-                        W[k] = share[s] * at_vertex[corners[s, c], k]
-                    for k in range(6 if share[s] < 1.0 else 0):
-                        W[k] += (1.0 - share[s]) * own[group[s], k]
+                        W[k] = least * at_vertex[corners[s, c], k]
+                    for k in range(6 if least < 1.0 else 0):
+                        W[k] += (1.0 - least) * own[group[s], k]
                     if in_plane:
                         _turn(W, axis, 1, 3)
                         W[2] = W[4] = W[5] = 0.0
