@@ -623,7 +623,10 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
     one: cython.pointer(List) = cython.address(s.lists[place])
     n: cython.int = one.count
     for i in range(n):
-        o.label[one.windows[i].root] = s.label[one.windows[i].root]
+        root: cython.int = one.windows[i].root
+        # A vertex that the other search has nearer may have its path from another source.
+        if root >= s.n or s.distance[root] <= o.distance[root]:
+            o.label[root] = s.label[root]
     append(o, h, one.windows, n, one.turns, False)
     o.n_windows -= n
     s.n_waiting -= n
