@@ -340,16 +340,18 @@ def test_no_distance_contradicts_lines_or_edges(p, most):
     assert (p == 3 and most >= 3) or again == pytest.approx(distance, rel=1e-3)  # to which changes are handed on
 
 
-@pytest.mark.parametrize("kind", ["two speeds", "smooth speeds"])
+@pytest.mark.parametrize("kind", ["two speeds", "smooth speeds", "fibres"])
 def test_several_sources_give_the_least_of_single_ones(kind):
     """With T linear between vertices of different sources, single vertices were 2 to 30 % off."""
     rng = np.random.default_rng(8)
-    mesh = shapes.icosphere(4) if kind == "two speeds" else shapes.box(12)
+    mesh = {"two speeds": shapes.icosphere(4), "smooth speeds": shapes.box(12), "fibres": shapes.box(8)}[kind]
     x = mesh.V[mesh.F].mean(axis=1)[:, 0] if kind == "two speeds" else mesh.V[:, 0]
-    found = solver(mesh, np.eye(3) / (np.where(x > 0, 2, 1) if kind == "two speeds" else 1 + 2 * x)[:, None, None] ** 2)
+    g = np.eye(3) / (np.where(x > 0, 2, 1) if kind == "two speeds" else 1 + 2 * x)[:, None, None] ** 2
+    found = solver(mesh, fibre_metric(np.stack([0 * x, np.cos(x), np.sin(x)], 1), 1, 0.6) if kind == "fibres" else g)
     near = np.linalg.norm(mesh.V - mesh.V[mesh.n_vertices // 3], axis=1).argsort()[:20]
     for sources in (rng.choice(mesh.n_vertices, 30, replace=False), near, np.flatnonzero(mesh.V[:, 0] < 0.03)[:169]):
-        starts = 0.1 * rng.random(len(sources)) * (len(sources) < 100)
+        # Some come before others begin.
+        starts = 0.3 * rng.random(len(sources)) * (len(sources) < 100)
         least = np.min([t + found.distance(v) for v, t in zip(sources, starts, strict=True)], axis=0)
         # To 1e-3 both: changes below are not handed on.
         assert found.distance(OffsetSources(sources, starts)) == pytest.approx(least, rel=2e-3)
@@ -452,7 +454,7 @@ def test_derivatives_have_the_degrees_of_lengths(name):
 
 @pytest.mark.filterwarnings("ignore:the metric changes farther")
 def test_a_path_may_cross_a_facet_whose_corners_its_front_does_not_reach():
-    rng = np.random.default_rng(23)
+    rng = np.random.default_rng(26)
     mesh = tetrahedra(rng.random((120, 3)) * [1, 1, 0.3])
     found = solver(mesh, fibre_metric(rng.standard_normal((mesh.n_faces, 3)), 1.0, 1.6))
     start = np.array([0.1, 0.12])

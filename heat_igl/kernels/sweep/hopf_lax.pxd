@@ -23,8 +23,11 @@ cdef class HopfLax:
     # Distance, the same of visited vertices alone, the change that visits have not taken in, and distance from all sources.
     cdef double[::1] d, known, pending, limit
     # Facets that have changed since they were asked.
-    cdef unsigned char[::1] changed, leads
-    # Which vertices lead on to those around them, and those that the source has reached, in this order.
+    cdef unsigned char[::1] changed
+    # Whether vertices lead on to those around them, 2, or matter to some that do, 1; and the mean square of edges around.
+    cdef unsigned char[::1] leads
+    cdef double[::1] square
+    # Labels, visits in rounds, and the vertices that the source has reached, in this order.
     cdef int[::1] label, n_visits, reached
     cdef int n_reached
     # Distance at the source, the change that is not handed on, and that of the slope of the last vertex.
@@ -57,6 +60,10 @@ cdef class HopfLax:
     cdef void forget(self, int v) noexcept nogil
     cdef void march(self) noexcept nogil
     cdef void lead_on(self, int v) noexcept nogil
+    cdef void rely(self, int v) noexcept nogil
+    cdef bint is_close(self, int v, double d) noexcept nogil
+    cdef bint is_beside(self, int v) noexcept nogil
+    cdef bint matters(self, int v, double d) noexcept nogil
     cdef void reach(self, int v) noexcept nogil
     cdef void wait(self, int v) noexcept nogil
     cdef void sharpen(self) noexcept nogil

@@ -59,6 +59,7 @@ class HopfLax:
         self.changed = np.zeros(incident.shape[0], np.uint8)
         self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
+        self.square = np.full(n, -1.0)
         self.doubt, self.own = np.zeros(n), np.zeros(n)
         self.asked, self.n_asked = np.full(n, -1, np.int64), 0
         update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
@@ -107,8 +108,10 @@ class HopfLax:
         with cython.nogil:
             for at in range(self.n_reached):
                 self.forget(self.reached[at])
-        self.n_reached, self.reached[0], self.d[source] = 1, source, start
-        self.wait(source)
+        self.n_reached, self.reached[0], self.d[source], self.known[source] = 1, source, start, start
+        # Where others come before it begins, a source is the nearest to no vertex.
+        if start <= limit[source]:
+            self.wait(source)
         found, d = np.asarray(self.reached[:1]), np.asarray(self.d)
         while self.waiting.count > 0 and not is_interrupted():
             self.left = left
@@ -235,32 +238,77 @@ class HopfLax:
                 break
             v: cython.int = cython.cast(cython.int, self.waiting.first())
             self.waiting.set_key(v, 0.0)
-            is_first: cython.bint = self.facet[v] < 0
-            if self.pending[v] == 0.0:
-                # The source.
-                self.known[v] = self.d[v]
-            elif self.left > 0:
-                self.left -= not is_first
+            # Not the source, which has its distance.
+            if self.pending[v] > 0.0 and self.left > 0:
+                self.left -= self.facet[v] >= 0
                 self.renew(v)
             self.lead_on(v)
 
     def lead_on(self, v: cython.int) -> cython.void:
-        """Reach the vertices around v once, unless other sources are clearly nearer to v.
+        """Reach the vertices around v once, unless other sources are clearly nearer to v, or to all of those."""
+        if self.leads[v] < 2 and self.is_close(v, self.d[v]) and self.is_beside(v):
+            self.leads[v] = 2
+            self.reach(v)
+            self.rely(v)
+
+    def rely(self, v: cython.int) -> cython.void:
+        """If v leads on, or matters to others that do, so do the vertices that it has its distance from."""
+        for i in range(self.update.p if self.leads[v] > 0 and self.facet[v] >= 0 else 0):
+            u: cython.int = self.support(v, i)
+            if self.leads[u] == 0 and self.share(v, i) > 0.0:
+                self.leads[u] = 1
+                if self.facet[u] >= 0:
+                    self.pending[u] = max(self.pending[u], 2 * self.settled)
+                    if self.left > 0:
+                        self.wait(u)
+
+    def matters(self, v: cython.int, d: cython.double) -> cython.bint:
+        """Whether to visit v again, where it may get the distance d. Most vertices beside a cell are visited once."""
+        if self.leads[v] == 0 and self.is_close(v, d):
+            self.leads[v] = 1
+        return self.leads[v] > 0
+
+    def is_close(self, v: cython.int, d: cython.double) -> cython.bint:
+        """Whether no other source is clearly nearer to v than d.
 
         A shortest path runs where its source is the nearest, perhaps between vertices that are nearer to others. Fronts
         of sources one edge h apart differ in direction by h / R at the distance R, so by h^2 / R one edge beside their
         border. The longest edge in place of the mean would be that of slivers.
         """
-        square: cython.double = 0.0
-        excess: cython.double = self.d[v] - self.limit[v]
-        if excess > 0.0:
+        excess: cython.double = d - self.limit[v]
+        if not excess > 0.0:
+            return True
+        if self.square[v] < 0.0:
+            square: cython.double = 0.0
             for k in range(self.first[v], self.first[v + 1]):
                 for i in range(self.update.mean.shape[1]):
                     square += self.update.mean[self.incident[k] // self.corners.shape[1], i]
-            square /= (self.first[v + 1] - self.first[v]) * self.update.mean.shape[1]
-        if not self.leads[v] and (excess <= CLOSE * sqrt(square) or excess * (self.d[v] - self.low) <= square):
-            self.leads[v] = 1
-            self.reach(v)
+            self.square[v] = square / ((self.first[v + 1] - self.first[v]) * self.update.mean.shape[1])
+        return excess <= CLOSE * sqrt(self.square[v]) or excess * (d - self.low) <= self.square[v]
+
+    def is_beside(self, v: cython.int) -> cython.bint:
+        """Whether the source may be the nearest to v or to a vertex around it.
+
+        It is not to other sources. Elsewhere distances follow from that at v and its slope, as in a constant metric.
+        """
+        size: cython.int = self.corners.shape[1]
+        far: cython.double = self.d[v] - self.low
+        if self.d[v] <= self.limit[v] or not self.update.is_sloped[v]:
+            return True
+        for k in range(self.first[v], self.first[v + 1]):
+            s: cython.int = self.incident[k] // size
+            for i in range(size):
+                u: cython.int = self.corners[s, i]
+                if u == v or not self.limit[u] > self.low:
+                    continue
+                sq: cython.double = self.update.mean[s, pair(self.incident[k] % size, i)]
+                rise: cython.double = 0.0
+                for j in range(3):
+                    rise += self.update.slope[v, j] * (self.update.V[u, j] - self.update.V[v, j])
+                most: cython.double = self.limit[u] - self.low + CLOSE * sqrt(sq)
+                if far * (far + 2.0 * rise) + sq <= most * most:
+                    return True
+        return False
 
     def reach(self, v: cython.int) -> cython.void:
         """Lower distances around v to those along edges from v, where vertices were not visited."""
@@ -308,7 +356,8 @@ class HopfLax:
                 v = self.order[at]
                 # If the metric turns far within a simplex, dependencies may be cyclic: each further visit of a vertex
                 # needs a larger change.
-                if self.pending[v] > self.settled * self.n_visits[v]:
+                matters: cython.bint = self.leads[v] > 0 or self.facet[v] < 0
+                if matters and self.pending[v] > self.settled * self.n_visits[v]:
                     is_settled = False
                     self.n_visits[v] += 1
                     self.renew(v)
@@ -326,6 +375,7 @@ class HopfLax:
         for k in range(3):
             self.turn[k] = (self.update.slope[v, k] - self.turn[k]) / (8.0 * span)
         self.hand_on(v, old, change)
+        self.rely(v)
 
     def hand_on(self, v: cython.int, old: cython.double, change: cython.double) -> cython.void:
         """Request visits to the vertices around v after its value, which was `old`, or its slope has changed."""
@@ -354,14 +404,17 @@ class HopfLax:
                     or (is_new and self.update.gains(s, c, self.incident[k] - size * s))
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
-                    if self.left > 0:
+                    least: cython.double = -INFINITY
+                    if self.leads[u] == 0:
+                        least = self.update.through(s, c, self.d[u] * (1 - EQUAL))
+                    if self.matters(u, least) and self.left > 0:
                         self.wait(u)
         for k in range(self.begin[v], self.begin[v + 1]):
             u = self.ends[k, 2]
             matters: cython.bint = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
             if self.facet[u] >= 0 and change > self.settled and (matters or self.beyond[u] == self.ends[k, 0]):
                 self.pending[u] = max(change, self.pending[u])
-                if self.left > 0:
+                if self.matters(u, self.d[v] + self.lengths[k]) and self.left > 0:
                     self.wait(u)
 
     def visit(self, v: cython.int) -> cython.void:
