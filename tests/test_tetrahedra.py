@@ -12,7 +12,7 @@ from heat_igl import GeodesicSolver, shapes
 from heat_igl.mesh import Mesh
 from heat_igl.operators import MetricSimplices
 from heat_igl.sources import source_set
-from heat_igl.sweep.lines import LineEngine
+from heat_igl.sweep.lines import LineEngine, along_curve
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 from heat_igl.validation.closed_forms import around_the_edge
 from heat_igl.validation.construction import carved, compact, tetrahedra
@@ -214,6 +214,13 @@ def test_what_is_seen_is_at_the_length_of_the_line(seed):
         found = solver.distance(int(source))
         assert (found >= line * (1 - 1e-9)).all()
         np.testing.assert_allclose(found[seen], line[seen], rtol=1e-4)
+
+
+def test_the_curve_through_space_fills_one_box_after_the_other():
+    P = np.random.default_rng(0).permutation(np.indices((8, 8, 8)).reshape(3, -1).T) * 0.5 - 3
+    for size in (2, 4):
+        boxes = P[along_curve(P)].reshape(-1, size**3, 3)
+        np.testing.assert_array_equal(np.ptp(boxes, axis=1), 0.5 * (size - 1))
 
 
 def test_the_line_behind_an_edge_stays_inside():

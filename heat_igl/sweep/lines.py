@@ -44,7 +44,7 @@ class LineEngine(SimplexEngine):
 
     def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
         super().__init__(simplices)
-        # A query takes .89 to .97 of the time on 13 bodies of 10 000 vertices.
+        # A query takes .89 to .97 of the time on 13 bodies of 10 000 vertices, .70 to .86 on three of 50 000 to 70 000.
         self._order = along_curve(simplices.place)
         self._number = np.argsort(self._order).astype(np.int32)
         self._V, corners = simplices.place[self._order], self._number[self._corners]
