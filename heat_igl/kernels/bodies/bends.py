@@ -15,8 +15,8 @@ _LEVEL = cython.declare(cython.double, 1e-6)
 # Share of an edge by which the fitted distance may be wrong at its quarters. On 32 bodies, a fifth of it makes 515
 # vertices longer by .2 to .6 %, four times as much 739 shorter by .2 to 1.8 %.
 _MISFIT = cython.declare(cython.double, 1e-3)
-# Fall of the slope along an edge from which two fronts meet there. A quarter of it makes 28 vertices longer by .2 to
-# .9 %, four times as much 46 shorter by .2 to 1.1 %.
+# By how much slopes along an edge may fall from point to point, before two fronts are looked for in between. A quarter
+# of it changes one vertex by more than .2 %, four times as much makes 12 longer by .2 to .5 %.
 _FALL = cython.declare(cython.double, 0.016)
 # Change of the slope along an edge below which a front is straight there.
 _STRAIGHT_FRONT = cython.declare(cython.double, 1e-7)
@@ -32,6 +32,7 @@ _NONE = cython.declare(cython.int, -3)
 _Offer = cython.struct(fit=cython.int, next=cython.int, is_guess=cython.int, value=cython.double)
 # As large as what a processor reads at once.
 _Met = cython.struct(fits=cython.int[14], count=cython.int, next=cython.int)
+_Piece = cython.struct(begin=cython.double, value=cython.double, slope=cython.double, lean=cython.double)
 # All that is known of an edge stands together, as it is read.
 _Edge = cython.struct(
     tangent=cython.double[3],
@@ -46,8 +47,8 @@ _Edge = cython.struct(
     across=cython.double[3],
     wall=cython.double,
     before=cython.double[2],
-    slope=cython.double[4],
-    lean=cython.double[4],
+    pieces=_Piece[9],
+    count=cython.int,
 )
 
 
@@ -86,9 +87,9 @@ def bend_around(
     tangent = (ends[:, 1] - ends[:, 0]) / lengths
     beyond, across = np.full((e, 5), np.inf), np.cross(tangent, outward)
     known = [tangent, ends[:, 0], lengths, np.zeros((e, 4)), beyond, outward, across, np.asarray(wall)[:, None]]
-    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 10))], axis=1)
+    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 39))], axis=1)
     one = _Bends(body, sources, offset, d, label)
-    one.edges, one.way = edges, way
+    one.edges, one.n_edges, one.way = edges, e, way
     if e > 0:
         one.edge = cython.cast(cython.pointer[_Edge], cython.address(table[0, 0]))
     one.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
@@ -127,9 +128,10 @@ class _Bends(Ray):
     """Edges of a body around which ways bend, the ways, and the edges that are candidates for them.
 
     Distance along an edge that `fits` is ``start + |(x - along, height)|``, x along the edge; at its ends, the quarters
-    and the middle it is `at`. Each quarter of another edge has a `slope`, and lines meet the edge there with a `lean`,
-    their way along it for each unit across, at its beginning if that is huge. The way comes to the middle from
-    `before`, a place along `outward` and `across`, 0 if it is not known. No way to a vertex is longer than its `bound`.
+    and the middle it is `at`. On another edge, it is linear in `count` - 1 `pieces` between these points and those at
+    which two fronts meet. Each has the `value` at its beginning, and a `slope`, and lines meet the edge there with a
+    `lean`, their way along it for each unit across. The way comes to the middle from `before`, a place along `outward`
+    and `across`, 0 if it is not known. No way to a vertex is longer than its `bound`.
 
     Of the way that was last asked for, `bend` (3,) is the point at which it bends last, and `share` the place of this
     point along the edge.
@@ -142,9 +144,11 @@ class _Bends(Ray):
     are `near`, on ways of `near_value`. Edges begin from one end if it `is_lone`.
     The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`; `followed` (e,)
     are the points of an edge whose ways have been followed, in bits, and `refuted` is an edge at which one was hidden.
+    `front` is the edge or source from which the last point has its way, as of `front_at`.
     """
 
     edges: cython.const[cython.int][:, ::1]
+    n_edges: cython.int
     edge: cython.pointer[_Edge]
     way: cython.int[::1]
     bend: cython.double[3]
@@ -166,6 +170,8 @@ class _Bends(Ray):
     bound: cython.double[::1]
     followed: cython.uchar[::1]
     refuted: cython.int
+    slope: cython.double
+    front: cython.int
     line: Line
     point: cython.int
     n_near: cython.int
@@ -185,47 +191,122 @@ class _Bends(Ray):
         If the ways to both ends come from one source or edge, so do those to points between, or they are hidden.
         """
         x: cython.double[3]
+        slope: cython.double[5]
+        front: cython.int[5]
         edge: cython.pointer[_Edge] = cython.address(self.edge[i])
         a: cython.int = self.edges[i, 0]
         b: cython.int = self.edges[i, 1]
-        for k in range(3):
-            x[k] = 0.5 * (self.body.positions[a, k] + self.body.positions[b, k])
+        front[0], front[4] = self.front_at(a), self.front_at(b)
+        self.point_along(i, 2, x)
         edge.before[0] = edge.before[1] = 0.0
-        if self.way[a] > -2:
-            self.look_back(self.way[a], a, x)
+        if front[0] >= 0:
+            self.look_back(front[0], x)
             for k in range(3):
                 edge.before[0] += (self.line.goal[k] - edge.end[k]) * edge.outward[k]
                 edge.before[1] += (self.line.goal[k] - edge.end[k]) * edge.across[k]
         edge.at[0], edge.at[4] = min(self.d[a], self.d[b] + edge.length), min(self.d[b], self.d[a] + edge.length)
         part: cython.double = 0.25 * edge.length
-        way: cython.int = self.way[a]
-        follows = follows or way < -1 or self.way[b] != way or (way == -1 and self.label[a] != self.label[b])
+        follows = follows or front[0] < 0 or front[0] != front[4]
         self.followed[i] = 255 if follows else 0
         for j in range(1, 4):
             self.point_along(i, j, x)
             most: cython.double = min(edge.at[j - 1] + part, edge.at[4] + (4 - j) * part)
-            if follows:
-                edge.at[j] = self.shortest_to(i, x, most)
-            elif way >= 0:
-                edge.at[j] = min(most, self.around(way, x, False))
-            else:
-                edge.at[j] = min(most, self.offset[self.label[a]] + self.body.away(self.sources[self.label[a]], x))
+            # Along the edge, if no way is found.
+            self.front, self.slope = _NONE, 1 if most == edge.at[j - 1] + part else -1
+            edge.at[j] = self.shortest_to(i, x, most) if follows else min(most, self.from_front(front[0], x))
+            front[j], slope[j] = self.front, self.slope
         for j in range(3, 0, -1):
-            edge.at[j] = min(edge.at[j], edge.at[j + 1] + part)
+            if edge.at[j] > edge.at[j + 1] + part:
+                edge.at[j], front[j], slope[j] = edge.at[j + 1] + part, _NONE, -1
         self.lay_flat(i, a, b)
-        for j in range(4):
-            edge.slope[j] = max(-1.0, min((edge.at[j + 1] - edge.at[j]) / part, 1.0))
-        for j in range(4):
-            edge.lean[j] = edge.slope[j] / sqrt(max(1 - edge.slope[j] * edge.slope[j], 1e-12))
-            # Where two fronts meet, distance is above the line between the ends of a quarter, at most by a quarter of
-            # the fall of the slope, times a quarter of the edge; before or after it the slope falls.
-            for k in range(max(j - 1, 0), min(j + 1, 3)):
-                if edge.slope[k] > edge.slope[k + 1] + _FALL:
-                    edge.lean[j] = 1e30
+        for c in range(2):
+            slope[4 * c] = 1 - 2 * c
+            if front[4 * c] >= 0 and not edge.fits:
+                self.look_back(front[4 * c], cython.address(self.body.positions[self.edges[i, c], 0]))
+                slope[4 * c] = self.slope_along(i)
+        edge.count = 0
+        for j in range(5):
+            if j > 0 and follows and not edge.fits:
+                hidden: cython.bint = self.is_hidden(i, j, front[j - 1]) or self.is_hidden(i, j - 1, front[j])
+                self.meet(i, j, slope[j - 1], slope[j], hidden)
+            self.add_piece(i, j * part, edge.at[j])
 
     @cython.cfunc
     @cython.nogil
-    def point_along(self, i: cython.int, j: cython.int, x: cython.pointer[cython.double]) -> cython.void:
+    def meet(
+        self, i: cython.int, j: cython.int, one: cython.double, other: cython.double, hidden: cython.bint
+    ) -> cython.void:
+        """Begin a piece between points j - 1 and j of an edge, at which distance has these slopes, if two fronts meet.
+
+        That is if one of the fronts is `hidden` at the other's point, or slopes do not grow from one to the next. The
+        place is where both are equal; a front that cannot come to the other point as late comes along the edge.
+        """
+        x: cython.double[3]
+        edge: cython.pointer[_Edge] = cython.address(self.edge[i])
+        part: cython.double = 0.25 * edge.length
+        rise: cython.double = (edge.at[j] - edge.at[j - 1]) / part
+        # By how much, in parts, either front is later at the other's point.
+        behind: cython.double = one - rise
+        ahead: cython.double = rise - other
+        if hidden or max(behind, ahead) > _FALL:
+            behind = behind if behind > 0 else 1 - rise
+            ahead = ahead if ahead > 0 else 1 + rise
+            # Not too near to either point, which it would tell nothing of.
+            share: cython.double = max(0.1, min(ahead / (ahead + behind), 0.9))
+            self.point_along(i, j - 1 + share, x)
+            most: cython.double = min(edge.at[j - 1] + share * part, edge.at[j] + (1 - share) * part)
+            self.add_piece(i, (j - 1 + share) * part, self.shortest_to(i, x, most))
+
+    @cython.cfunc
+    @cython.nogil
+    def is_hidden(self, i: cython.int, j: cython.int, f: cython.int) -> cython.bint:
+        """Whether the way from a front, as of `front_at`, would be shorter to point j of an edge than the shortest."""
+        x: cython.double[3]
+        self.point_along(i, j, x)
+        return f >= 0 and self.from_front(f, x) < self.edge[i].at[j] * (1 - GAIN)
+
+    @cython.cfunc
+    @cython.nogil
+    def slope_along(self, i: cython.int) -> cython.double:
+        """The slope of distance along an edge, at the origin of the `line`."""
+        along: cython.double = 0.0
+        squared: cython.double = 0.0
+        for k in range(3):
+            off: cython.double = self.line.origin[k] - self.line.goal[k]
+            along += off * self.edge[i].tangent[k]
+            squared += off * off
+        return along / sqrt(squared) if squared > 0 else 0.0
+
+    @cython.cfunc
+    @cython.nogil
+    def add_piece(self, i: cython.int, begin: cython.double, value: cython.double) -> cython.void:
+        """Let a piece of an edge begin at a place and a distance, where the one before it ends."""
+        edge: cython.pointer[_Edge] = cython.address(self.edge[i])
+        piece: cython.pointer[_Piece] = cython.address(edge.pieces[edge.count])
+        piece.begin, piece.value = begin, value
+        if edge.count > 0:
+            last: cython.pointer[_Piece] = cython.address(edge.pieces[edge.count - 1])
+            last.slope = max(-1.0, min((value - last.value) / (begin - last.begin), 1.0))
+            last.lean = last.slope / sqrt(max(1 - last.slope * last.slope, 1e-12))
+        edge.count += 1
+
+    @cython.cfunc
+    @cython.nogil
+    def front_at(self, v: cython.int) -> cython.int:
+        """The edge around which the way to v bends last; if that is straight, e added to its source; -2 if unknown."""
+        return self.n_edges + self.label[v] if self.way[v] == -1 else self.way[v]
+
+    @cython.cfunc
+    @cython.nogil
+    def from_front(self, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+        """The way to a point that comes from an edge or a source, as `front_at` numbers them."""
+        if f < self.n_edges:
+            return self.around(f, x, False)
+        return self.offset[f - self.n_edges] + self.body.away(self.sources[f - self.n_edges], x)
+
+    @cython.cfunc
+    @cython.nogil
+    def point_along(self, i: cython.int, j: cython.double, x: cython.pointer[cython.double]) -> cython.void:
         """Set x to the place j quarters along an edge."""
         for k in range(3):
             x[k] = self.body.positions[self.edges[i, 0], k] + 0.25 * j * self.edge[i].length * self.edge[i].tangent[k]
@@ -236,13 +317,13 @@ class _Bends(Ray):
         """Whether the ways to the points of an edge are clear; they are followed when one bends between its ends."""
         x: cython.double[3]
         quarters: cython.double = 4 * self.share
-        way: cython.int = self.way[self.edges[i, 0]]
+        front: cython.int = self.front_at(self.edges[i, 0])
         for j in range(1, 4):
             if fabs(j - quarters) < 1 and not (self.followed[i] >> j) & 1:
                 self.point_along(i, j, x)
                 # First, as where edges touch, each may rely on the other.
                 self.followed[i] |= 1 << j
-                if way == -2 or not self.is_lit(i, way, self.edges[i, 0], x) or (way >= 0 and not self.holds(way)):
+                if front < 0 or not self.is_lit(i, front, x) or (front < self.n_edges and not self.holds(front)):
                     self.followed[i] &= 255 - (1 << j)
                     return False
         return True
@@ -299,7 +380,7 @@ class _Bends(Ray):
         for c in range(2 if sees else 0):
             label: cython.int = self.label[self.edges[i, c]]
             if label >= 0 and (c == 0 or label != self.label[self.edges[i, 0]]):
-                self.near[self.n_near] = -1 - c
+                self.near[self.n_near] = self.n_edges + label
                 self.near_value[self.n_near] = self.offset[label] + self.body.away(self.sources[label], x)
                 self.n_near += 1
         while self.n_near > 0:
@@ -307,16 +388,18 @@ class _Bends(Ray):
             for k in range(self.n_near):
                 if self.near_value[k] < self.near_value[best]:
                     best = k
-            way = self.near[best]
+            front: cython.int = self.near[best]
             value: cython.double = self.near_value[best]
             self.n_near -= 1
             self.near[best], self.near_value[best] = self.near[self.n_near], self.near_value[self.n_near]
             if value >= most:
                 return most
-            if self.is_lit(i, max(way, -1), self.edges[i, 1 if way == -2 else 0], x):
-                if way < 0 or self.holds(way):
+            if self.is_lit(i, front, x):
+                slope: cython.double = self.slope_along(i)
+                if front >= self.n_edges or self.holds(front):
+                    self.slope, self.front = slope, front
                     return value
-                self.refuted = way
+                self.refuted = front
                 continue
             for c in range(1, 4):
                 self.add_at(i, self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
@@ -367,14 +450,15 @@ class _Bends(Ray):
             best = edge.start + sqrt((along - edge.along) * (along - edge.along) + both * both)
         else:
             both = 1.0
-            for j in range(5):
-                if edge.fits and 0 < j < 4:
+            for j in range(edge.count):
+                if edge.fits and 0 < j < edge.count - 1:
                     continue
-                begin: cython.double = 0.25 * j * edge.length
-                through: cython.double = edge.at[j]
-                if not edge.fits and j < 4:
-                    off = max(0.0, min(along - edge.lean[j] * height - begin, 0.25 * edge.length))
-                    through += edge.slope[j] * off
+                piece: cython.pointer[_Piece] = cython.address(edge.pieces[j])
+                begin: cython.double = piece.begin
+                through: cython.double = piece.value
+                if not edge.fits and j < edge.count - 1:
+                    off = max(0.0, min(along - piece.lean * height, edge.pieces[j + 1].begin) - begin)
+                    through += piece.slope * off
                     begin += off
                 through += sqrt(squared + (along - begin) * (along - begin))
                 if through < best:
@@ -387,26 +471,24 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def look_back(self, i: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
-        """Make the place where a way to x bends around edge i the goal of the `line`, or the source of v if i is -1."""
+    def look_back(self, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
+        """Make the place from which a way comes to x the goal of the `line`; f is its front, as of `front_at`."""
         line: cython.pointer[Line] = cython.address(self.line)
         line.origin = x
-        if i >= 0:
-            self.around(i, x, True)
+        if f < self.n_edges:
+            self.around(f, x, True)
             line.goal = self.bend
-            line.goal_a = self.edges[i, 1 if self.share > 1 - NUDGE else 0]
-            line.goal_b = self.edges[i, 0 if self.share < NUDGE else 1]
+            line.goal_a = self.edges[f, 1 if self.share > 1 - NUDGE else 0]
+            line.goal_b = self.edges[f, 0 if self.share < NUDGE else 1]
         else:
-            line.goal_a = line.goal_b = self.sources[self.label[v]]
+            line.goal_a = line.goal_b = self.sources[f - self.n_edges]
             line.goal = cython.address(self.body.positions[line.goal_a, 0])
 
     @cython.cfunc
     @cython.nogil
-    def is_lit(
-        self, e: cython.int, i: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]]
-    ) -> cython.bint:
+    def is_lit(self, e: cython.int, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
         """Whether the line back from a point x of edge e, as of `look_back`, stays inside."""
-        self.look_back(i, v, x)
+        self.look_back(f, x)
         line: cython.pointer[Line] = cython.address(self.line)
         a: cython.int = self.edges[e, 0]
         b: cython.int = self.edges[e, 1]
@@ -578,7 +660,7 @@ class _Bends(Ray):
             value: cython.double = self.offers[k].value
             least: cython.double = value if self.offers[k].is_guess else 0.0
             self.offers[k].value = INFINITY
-            self.look_back(i, v, cython.address(self.body.positions[v, 0]))
+            self.look_back(i, cython.address(self.body.positions[v, 0]))
             share: cython.double = self.share
             is_clear: cython.bint = self.follows(line, v)
             if is_clear and not self.holds(i):
