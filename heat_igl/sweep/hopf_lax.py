@@ -108,25 +108,30 @@ class HopfLaxEngine(SimplexEngine):
     def _crossings(self, mark: AnyArray, update: Any) -> tuple[AnyArray, ...]:
         """The paths that cross facets between simplices of different marks."""
         corners, size, n = self._corners, self._corners.shape[1], self._simplices.n
+        others = np.array([[j for j in range(size) if j != c] for c in range(size)])
         # Marks differ at all vertices of these facets.
         at_vertex, is_mixed, some = np.zeros(n, np.float32), np.zeros(n, bool), np.flatnonzero(mark)
         at_vertex[corners[some]] = mark[some, None]
         is_mixed[corners[some][at_vertex[corners[some]] != mark[some, None]]] = True
         some = some[np.count_nonzero(is_mixed[corners[some]], axis=1) >= size - 1]
-        rows = corners[some][:, [[j for j in range(size) if j != c] for c in range(size)]].reshape(-1, size - 1).T
+        rows = corners[some][:, others].reshape(-1, size - 1).T
         low, high = reduce(np.minimum, rows), reduce(np.maximum, rows)
         _, facet, counts = unique_rows(np.stack([low, sum(rows) - low - high, high], axis=1), n)
         _, order = group_by_label(facet, len(counts))
         at, facet = (size * some[:, None] + np.arange(size)).astype(np.int32).ravel()[order], facet[order]
         beside = [np.stack([at[k:], at[:-k]])[:, facet[k:] == facet[:-k]] for k in range(1, counts.max(initial=2))]
         pairs = np.concatenate(beside, axis=1).T
-        pairs = pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]]
-        lengths = update.crossings(np.ascontiguousarray(pairs))
-        pairs, lengths = pairs[np.isfinite(lengths)], lengths[np.isfinite(lengths)]
-        ends = np.concatenate([pairs, pairs[:, ::-1]])
-        ends = np.concatenate([ends, corners.ravel()[ends[:, 1:]]], axis=1)
-        begins, order = group_by_label(corners.ravel()[ends[:, 0]], n)
-        return begins.astype(np.int32), ends[order], np.tile(lengths, 2)[order]
+        pairs = np.ascontiguousarray(pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]])
+        lengths = update.crossings(pairs)
+        # The corner opposite the facet, those where each path starts and ends, there and back.
+        kind, k = np.nonzero(np.isfinite(lengths.T))
+        is_second, lengths = kind >= size, lengths[k, kind]
+        at, start = pairs[k, is_second * 1], pairs[k, 1 - is_second]
+        end = at // size * size + np.where(is_second, others[at % size, (kind - size) % (size - 1)], kind)
+        paths = np.concatenate([np.stack([at, start, end], axis=1), np.stack([start, end, start], axis=1)])
+        begins, order = group_by_label(corners.ravel()[paths[:, 2]], n)
+        paths[:, 2] = corners.ravel()[paths[:, 1]]
+        return begins.astype(np.int32), paths[order].astype(np.int32), np.tile(lengths, 2)[order]
 
     @property
     def _scheme(self) -> Any:

@@ -49,7 +49,8 @@ class _Inputs(NamedTuple):
     start : (k,) float64
         The offset of the source.
 
-    If paths cross facets, the corner beyond it and its metric follow in `distance`, `slope`, `X` and `tensors`.
+    If paths cross facets, the corner beyond it and its metric follow in `distance`, `slope`, `X` and `tensors`, and
+    then in `X` the corner opposite the facet. The vertex may be a corner of the facet.
     """
 
     distance: AnyArray
@@ -99,7 +100,10 @@ class _FacetUpdate:
             step = np.einsum("kij,kj->ki", self.moves, self._value(at, self.share)[2])
             # The step ends at the boundary of the facet.
             room = np.min(np.where(step < 0, -self.share / np.minimum(step, -1e-300), 1.0), axis=1)
-            self.share += np.where(np.isfinite(step), np.minimum(room, 1.0)[:, None] * step, 0.0)
+            step = np.where(np.isfinite(step), np.minimum(room, 1.0)[:, None] * step, 0.0)
+            # Half a step where the value rises, so that no two places alternate.
+            before, after = (sum(self._value(at, x)[:2]) for x in (self.share, self.share + step))
+            self.share += np.where(after > before * (1 + _SETTLED), 0.5, 1.0)[:, None] * step
             if not (np.abs(step) >= _SETTLED).any():
                 break
 
@@ -111,6 +115,12 @@ class _FacetUpdate:
             share = share + 1j * np.einsum("kij,kj->ki", self.moves, change)
         T, length, _, lean = self._value(at, share)
         e = at.X[:, 1 : p + 1] - at.X[:, :1]
+        if self._crosses.any():
+            straight = np.einsum("kxy,ki,kiy->kx", at.tensors[:, 0], -share / length[:, None], e)
+            # Along the facet, the corner opposite it stands for the vertex.
+            stands = self._crosses[:, None, None] & ~np.real(e).any(axis=2, keepdims=True)
+            e = np.where(stands, at.X[:, -1:] - at.X[:, :1], e)
+            lean = np.where(self._crosses[:, None], np.einsum("kpx,kx->kp", e, straight), lean)
         slope = np.einsum("kpx,kpq,kq->kx", e, _inverse(e @ np.swapaxes(e, 1, 2)), lean)
         # In a simplex of one metric, distance from the corner beyond the facet.
         start = np.where(self._crosses, at.distance[:, -1], at.start)
@@ -130,11 +140,11 @@ class _FacetUpdate:
         # At a corner T is the distance there. At a source it is 0, where the square root has no derivative.
         T = np.where(self._is_corner, mean, np.sqrt(np.where(self._is_corner, 1.0, mean**2 - (x * hang).sum(axis=1))))
         to_T = np.where(self._is_corner[:, None], D, (mean[:, None] * D - hang) / np.where(T == 0, 1, T)[:, None])
+        by = np.einsum("kij,kj->ki", product[:, 0], x)
+        even_length = np.sqrt((x * by).sum(axis=1))
+        even_g = by / even_length[:, None]
         if product.shape[1] == 1:
-            by = np.einsum("kij,kj->ki", product[:, 0], x)
-            length = np.sqrt((x * by).sum(axis=1))
-            g = by / length[:, None]
-            return T, length, to_T + g, -g
+            return T, even_length, to_T + even_g, -even_g
         mean = np.trace(W, axis1=2, axis2=3) / e.shape[2]
         one, two = mean[:, 0], (x * mean[:, 1:]).sum(axis=1)
         middle = _inverse((W[:, 0] + np.einsum("kj,kjab->kab", x, W[:, 1:])) / 2)
@@ -156,7 +166,9 @@ class _FacetUpdate:
         along = np.einsum("ka,kja->kj", u, e)
         g = factor[:, None] * (along - by[:, 1:]) + (longer / two)[:, None] * mean[:, 1:]
         lean = factor[:, None] * (by[:, :1] - along - by[:, 1:]) - longer[:, None] * (mean[:, 1:] / one[:, None] - 1)
-        return T, length, to_T + g, lean
+        # Where paths cross facets, the simplex has one metric, and may have a corner of the facet for the vertex.
+        g, lean = (np.where(self._crosses[:, None], *both) for both in ((even_g, g), (-even_g, lean)))
+        return T, np.where(self._crosses, even_length, length), to_T + g, lean
 
     def _most_growth(self, e: AnyArray, centre: AnyArray, speed: AnyArray) -> AnyArray:
         """The largest gradient (k,) of the mean velocity that is used, as in `lengths_in_velocity`."""
@@ -174,7 +186,7 @@ class _FacetUpdate:
         sag, in_metric = self._sag(at, D, e, product), (e, e) if product.shape[1] == 1 else self._velocity(tensors, e)
         if self._crosses.any():
             # The distance from the corner beyond the facet, as in `SimplexUpdate.crossing`.
-            between = X[:, 1 : p + 2, None] - X[:, None, 1 : p + 2]
+            between = X[:, 1:-1, None] - X[:, None, 1:-1]
             square = np.einsum("kijx,kxy,kijy->kij", between, at.tensors[:, -1], between)
             length = np.sqrt(square[:, :p, p])
             square = square[:, :p, :p] - (length[:, :, None] - length[:, None]) ** 2
@@ -386,16 +398,17 @@ class FixedPointDerivative(SimplexDerivative):
         simplex, corner = np.divmod(facet[at, None], size)
         corner = np.concatenate([corner, others[corner[:, 0]]], axis=1)
         # The vertex, and the corners of its facet.
-        self._vertices = simplices.corners[simplex, corner]
+        self._vertices = np.concatenate([vertex[at, None], simplices.corners[simplex, corner[:, 1:]]], axis=1)
         q, crosses = 1 if simplices.velocity is None else size, beyond[at] >= 0
         self._simplex, self._corner = simplex.repeat(q, axis=1), corner[:, :q]
         if crosses.any():
-            # The corner beyond the facet, or the vertex itself.
+            # The corner beyond the facet, or the vertex itself, and that opposite the facet.
+            opposite = simplices.corners[simplex, corner[:, :1]]
             simplex, corner = np.divmod(np.where(crosses, beyond[at], facet[at])[:, None], size)
             self._simplex = np.concatenate([self._simplex, simplex], axis=1)
             self._corner = np.concatenate([self._corner, corner], axis=1)
-            self._vertices = np.concatenate([self._vertices, simplices.corners[simplex, corner]], axis=1)
-        by_key, known = np.argsort(key), self._vertices.copy()
+            self._vertices = np.concatenate([self._vertices, simplices.corners[simplex, corner], opposite], axis=1)
+        by_key, known = np.argsort(key), self._vertices[:, : size + crosses.any()].copy()
         # Corners of facets that paths cross need no distance.
         known[crosses, 1:size] = known[crosses, :1]
         self._nodes = by_key[np.searchsorted(key, source[at, None] * n + known, sorter=by_key)]

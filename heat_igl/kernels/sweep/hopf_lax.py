@@ -42,8 +42,9 @@ class HopfLax:
     first, incident : (n + 1,) int32, (m (p + 1),) int32
         Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
     crossings : (n + 1,) int32, (k, 3) int32, (k,) float64
-        Paths that may cross a facet between two metrics, ``crossings[0][v]`` to ``crossings[0][v + 1]`` to vertex v:
-        the corners, as above, where they end and start, the vertex of the latter; and lengths.
+        Paths that may cross a facet between two metrics, or run along it, ``crossings[0][v]`` to
+        ``crossings[0][v + 1]`` to vertex v: the corner, as above, opposite the facet on its side, that where the path
+        starts, and the vertex of the latter; and lengths.
     in_metric
         What else `SimplexUpdate` takes of the simplices.
     """
@@ -136,8 +137,8 @@ class HopfLax:
         -------
         facet, beyond, place : (k,) int32, (k,) int32, (k, p) float64
             The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1; the
-            corner on the other side, if the distance comes from there alone, or -1; and the shares of the other
-            corners, in their order, at the best place on that facet.
+            corner of the simplex on the other side, if the distance comes from there alone, or -1; and the shares of
+            the other corners, in their order, at the best place on that facet.
         slope, is_sloped : (k, 3) float64, (k,) uint8
             The derivative of distance by the position of each vertex, and whether it is known.
         weight : (k,) float64
@@ -366,7 +367,7 @@ class HopfLax:
         """Visit v, and hand on what has changed."""
         self.pending[v] = 0.0
         old: cython.double = self.d[v]
-        change: cython.double = 0.0 if self.update.is_sloped[v] else INFINITY
+        change: cython.double = INFINITY if self.facet[v] < 0 else 0.0
         for k in range(3):
             self.turn[k] = self.update.slope[v, k]
         self.visit(v)
@@ -412,7 +413,8 @@ class HopfLax:
         for k in range(self.begin[v], self.begin[v + 1]):
             u = self.ends[k, 2]
             matters: cython.bint = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
-            if self.facet[u] >= 0 and change > self.settled and (matters or self.beyond[u] == self.ends[k, 0]):
+            matters |= self.beyond[u] >= 0 and self.support(u, 0) == v
+            if self.facet[u] >= 0 and change > self.settled and matters:
                 self.pending[u] = max(change, self.pending[u])
                 if self.matters(u, self.d[v] + self.lengths[k]) and self.left > 0:
                     self.wait(u)
@@ -446,6 +448,9 @@ class HopfLax:
                 at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
                 if at < 0 or (k >= self.first[v] and (at == self.facet[v] or not (asks_all or self.changed[at]))):
                     continue
+                # After a path along a facet, v is not opposite it.
+                if self.corners[at // size, at % size] != v:
+                    continue
                 s: cython.int = simplex_of(at, size)
                 c: cython.int = at - size * s
                 has_open: cython.bint = not is_open
@@ -475,13 +480,23 @@ class HopfLax:
         self.update.d = cython.address(self.known[0])
         for i in range(size - 1):
             self.update.share[i] = kept[i]
+        end: cython.int = c
+        for i in range(size):
+            end = i if self.corners[s, i] == v else end
         if beyond >= 0:
-            self.update.crossing(s, c, beyond // size)
+            self.update.crossing(best_at, end, beyond)
         for i in range(size - 1):
             self.place[v, i] = self.update.share[i]
         self.d[v], self.known[v], self.facet[v], self.beyond[v] = best, best, best_at, beyond
         self.step[v] = self.above(v, best)
-        self.update.find_slope(s, c)
+        # Along the facet, seen from v in the simplex.
+        for i in range(size if end != c else 0):
+            if i != end:
+                k = i if i < c else i - 1
+                value = self.place[v, end if end < c else end - 1]
+                self.update.share[i if i < end else i - 1] = self.place[v, k] / (1.0 - value) if i != c else 0.0
+        self.update.face(s, end)
+        self.update.find_slope(s, end)
 
     def arrange(self) -> cython.void:
         """Order vertices topologically, each after the corners that its distance comes from, except in cycles.

@@ -33,7 +33,7 @@ cdef class SimplexUpdate(Facet):
     # How far T is of second order for each vertex.
     cdef double[::1] weight
 
-    cdef double crossing(self, int s, int c, int other) noexcept nogil
+    cdef double crossing(self, int at, int end, int start) noexcept nogil
     cdef double face(self, int s, int c) noexcept nogil
     cdef double linear(self, int s, int c, double room) noexcept nogil
     cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil

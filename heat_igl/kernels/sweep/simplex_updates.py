@@ -53,9 +53,12 @@ class SimplexUpdate(Facet):
         return found
 
     def crossings(self, corners: cython.const[cython.int][:, ::1]):
-        """The length (k,) of `crossing` between corners ``simplex * (p + 1) + corner`` (k, 2) beyond one facet."""
-        found, unused = np.empty(len(corners)), np.zeros(len(self.V))
-        lengths: cython.double[::1] = found
+        """The lengths (k, 2 p + 1) of `crossing` through facets between two simplices, opposite their corners (k, 2).
+
+        They are those from the second corner to all of the first simplex, and from the first to those of the facet.
+        """
+        found, unused = np.empty((len(corners), 2 * self.p + 1)), np.zeros(len(self.V))
+        lengths: cython.double[:, ::1] = found
         levels: cython.double[::1] = unused
         self.d = cython.address(levels[0])
         size: cython.int = self.p + 1
@@ -63,38 +66,58 @@ class SimplexUpdate(Facet):
             for k in range(lengths.shape[0]):
                 if k % ASK == 0 and is_interrupted():
                     break
-                lengths[k] = self.crossing(corners[k, 0] // size, corners[k, 0] % size, corners[k, 1] // size)
+                for i in range(lengths.shape[1]):
+                    at: cython.int = corners[k, i > self.p]
+                    # All corners of the first simplex, and those of the facet in the second one.
+                    end: cython.int = i if i <= self.p else i - size + (i - size >= at % size)
+                    lengths[k, i] = self.crossing(at, end, corners[k, i <= self.p])
         raise_caught()
         return found
 
-    def crossing(self, s: cython.int, c: cython.int, other: cython.int) -> cython.double:
-        """The least |u - x| + |x - v| over a facet between v, corner c of s, and u in another simplex; sets `share`.
+    def crossing(self, at: cython.int, end: cython.int, start: cython.int) -> cython.double:
+        """The least |u - x| + |x - v| over a facet between two simplices of one metric each; sets `share`.
 
-        Both have one metric each. It is inf if the path is no shorter than along an edge.
+        The facet is opposite the corner `at`, v is the corner `end` of that simplex, u the corner `start` of the other
+        one. If u or v is on the facet, the path runs along it. It is inf if the path is no shorter than along an edge.
         """
         q: cython.int = self.q
+        s: cython.int = at // (self.p + 1)
+        other: cython.int = start // (self.p + 1)
+        u: cython.int = start % (self.p + 1)
+        own = cython.address(self.mean[s, 0])
         sq = cython.address(self.mean[other, 0])
+        m = cython.address(self.product[0])
         where: cython.int[3]
-        far: cython.int = self.p * (self.p + 1) // 2
-        start: cython.double = self.start
+        nearest: cython.int = 0
         along: cython.double = INFINITY
-        self.face(s, c)
+        falls: cython.bint = False
+        self.face(s, at % (self.p + 1))
         for i in range(self.p):
             where[i] = 0
-            while self.corners[other, where[i]] != self.at[i]:
+            while self.corners[other, where[i]] != self.corners[s, self.side[i]]:
                 where[i] += 1
-            far -= where[i]
-        self.q, self.start = 1, 0.0
-        self.lay(s, c)
-        for i in range(self.p):
-            self.share[i], self.D[i] = 1.0 / self.p, sqrt(sq[pair(far, where[i])])
-            along = min(along, self.D[i] + sqrt(self.product[4 * i]))
+            self.share[i], self.D[i] = 1.0 / self.p, sqrt(sq[pair(u, where[i])]) if u != where[i] else 0.0
+            m[4 * i] = own[pair(end, self.side[i])] if end != self.side[i] else 0.0
+            if self.D[i] + sqrt(m[4 * i]) < along:
+                along, nearest = self.D[i] + sqrt(m[4 * i]), i
             for j in range(i):
+                m[3 * i + j] = m[3 * j + i] = 0.5 * (m[4 * i] + m[4 * j] - own[pair(self.side[i], self.side[j])])
                 # As T from u in the other metric, whose square is quadratic.
                 rise: cython.double = self.D[i] - self.D[j]
                 self.sag[i][j] = self.sag[j][i] = sq[pair(where[i], where[j])] - rise * rise
-        length: cython.double = self.newton(self.length(self.share), INFINITY)
-        self.q, self.start = q, start
+        # Lengths are convex: if they rise from a corner towards all others, none is less than there.
+        D: cython.double = self.D[nearest]
+        to: cython.double = m[4 * nearest]
+        for i in range(self.p):
+            side: cython.double = self.sag[nearest][i] + (self.D[i] - D) * (self.D[i] - D)
+            slope: cython.double = 0.5 * ((self.D[i] - D) * (self.D[i] + D) - side) / D if D > 0.0 else sqrt(side)
+            slope += (m[3 * nearest + i] - to) / sqrt(to) if to > 0.0 else sqrt(m[4 * i])
+            falls |= i != nearest and slope < 0.0
+        if not falls:
+            return INFINITY
+        self.q = 1
+        length: cython.double = self.newton(self.length(self.share), INFINITY) - self.start
+        self.q = q
         return length if length < along * (1.0 - EQUAL) else INFINITY
 
     def face(self, s: cython.int, c: cython.int) -> cython.double:
