@@ -23,10 +23,9 @@ cdef class HopfLax:
     # Distance, the same of visited vertices alone, the change that visits have not taken in, and distance from all sources.
     cdef double[::1] d, known, pending, limit
     # Facets that have changed since they were asked.
-    cdef unsigned char[::1] changed
-    # Whether vertices lead on to those around them, 2, or matter to some that do, 1; and the mean square of edges around.
-    cdef unsigned char[::1] leads
-    cdef double[::1] square
+    # Whether vertices lead on to those around them, 2, or matter to some that do, 1; whether others surround the source.
+    cdef unsigned char[::1] changed, leads
+    cdef bint is_inner
     # Labels, visits in rounds, and the vertices that the source has reached, in this order.
     cdef int[::1] label, n_visits, reached
     cdef int n_reached
@@ -50,8 +49,8 @@ cdef class HopfLax:
     # Of each vertex, the velocities at both ends of the last edge that it was asked along.
     cdef long long[::1] asked
     cdef long long n_asked
-    # By how much each distance may be wrong, and by how much of that at its last step.
-    cdef double[::1] doubt, own
+    # By how much each distance may be wrong, by how much of that at its last step, and the mean square of edges around.
+    cdef double[::1] doubt, own, square
 
     cdef int support(self, int v, int i) noexcept nogil
     cdef double share(self, int v, int i) noexcept nogil
@@ -63,7 +62,7 @@ cdef class HopfLax:
     cdef void rely(self, int v) noexcept nogil
     cdef bint is_close(self, int v, double d) noexcept nogil
     cdef bint is_beside(self, int v) noexcept nogil
-    cdef bint matters(self, int v, double d) noexcept nogil
+    cdef void ask(self, int v, double d) noexcept nogil
     cdef void reach(self, int v) noexcept nogil
     cdef void wait(self, int v) noexcept nogil
     cdef void sharpen(self) noexcept nogil

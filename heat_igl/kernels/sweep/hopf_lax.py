@@ -60,8 +60,7 @@ class HopfLax:
         self.changed = np.zeros(incident.shape[0], np.uint8)
         self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
-        self.square = np.full(n, -1.0)
-        self.doubt, self.own = np.zeros(n), np.zeros(n)
+        self.doubt, self.own, self.square = np.zeros(n), np.zeros(n), np.full(n, -1.0)
         self.asked, self.n_asked = np.full(n, -1, np.int64), 0
         update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
         update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
@@ -105,7 +104,7 @@ class HopfLax:
         """
         # In strongly anisotropic metrics distances depend on larger ones, and the pass from near to far takes too long.
         left: cython.Py_ssize_t = len(limit) // 2
-        self.limit, self.low, self.update.start = limit, start, start
+        self.limit, self.low, self.update.start, self.is_inner = limit, start, start, True
         with cython.nogil:
             for at in range(self.n_reached):
                 self.forget(self.reached[at])
@@ -239,7 +238,6 @@ class HopfLax:
                 break
             v: cython.int = cython.cast(cython.int, self.waiting.first())
             self.waiting.set_key(v, 0.0)
-            # Not the source, which has its distance.
             if self.pending[v] > 0.0 and self.left > 0:
                 self.left -= self.facet[v] >= 0
                 self.renew(v)
@@ -260,14 +258,14 @@ class HopfLax:
                 self.leads[u] = 1
                 if self.facet[u] >= 0:
                     self.pending[u] = max(self.pending[u], 2 * self.settled)
-                    if self.left > 0:
-                        self.wait(u)
+                    self.ask(u, self.d[u])
 
-    def matters(self, v: cython.int, d: cython.double) -> cython.bint:
-        """Whether to visit v again, where it may get the distance d. Most vertices beside a cell are visited once."""
-        if self.leads[v] == 0 and self.is_close(v, d):
-            self.leads[v] = 1
-        return self.leads[v] > 0
+    def ask(self, v: cython.int, d: cython.double) -> cython.void:
+        """Visit v again, where it may get the distance d, if that matters: beside a cell most are visited once."""
+        if not self.leads[v]:
+            self.leads[v] = self.is_close(v, d)
+        if self.leads[v] and self.left > 0:
+            self.wait(v)
 
     def is_close(self, v: cython.int, d: cython.double) -> cython.bint:
         """Whether no other source is clearly nearer to v than d.
@@ -288,13 +286,10 @@ class HopfLax:
         return excess <= CLOSE * sqrt(self.square[v]) or excess * (d - self.low) <= self.square[v]
 
     def is_beside(self, v: cython.int) -> cython.bint:
-        """Whether the source may be the nearest to v or to a vertex around it.
-
-        It is not to other sources. Elsewhere distances follow from that at v and its slope, as in a constant metric.
-        """
+        """Whether the source, if others surround it, may be the nearest to v or around v, by the slope there."""
         size: cython.int = self.corners.shape[1]
         far: cython.double = self.d[v] - self.low
-        if self.d[v] <= self.limit[v] or not self.update.is_sloped[v]:
+        if not self.is_inner or self.d[v] <= self.limit[v] or not self.update.is_sloped[v]:
             return True
         for k in range(self.first[v], self.first[v + 1]):
             s: cython.int = self.incident[k] // size
@@ -303,11 +298,11 @@ class HopfLax:
                 if u == v or not self.limit[u] > self.low:
                     continue
                 sq: cython.double = self.update.mean[s, pair(self.incident[k] % size, i)]
-                rise: cython.double = 0.0
-                for j in range(3):
-                    rise += self.update.slope[v, j] * (self.update.V[u, j] - self.update.V[v, j])
                 most: cython.double = self.limit[u] - self.low + CLOSE * sqrt(sq)
-                if far * (far + 2.0 * rise) + sq <= most * most:
+                square: cython.double = far * far + sq
+                for j in range(3):
+                    square += 2.0 * far * self.update.slope[v, j] * (self.update.V[u, j] - self.update.V[v, j])
+                if square <= most * most:
                     return True
         return False
 
@@ -324,6 +319,7 @@ class HopfLax:
             for i in range(size):
                 u: cython.int = self.corners[s, i]
                 gap: cython.double = self.d[u] - self.d[v]
+                self.is_inner &= self.d[v] > self.low or self.limit[u] <= self.low
                 if self.facet[u] < 0 and gap > 0.0:
                     # The simplices around an edge know the same of it, if velocities at its ends are the same in them.
                     if self.update.q > 1:
@@ -357,8 +353,8 @@ class HopfLax:
                 v = self.order[at]
                 # If the metric turns far within a simplex, dependencies may be cyclic: each further visit of a vertex
                 # needs a larger change.
-                matters: cython.bint = self.leads[v] > 0 or self.facet[v] < 0
-                if matters and self.pending[v] > self.settled * self.n_visits[v]:
+                is_due: cython.bint = self.pending[v] > self.settled * self.n_visits[v]
+                if is_due and (self.leads[v] > 0 or self.facet[v] < 0):
                     is_settled = False
                     self.n_visits[v] += 1
                     self.renew(v)
@@ -405,19 +401,14 @@ class HopfLax:
                     or (is_new and self.update.gains(s, c, self.incident[k] - size * s))
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
-                    least: cython.double = -INFINITY
-                    if self.leads[u] == 0:
-                        least = self.update.through(s, c, self.d[u] * (1 - EQUAL))
-                    if self.matters(u, least) and self.left > 0:
-                        self.wait(u)
+                    self.ask(u, self.d[u] if self.leads[u] else self.update.through(s, c, self.d[u] * (1 - EQUAL)))
         for k in range(self.begin[v], self.begin[v + 1]):
             u = self.ends[k, 2]
             matters: cython.bint = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
             matters |= self.beyond[u] >= 0 and self.support(u, 0) == v
             if self.facet[u] >= 0 and change > self.settled and matters:
                 self.pending[u] = max(change, self.pending[u])
-                if self.matters(u, self.d[v] + self.lengths[k]) and self.left > 0:
-                    self.wait(u)
+                self.ask(u, self.d[v] + self.lengths[k])
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it.
