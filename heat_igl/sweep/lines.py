@@ -23,6 +23,8 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Of the places nearest in space so many are compared by their offsets; so many vertices at a time.
 _MOST_NEAR, _ROWS = 64, 16384
+# Sources that a vertex looks for first, nearest first.
+_MOST_FIRST = 8
 # What the kernel of bends knows of the way to a vertex.
 _STRAIGHT, _UNKNOWN = -1, -2
 # Sine of the angle by which a body must exceed half a turn at an edge.
@@ -104,14 +106,16 @@ class LineEngine(SimplexEngine):
         return body(self._corners, self._first, self._incident, self._V)
 
     def _from_near(self, vertices: AnyArray, offset: FloatArray) -> tuple[AnyArray, AnyArray]:
-        """All vertices from near to far in space, and the source (n,) that each looks for first, -1 for none."""
+        """All vertices from near to far in space, and the sources (n, k) that each looks for first, or -1."""
         if len(vertices) == 1:
             far = np.sqrt(sum((x - x[vertices[0]]) ** 2 for x in self._V.T))
-            nearest = np.full(len(far), 0 if self._is_small else -1)
+            nearest = np.full((len(far), 1), 0 if self._is_small else -1)
         else:
             # Where another arrives before a source begins, no line comes from the source.
             first = np.unique(nearest_in_value(self._V[vertices], self._V[vertices], offset)[1])
-            far, which = nearest_in_value(self._V, self._V[vertices[first]], offset[first])
+            # A wall may hide the nearest one, and the next one be seen between vertices that belong to others.
+            count = min(_MOST_FIRST if len(self.reflex_edges[0]) else 1, len(first))
+            far, which = nearest_in_value(self._V, self._V[vertices[first]], offset[first], count)
             nearest = first[which]
         return np.argsort(far, kind="stable").astype(np.int32), nearest.astype(np.int32)
 
@@ -185,19 +189,24 @@ def along_curve(places: FloatArray) -> IntArray:
     return np.argsort(sum((cell >> b & 1) @ [4 << 3 * b, 2 << 3 * b, 1 << 3 * b] for b in range(20)), kind="stable")
 
 
-def nearest_in_value(V: FloatArray, places: FloatArray, offset: FloatArray) -> tuple[FloatArray, IntArray]:
-    """The least sum of an offset (k,) and the distance from its place (k, 3) in space, at each V (n, 3), and which."""
+def nearest_in_value(
+    V: FloatArray, places: FloatArray, offset: FloatArray, count: int = 1
+) -> tuple[FloatArray, IntArray]:
+    """The least sum of an offset (k,) and the distance from its place (k, 3) in space, at each V (n, 3).
+
+    Returns also which place that is, and which ones of those near to V follow: (n, count).
+    """
     from scipy.spatial import cKDTree
 
     tree, least = cKDTree(places), offset - offset.min()
-    value, which = np.empty(len(V)), np.empty(len(V), np.int64)
+    value, which = np.empty(len(V)), np.empty((len(V), count), np.int64)
     for begin in range(0, len(V), _ROWS):
-        left, k = np.arange(begin, min(begin + _ROWS, len(V))), 1
+        left, k = np.arange(begin, min(begin + _ROWS, len(V))), count
         while len(left) and k <= _MOST_NEAR:
             far, near = tree.query(V[left], np.arange(1, min(k, len(places)) + 1))
             found = far + least[near]
-            value[left], best = found.min(axis=1), found.argmin(axis=1)
-            which[left] = near[np.arange(len(left)), best]
+            value[left], best = found.min(axis=1), found.argsort(axis=1, kind="stable")[:, :count]
+            which[left] = np.take_along_axis(near, best, axis=1)
             # All other places are farther.
             left, k = left[(value[left] > far[:, -1]) & (k < len(places))], 2 * k
     return value, which

@@ -32,7 +32,9 @@ _NONE = cython.declare(cython.int, -3)
 _Offer = cython.struct(fit=cython.int, next=cython.int, is_guess=cython.int, value=cython.double)
 # As large as what a processor reads at once.
 _Met = cython.struct(fits=cython.int[14], count=cython.int, next=cython.int)
-_Piece = cython.struct(begin=cython.double, value=cython.double, slope=cython.double, lean=cython.double)
+_Piece = cython.struct(
+    begin=cython.double, value=cython.double, slope=cython.double, lean=cython.double, label=cython.int
+)
 # All that is known of an edge stands together, as it is read.
 _Edge = cython.struct(
     tangent=cython.double[3],
@@ -87,7 +89,7 @@ def bend_around(
     tangent = (ends[:, 1] - ends[:, 0]) / lengths
     beyond, across = np.full((e, 5), np.inf), np.cross(tangent, outward)
     known = [tangent, ends[:, 0], lengths, np.zeros((e, 4)), beyond, outward, across, np.asarray(wall)[:, None]]
-    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 39))], axis=1)
+    table: cython.double[:, ::1] = np.concatenate([*known, np.zeros((e, 48))], axis=1)
     one = _Bends(body, sources, offset, d, label)
     one.edges, one.n_edges, one.way = edges, e, way
     if e > 0:
@@ -172,6 +174,7 @@ class _Bends(Ray):
     refuted: cython.int
     slope: cython.double
     front: cython.int
+    origin: cython.int
     line: Line
     point: cython.int
     n_near: cython.int
@@ -193,6 +196,7 @@ class _Bends(Ray):
         x: cython.double[3]
         slope: cython.double[5]
         front: cython.int[5]
+        label: cython.int[5]
         edge: cython.pointer[_Edge] = cython.address(self.edge[i])
         a: cython.int = self.edges[i, 0]
         b: cython.int = self.edges[i, 1]
@@ -205,6 +209,8 @@ class _Bends(Ray):
                 edge.before[0] += (self.line.goal[k] - edge.end[k]) * edge.outward[k]
                 edge.before[1] += (self.line.goal[k] - edge.end[k]) * edge.across[k]
         edge.at[0], edge.at[4] = min(self.d[a], self.d[b] + edge.length), min(self.d[b], self.d[a] + edge.length)
+        label[0] = self.label[a if edge.at[0] == self.d[a] else b]
+        label[4] = self.label[b if edge.at[4] == self.d[b] else a]
         part: cython.double = 0.25 * edge.length
         follows = follows or front[0] < 0 or front[0] != front[4]
         self.followed[i] = 255 if follows else 0
@@ -213,11 +219,12 @@ class _Bends(Ray):
             most: cython.double = min(edge.at[j - 1] + part, edge.at[4] + (4 - j) * part)
             # Along the edge, if no way is found.
             self.front, self.slope = _NONE, 1 if most == edge.at[j - 1] + part else -1
+            self.origin = label[j - 1 if self.slope > 0 else 4]
             edge.at[j] = self.shortest_to(i, x, most) if follows else min(most, self.from_front(front[0], x))
-            front[j], slope[j] = self.front, self.slope
+            front[j], slope[j], label[j] = self.front, self.slope, self.origin
         for j in range(3, 0, -1):
             if edge.at[j] > edge.at[j + 1] + part:
-                edge.at[j], front[j], slope[j] = edge.at[j + 1] + part, _NONE, -1
+                edge.at[j], front[j], slope[j], label[j] = edge.at[j + 1] + part, _NONE, -1, label[j + 1]
         self.lay_flat(i, a, b)
         for c in range(2):
             slope[4 * c] = 1 - 2 * c
@@ -229,7 +236,7 @@ class _Bends(Ray):
             if j > 0 and follows and not edge.fits:
                 hidden: cython.bint = self.is_hidden(i, j, front[j - 1]) or self.is_hidden(i, j - 1, front[j])
                 self.meet(i, j, slope[j - 1], slope[j], hidden)
-            self.add_piece(i, j * part, edge.at[j])
+            self.add_piece(i, j * part, edge.at[j], label[j])
 
     @cython.cfunc
     @cython.nogil
@@ -255,7 +262,8 @@ class _Bends(Ray):
             share: cython.double = max(0.1, min(ahead / (ahead + behind), 0.9))
             self.point_along(i, j - 1 + share, x)
             most: cython.double = min(edge.at[j - 1] + share * part, edge.at[j] + (1 - share) * part)
-            self.add_piece(i, (j - 1 + share) * part, self.shortest_to(i, x, most))
+            value: cython.double = self.shortest_to(i, x, most)
+            self.add_piece(i, (j - 1 + share) * part, value, self.origin)
 
     @cython.cfunc
     @cython.nogil
@@ -279,16 +287,29 @@ class _Bends(Ray):
 
     @cython.cfunc
     @cython.nogil
-    def add_piece(self, i: cython.int, begin: cython.double, value: cython.double) -> cython.void:
+    def add_piece(self, i: cython.int, begin: cython.double, value: cython.double, label: cython.int) -> cython.void:
         """Let a piece of an edge begin at a place and a distance, where the one before it ends."""
         edge: cython.pointer[_Edge] = cython.address(self.edge[i])
         piece: cython.pointer[_Piece] = cython.address(edge.pieces[edge.count])
-        piece.begin, piece.value = begin, value
+        piece.begin, piece.value, piece.label = begin, value, label
         if edge.count > 0:
             last: cython.pointer[_Piece] = cython.address(edge.pieces[edge.count - 1])
             last.slope = max(-1.0, min((value - last.value) / (begin - last.begin), 1.0))
             last.lean = last.slope / sqrt(max(1 - last.slope * last.slope, 1e-12))
         edge.count += 1
+
+    @cython.cfunc
+    @cython.nogil
+    def label_at(self, i: cython.int) -> cython.int:
+        """The source of the point of an edge at its `share`: that of the beginning of a piece next to it."""
+        edge: cython.pointer[_Edge] = cython.address(self.edge[i])
+        best: cython.int = 0
+        for j in range(1, edge.count):
+            if fabs(edge.pieces[j].begin - self.share * edge.length) < fabs(
+                edge.pieces[best].begin - self.share * edge.length
+            ):
+                best = j
+        return edge.pieces[best].label
 
     @cython.cfunc
     @cython.nogil
@@ -396,8 +417,9 @@ class _Bends(Ray):
                 return most
             if self.is_lit(i, front, x):
                 slope: cython.double = self.slope_along(i)
+                origin: cython.int = front - self.n_edges if front >= self.n_edges else self.label_at(front)
                 if front >= self.n_edges or self.holds(front):
-                    self.slope, self.front = slope, front
+                    self.slope, self.front, self.origin = slope, front, origin
                     return value
                 self.refuted = front
                 continue
@@ -661,7 +683,7 @@ class _Bends(Ray):
             least: cython.double = value if self.offers[k].is_guess else 0.0
             self.offers[k].value = INFINITY
             self.look_back(i, cython.address(self.body.positions[v, 0]))
-            share: cython.double = self.share
+            label: cython.int = self.label_at(i)
             is_clear: cython.bint = self.follows(line, v)
             if is_clear and not self.holds(i):
                 self.begin(i, True)
@@ -669,10 +691,7 @@ class _Bends(Ray):
             else:
                 if is_clear:
                     is_found = True
-                    self.d[v], self.way[v] = value, i
-                    # A way may bend at an end that is not reached yet, equally short to rounding.
-                    end: cython.int = self.edges[i, share >= 0.5]
-                    self.label[v] = self.label[end if self.label[end] >= 0 else self.edges[i, share < 0.5]]
+                    self.d[v], self.way[v], self.label[v] = value, i, label
                 else:
                     for c in range(1, 4):
                         self.offer_at(self.body.cells[line.t, (line.out + c) & 3], v, 0.0)

@@ -19,7 +19,7 @@ def look_around(
     sources: cython.const[cython.int][::1],
     offset: cython.const[cython.double][::1],
     edges: cython.const[cython.int][:, ::1],
-    guess: cython.int[::1],
+    guess: cython.int[:, ::1],
     d: cython.double[::1],
     label: cython.int[::1],
 ):
@@ -31,8 +31,8 @@ def look_around(
 
     All vertices are in `order` (n,), roughly from near to far. Source i of k is at vertex ``sources[i]``, and distance
     begins there at ``offset[i]``. Ways bend around the `edges` (e, 2); not all tetrahedra at a source there see the
-    same. A vertex looks first for the source `guess` (n,), unless that is -1. `label` (n,) is the source of each; with
-    `d` and `guess` it is changed.
+    same. A vertex looks first for the sources `guess` (n, k), nearest first, unless they are -1. `label` (n,) is the
+    source of each; with `d` and `guess` it is changed.
     """
     n = order.shape[0]
     one = _Sight(body, sources, offset, d, label)
@@ -73,7 +73,7 @@ class _Sight(Ray):
 
     turns: cython.const[cython.uchar][::1]
     is_concave: cython.bint
-    guess: cython.int[::1]
+    guess: cython.int[:, ::1]
     is_waiting: cython.uchar[::1]
     lit: cython.int[::1]
     sought: cython.int
@@ -135,15 +135,18 @@ class _Sight(Ray):
         """Give v the shortest line from a source of its neighbours that stays inside; returns whether there is one."""
         below: cython.double = self.d[v] * (1 - GAIN)
         looks: cython.int = _MOST_LOOKS
-        nearest: cython.int = self.guess[v]
-        if nearest >= 0:
-            self.guess[v] = -1
+        for i in range(self.guess.shape[1] if self.guess[v, 0] >= 0 else 0):
+            nearest: cython.int = self.guess[v, i]
             # There is no other.
             if self.sources.shape[0] == 1:
                 looks = 0
-            if self.line(v, nearest) < below and self.sees_source(v, nearest):
+            if not self.line(v, nearest) < below:
+                break
+            if self.sees_source(v, nearest):
+                self.guess[v, 0] = -1
                 self.take(v, nearest)
                 return True
+        self.guess[v, 0] = -1
         above: cython.double = -INFINITY
         for _looks in range(looks):
             nearest = self.nearest_around(v, v, above, below, -1)
