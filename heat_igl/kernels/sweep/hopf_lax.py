@@ -384,21 +384,25 @@ class HopfLax:
         is_new: cython.bint = change == INFINITY or self.d[v] < old
         for k in range(self.first[v], self.first[v + 1]):
             s: cython.int = simplex_of(self.incident[k], size)
+            own: cython.int = self.incident[k] - size * s
+            of = cython.address(self.corners[s, 0])
             most: cython.double = change
             # T changes by an eighth, in the middle of an edge, of how far a slope changes along it.
-            for c in range(size if change < INFINITY else 0):
-                to = cython.address(self.update.V[self.corners[s, c], 0])
+            for i in range(size - 1 if change < INFINITY else 0):
+                u: cython.int = of[i + (i >= own)]
+                to = cython.address(self.update.V[u, 0])
                 most = max(most, fabs(x * (to[0] - at[0]) + y * (to[1] - at[1]) + z * (to[2] - at[2])))
-            for c in range(size if most > self.settled else 0):
-                u: cython.int = self.corners[s, c]
-                if u == v or self.facet[u] < 0:
+            for i in range(size - 1 if most > self.settled else 0):
+                c: cython.int = i + (i >= own)
+                u = of[c]
+                if self.facet[u] < 0:
                     continue
                 # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
                 if (
                     most <= self.pending[u]
                     or self.d[v] < self.d[u]
                     or simplex_of(self.facet[u], size) == s
-                    or (is_new and self.update.gains(s, c, self.incident[k] - size * s))
+                    or (is_new and self.update.gains(s, c, own))
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
                     self.ask(u, self.d[u] if self.leads[u] else self.update.through(s, c, self.d[u] * (1 - EQUAL)))
