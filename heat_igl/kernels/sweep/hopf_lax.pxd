@@ -23,10 +23,8 @@ cdef class HopfLax:
     # Distance, the same of visited vertices alone, the change that visits have not taken in, and distance from all sources.
     cdef double[::1] d, known, pending, limit
     # Facets that have changed since they were asked.
-    # Whether vertices lead on to those around them, 2, or matter to some that do, 1; whether others surround the source.
     cdef unsigned char[::1] changed, leads
-    cdef bint is_inner
-    # Labels, visits in rounds, and the vertices that the source has reached, in this order.
+    # Which vertices lead on to those around them, and those that the source has reached, in this order.
     cdef int[::1] label, n_visits, reached
     cdef int n_reached
     # Distance at the source, the change that is not handed on, and that of the slope of the last vertex.
@@ -49,8 +47,8 @@ cdef class HopfLax:
     # Of each vertex, the velocities at both ends of the last edge that it was asked along.
     cdef long long[::1] asked
     cdef long long n_asked
-    # By how much each distance may be wrong, by how much of that at its last step, and the mean square of edges around.
-    cdef double[::1] doubt, own, square
+    # By how much each distance may be wrong, and by how much of that at its last step.
+    cdef double[::1] doubt, own
 
     cdef int support(self, int v, int i) noexcept nogil
     cdef double share(self, int v, int i) noexcept nogil
@@ -59,10 +57,6 @@ cdef class HopfLax:
     cdef void forget(self, int v) noexcept nogil
     cdef void march(self) noexcept nogil
     cdef void lead_on(self, int v) noexcept nogil
-    cdef void rely(self, int v) noexcept nogil
-    cdef bint is_close(self, int v, double d) noexcept nogil
-    cdef bint is_beside(self, int v) noexcept nogil
-    cdef void ask(self, int v, double d) noexcept nogil
     cdef void reach(self, int v) noexcept nogil
     cdef void wait(self, int v) noexcept nogil
     cdef void sharpen(self) noexcept nogil

@@ -60,7 +60,7 @@ class HopfLax:
         self.changed = np.zeros(incident.shape[0], np.uint8)
         self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
-        self.doubt, self.own, self.square = np.zeros(n), np.zeros(n), np.full(n, -1.0)
+        self.doubt, self.own = np.zeros(n), np.zeros(n)
         self.asked, self.n_asked = np.full(n, -1, np.int64), 0
         update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
         update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
@@ -104,7 +104,7 @@ class HopfLax:
         """
         # In strongly anisotropic metrics distances depend on larger ones, and the pass from near to far takes too long.
         left: cython.Py_ssize_t = len(limit) // 2
-        self.limit, self.low, self.update.start, self.is_inner = limit, start, start, True
+        self.limit, self.low, self.update.start = limit, start, start
         with cython.nogil:
             for at in range(self.n_reached):
                 self.forget(self.reached[at])
@@ -244,67 +244,22 @@ class HopfLax:
             self.lead_on(v)
 
     def lead_on(self, v: cython.int) -> cython.void:
-        """Reach the vertices around v once, unless other sources are clearly nearer to v, or to all of those."""
-        if self.leads[v] < 2 and self.is_close(v, self.d[v]) and self.is_beside(v):
-            self.leads[v] = 2
-            self.reach(v)
-            self.rely(v)
-
-    def rely(self, v: cython.int) -> cython.void:
-        """If v leads on, or matters to others that do, so do the vertices that it has its distance from."""
-        for i in range(self.update.p if self.leads[v] > 0 and self.facet[v] >= 0 else 0):
-            u: cython.int = self.support(v, i)
-            if self.leads[u] == 0 and self.share(v, i) > 0.0:
-                self.leads[u] = 1
-                if self.facet[u] >= 0:
-                    self.pending[u] = max(self.pending[u], 2 * self.settled)
-                    self.ask(u, self.d[u])
-
-    def ask(self, v: cython.int, d: cython.double) -> cython.void:
-        """Visit v again, where it may get the distance d, if that matters: beside a cell most are visited once."""
-        if not self.leads[v]:
-            self.leads[v] = self.is_close(v, d)
-        if self.leads[v] and self.left > 0:
-            self.wait(v)
-
-    def is_close(self, v: cython.int, d: cython.double) -> cython.bint:
-        """Whether no other source is clearly nearer to v than d.
+        """Reach the vertices around v once, unless other sources are clearly nearer to v.
 
         A shortest path runs where its source is the nearest, perhaps between vertices that are nearer to others. Fronts
         of sources one edge h apart differ in direction by h / R at the distance R, so by h^2 / R one edge beside their
         border. The longest edge in place of the mean would be that of slivers.
         """
-        excess: cython.double = d - self.limit[v]
-        if not excess > 0.0:
-            return True
-        if self.square[v] < 0.0:
-            square: cython.double = 0.0
+        square: cython.double = 0.0
+        excess: cython.double = self.d[v] - self.limit[v]
+        if excess > 0.0:
             for k in range(self.first[v], self.first[v + 1]):
                 for i in range(self.update.mean.shape[1]):
                     square += self.update.mean[self.incident[k] // self.corners.shape[1], i]
-            self.square[v] = square / ((self.first[v + 1] - self.first[v]) * self.update.mean.shape[1])
-        return excess <= CLOSE * sqrt(self.square[v]) or excess * (d - self.low) <= self.square[v]
-
-    def is_beside(self, v: cython.int) -> cython.bint:
-        """Whether the source, if others surround it, may be the nearest to v or around v, by the slope there."""
-        size: cython.int = self.corners.shape[1]
-        far: cython.double = self.d[v] - self.low
-        if not self.is_inner or self.d[v] <= self.limit[v] or not self.update.is_sloped[v]:
-            return True
-        for k in range(self.first[v], self.first[v + 1]):
-            s: cython.int = self.incident[k] // size
-            for i in range(size):
-                u: cython.int = self.corners[s, i]
-                if u == v or not self.limit[u] > self.low:
-                    continue
-                sq: cython.double = self.update.mean[s, pair(self.incident[k] % size, i)]
-                most: cython.double = self.limit[u] - self.low + CLOSE * sqrt(sq)
-                square: cython.double = far * far + sq
-                for j in range(3):
-                    square += 2.0 * far * self.update.slope[v, j] * (self.update.V[u, j] - self.update.V[v, j])
-                if square <= most * most:
-                    return True
-        return False
+            square /= (self.first[v + 1] - self.first[v]) * self.update.mean.shape[1]
+        if not self.leads[v] and (excess <= CLOSE * sqrt(square) or excess * (self.d[v] - self.low) <= square):
+            self.leads[v] = 1
+            self.reach(v)
 
     def reach(self, v: cython.int) -> cython.void:
         """Lower distances around v to those along edges from v, where vertices were not visited."""
@@ -319,7 +274,6 @@ class HopfLax:
             for i in range(size):
                 u: cython.int = self.corners[s, i]
                 gap: cython.double = self.d[u] - self.d[v]
-                self.is_inner &= self.d[v] > self.low or self.limit[u] <= self.low
                 if self.facet[u] < 0 and gap > 0.0:
                     # The simplices around an edge know the same of it, if velocities at its ends are the same in them.
                     if self.update.q > 1:
@@ -353,8 +307,7 @@ class HopfLax:
                 v = self.order[at]
                 # If the metric turns far within a simplex, dependencies may be cyclic: each further visit of a vertex
                 # needs a larger change.
-                is_due: cython.bint = self.pending[v] > self.settled * self.n_visits[v]
-                if is_due and (self.leads[v] > 0 or self.facet[v] < 0):
+                if self.pending[v] > self.settled * self.n_visits[v]:
                     is_settled = False
                     self.n_visits[v] += 1
                     self.renew(v)
@@ -372,7 +325,6 @@ class HopfLax:
         for k in range(3):
             self.turn[k] = (self.update.slope[v, k] - self.turn[k]) / (8.0 * span)
         self.hand_on(v, old, change)
-        self.rely(v)
 
     def hand_on(self, v: cython.int, old: cython.double, change: cython.double) -> cython.void:
         """Request visits to the vertices around v after its value, which was `old`, or its slope has changed."""
@@ -405,14 +357,16 @@ class HopfLax:
                     or (is_new and self.update.gains(s, c, own))
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
-                    self.ask(u, self.d[u] if self.leads[u] else self.update.through(s, c, self.d[u] * (1 - EQUAL)))
+                    if self.left > 0:
+                        self.wait(u)
         for k in range(self.begin[v], self.begin[v + 1]):
             u = self.ends[k, 2]
             matters: cython.bint = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
             matters |= self.beyond[u] >= 0 and self.support(u, 0) == v
             if self.facet[u] >= 0 and change > self.settled and matters:
                 self.pending[u] = max(change, self.pending[u])
-                self.ask(u, self.d[v] + self.lengths[k])
+                if self.left > 0:
+                    self.wait(u)
 
     def visit(self, v: cython.int) -> cython.void:
         """Give v the least value over its simplices, and the slope that goes with it.
