@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from heat_igl.errors import MeshError
-from heat_igl.intrinsic import IntrinsicTriangulation, Merged
+from heat_igl.intrinsic import Merged
 from heat_igl.kernels.windows import paths as kernels
 from heat_igl.mesh import Mesh, MeshPart, PointCloud
 from heat_igl.operators import MetricSides, Operators, SideLengths, Surface
@@ -52,10 +52,15 @@ class DistanceDerivative:
         part: MeshPart | None = None,
     ) -> None:
         self.distance, self._sources, self._sides, self._part = distance, sources, sides, part
-        if surface.faces is None:
+        if surface.faces is None or surface.given_faces is None:
             raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
-        self._faces, self._paths = surface.faces, PathLengths(windows, surface.faces, sources)
+        self._faces, self._F, self._tables = surface.faces, surface.given_faces, windows.tables
         self.unreachable: IntArray = np.flatnonzero(np.isinf(distance))
+        # A path is known by the last vertex or source point before each vertex, from which a straight line leads to it;
+        # up to there it is the path of that vertex.
+        done = search(windows.tables, sources)
+        self._places = done.starts.points
+        self._paths = windows.tables, done.found, done.starts, np.argsort(done.found.distance, kind="stable")
 
     def __call__(self, g: ArrayLike) -> FloatArray:
         """The gradient by the positions of the vertices.
@@ -119,7 +124,7 @@ class DistanceDerivative:
         slopes = self._place_slopes
         (row,) = gradient_rows(g, self.distance, 1)
         _, by_place = self._by_sides(row)
-        return np.zeros((0, 3)) if by_place is None else np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
+        return np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
     def by_metric(self, g: ArrayLike) -> FloatArray:
         """The gradient by the metric, (m, 3, 3) or (m, 2, 2) as it was given to `metric_operators`; `g` (n,).
@@ -171,13 +176,10 @@ class DistanceDerivative:
         if points is not None and len(places.faces):
             velocity = velocities("points", points, by_place.shape, "source point")
             by_place = np.einsum("pcx,px->pc", self._place_slopes, velocity)
-        if self._merged is not None:  # each face once
-            given_sides, given_places = by_side, by_place
-            kept, which = np.unique(self._merged.face, return_index=True)
-            by_side, by_place = np.zeros((len(kept), 3)), np.empty_like(given_places)
-            np.put_along_axis(by_side, self._merged.corner[which], given_sides[which], axis=1)
-            np.put_along_axis(by_place, self._merged.corner[places.faces], given_places, axis=1)
-        result = self._paths.push_forward(by_side, by_place)
+        moves = np.zeros((len(self._places.faces), 3))
+        for c, (known, point, corner) in enumerate(self._own_corners()):
+            moves[known, c] = by_place[point, corner]
+        result = self._summed(by_side.ravel()[self._sides_of_tables], moves, np.zeros(self._tables.n + len(moves)))
         result[self.unreachable] = 0.0
         return result
 
@@ -195,9 +197,14 @@ class DistanceDerivative:
     @cached_property
     def inexact(self) -> IntArray:
         """Vertices whose distance is not the length of the path that is differentiated."""
+        tables, found, starts, _ = self._paths
+        # A line is homogeneous in the sides (Euler); to it comes the distance at which the source starts.
+        begin = np.where(found.root == np.arange(tables.n), found.distance, 0.0)
+        moves, change = np.zeros((len(self._places.faces), 3)), np.concatenate([begin, starts.point_offset])
+        length = self._summed(self._faces.l[tables.face], moves, change)
         reached = np.flatnonzero(np.isfinite(self.distance))
         distance = self.distance[reached]
-        return np.asarray(reached[np.abs(self._paths.lengths()[reached] - distance) > _SAME * distance])
+        return np.asarray(reached[np.abs(length[reached] - distance) > _SAME * distance])
 
     def _positions(self) -> SideLengths:
         if self._sides is None:
@@ -207,26 +214,48 @@ class DistanceDerivative:
             )
         return self._sides
 
-    def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+    def _by_sides(self, row: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The derivatives (m, 3) by the sides, and (p, 3) by the points, of the faces that the user gave.
 
-        Of faces that are there twice, all but one have 0.
+        An edge of two faces changes both of its sides; of faces that are there twice, all but one have 0. By the
+        coordinates of a point, a row is known up to a constant.
         """
-        by_side, by_place = self._paths.pull_back(row)
-        if self._merged is None:
-            return by_side, by_place
-        if by_place is not None:
-            by_place = np.take_along_axis(by_place, self._merged.corner[self._sources.points.faces], axis=1)
-        kept, which = np.unique(self._merged.face, return_index=True)
-        on_given = np.zeros((len(self._merged.face), 3))
-        on_given[which] = np.take_along_axis(by_side[kept], self._merged.corner[which], axis=1)
-        return on_given, by_place
+        tables, e = self._tables, len(self._places.faces)
+        weight, by_table, by_place = np.zeros(tables.n + e), np.zeros(len(tables.edges.length)), np.zeros((e, 3))
+        weight[tables.number] = row
+        kernels.pull_back(*self._paths, weight, by_table, by_place)
+        by_side, by_point = np.zeros(self._F.shape), np.zeros((len(self._sources.points.faces), 3))
+        by_side.ravel()[self._sides_of_tables] = by_table.reshape(-1, 3)
+        by_place = tables.unscaled(by_place)
+        # Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
+        for c, (known, point, corner) in enumerate(self._own_corners()):
+            np.add.at(by_point, (point, corner), by_place[known, c])
+        return by_side, by_point
 
     @cached_property
-    def _merged(self) -> Merged | None:
-        """The change that removed faces which were there twice; None if there were none."""
-        history = self._faces.history
-        return history[0] if history and isinstance(history[0], Merged) else None
+    def _sides_of_tables(self) -> IntArray:
+        """The place of each side (t, 3) of the tables' triangles among those (m, 3) of the faces that the user gave."""
+        face, history = self._tables.face, self._faces.history
+        sides = 3 * face[:, None] + np.arange(3)
+        if history and isinstance(history[0], Merged):  # faces that were there twice
+            which = np.unique(history[0].face, return_index=True)[1][face, None]
+            np.put_along_axis(sides, history[0].corner[which[:, 0]], 3 * which + np.arange(3), axis=1)
+        return sides
+
+    def _own_corners(self) -> list[tuple[BoolArray, IntArray, IntArray]]:
+        """For each corner of the places' triangles: whether the point's own face has it, the point, the corner."""
+        places = self._places
+        F = self._faces.F[self._tables.face[places.faces]]
+        own = self._F[self._sources.points.faces[places.point]]
+        same = [own == F[:, [c]] for c in range(3)]
+        known = [at.any(axis=1) for at in same]
+        return [(k, places.point[k], at.argmax(axis=1)[k]) for at, k in zip(same, known, strict=True)]
+
+    def _summed(self, by_side: FloatArray, moves: FloatArray, change: FloatArray) -> FloatArray:
+        """Changes (n,) of distances when sides and places change, and offsets of sources, in the unit of the tables."""
+        tables = self._tables
+        kernels.push_forward(*self._paths, tables.scaled(by_side).ravel(), moves, change)
+        return tables.unscaled(change[tables.number])
 
 
 def require_differentiable(domain: Mesh | PointCloud | Operators, sources: SourceSet) -> None:
@@ -241,71 +270,3 @@ def require_differentiable(domain: Mesh | PointCloud | Operators, sources: Sourc
         raise ValueError(
             "derivatives are there for vertices and points, and a curve is among the sources: place points on it"
         )
-
-
-class PathLengths:
-    """Distances as lengths of paths: one answer of exact windows from vertices and points in the faces of the mesh.
-
-    A path is known by the last vertex or source point before each vertex, from which a straight line leads to it; up to
-    there it is the path of that vertex. The surface was made from the triangulation.
-    """
-
-    def __init__(self, surface: ExactSurface, triangulation: IntrinsicTriangulation, sources: SourceSet) -> None:
-        self._points = sources.points
-        self.triangulation, self._tables = triangulation, surface.tables
-        done = search(surface.tables, sources)
-        found, starts = done.found, done.starts
-        order = np.argsort(found.distance, kind="stable")
-        self._places, self._arguments = starts.points, (surface.tables, found, starts, order)
-
-    def pull_back(self, g: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-        """The derivative of the sum of distances times g (n,), by sides and places.
-
-        It is (m, 3) by the length of the side opposite each corner of the triangulation; an edge of two faces changes
-        both of its sides. By the coordinates of each source point it is (p, 3), up to a constant in each row; None
-        without points.
-        """
-        tables, e = self._tables, len(self._places.faces)
-        weight, by_table, by_place = np.zeros(tables.n + e), np.zeros(len(tables.edges.length)), np.zeros((e, 3))
-        weight[tables.number] = g
-        kernels.pull_back(*self._arguments, weight, by_table, by_place)
-        by_side = np.zeros(self.triangulation.l.shape)
-        by_side[tables.face] = by_table.reshape(-1, 3)
-        if not len(self._points.faces):
-            return by_side, None
-        by_point, by_place = np.zeros((len(self._points.faces), 3)), tables.unscaled(by_place)
-        # Of a point on a side, the triangle on the other side has a copy: it knows the derivative along the side alone.
-        for c, (known, point, corner) in enumerate(self._own_corners()):
-            np.add.at(by_point, (point, corner), by_place[known, c])
-        return by_side, by_point
-
-    def _own_corners(self) -> list[tuple[BoolArray, IntArray, IntArray]]:
-        """For each corner of the places' triangles: whether the point's own triangle has it, the point, the corner."""
-        places, points = self._places, self._points
-        F = self.triangulation.F[self._tables.face[places.faces]]
-        own_faces, _ = self.triangulation.locate(points.faces, points.barycentric)
-        own = self.triangulation.F[own_faces[places.point]]
-        same = [own == F[:, [c]] for c in range(3)]
-        known = [at.any(axis=1) for at in same]
-        return [(k, places.point[k], at.argmax(axis=1)[k]) for at, k in zip(same, known, strict=True)]
-
-    def push_forward(self, by_side: FloatArray, by_point: FloatArray) -> FloatArray:
-        """How the distances (n,) change with sides (m, 3) and places (p, 3) of points in the triangulation."""
-        moves = np.zeros((len(self._places.faces), 3))
-        for c, (known, point, corner) in enumerate(self._own_corners()):
-            moves[known, c] = by_point[point, corner]
-        return self._summed(by_side, moves, np.zeros(self._tables.n + len(moves)))
-
-    def lengths(self) -> FloatArray:
-        """Distances (n,) summed along the paths; 0 where there is none."""
-        # A line is homogeneous in the sides (Euler); to it comes the distance at which the source starts.
-        tables, found, starts, _ = self._arguments
-        begin = np.where(found.root == np.arange(tables.n), found.distance, 0.0)
-        moves = np.zeros((len(self._places.faces), 3))
-        return self._summed(self.triangulation.l, moves, np.concatenate([begin, starts.point_offset]))
-
-    def _summed(self, by_side: FloatArray, moves: FloatArray, change: FloatArray) -> FloatArray:
-        """Changes (n,) of distances when sides and places change, and offsets of sources, in the unit of the tables."""
-        tables = self._tables
-        kernels.push_forward(*self._arguments, tables.scaled(by_side[tables.face]).ravel(), moves, change)
-        return tables.unscaled(change[tables.number])
