@@ -63,7 +63,7 @@ class BatchedSolver(ABC):
 
     @property
     def n_vertices(self) -> int:
-        """Length of a distance array."""
+        """Length of a distance array: the vertices of the mesh. The operators of a solver by heat may have more."""
         domain = self._domain
         return domain.n_given if isinstance(domain, Operators) else domain.n_vertices
 

@@ -244,14 +244,16 @@ class Comparisons:
 class Checker:
     """Checks answers on one domain.
 
-    Straight lines need positions V (n, 3) of the given vertices, or `Operators.simplices`.
+    Straight lines need positions V (n, 3) of the given vertices, or `Operators.simplices`. If it `holds` answers, those
+    that violate bounds are moved inside. A field of length 1 is the paper's method, and a time step or a boundary that
+    was asked for has a purpose: their answers are left as they are.
     """
 
-    def __init__(self, domain: Operators, V: FloatArray | None) -> None:
+    def __init__(self, domain: Operators, V: FloatArray | None, holds: bool) -> None:
         surface, simplices, referenced = domain.source_surface, domain.simplices, domain.referenced[: domain.n_given]
         if V is None and simplices is not None:
             V = simplices.least * simplices.place
-        self._V = None if V is None else np.ascontiguousarray(V, np.float64)
+        self._V, self._holds = None if V is None else np.ascontiguousarray(V, np.float64), holds
         self._surface, self._F = surface, None if surface is None else surface.given_faces
         self._referenced, self._uses_all = referenced, bool(referenced.all())
         self._vertices = _sample(np.flatnonzero(referenced), _MOST_VERTICES)
@@ -265,11 +267,11 @@ class Checker:
             ends, length = _sample(pairs, _MOST_EDGES), _sample(lengths, _MOST_EDGES)
         self._edges = checking.EdgePaths(ends.astype(np.int32), length, domain.n)
 
-    def check(self, distance: FloatArray, sources: SourceSet, holds: bool) -> AnswerCheck:
+    def check(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck:
         """Check one answer (n,). A FactorizationError where it is no number.
 
-        If it `holds`, move the answer inside the bounds that it violates, in place: its mean error falls by a third on
-        shapes on which heat is poor. Of many sources, straight lines are only taken where the answer is far below them:
+        If answers are held, this one is moved in place: the mean error falls by a third on shapes on which heat is
+        poor. Of many sources, straight lines are only taken where the answer is far below them:
         it takes a while to find the nearest source of every vertex.
         """
         if np.isnan(distance.max(initial=0.0)):
@@ -285,10 +287,10 @@ class Checker:
             step = len(self._vertices) * len(places[0]) // _MOST_LINES + 1
             shortfall, most, shortest, farthest = checking.shortfall(distance, self._vertices, step, self._V, *places)
             largest = most / farthest if farthest > 0 else 0.0
-        if holds and self._surface is not None:
+        if self._holds and self._surface is not None:
             self._surface.paths.shorten(distance, share=_STEEP)
         is_worth_it = shortfall > _RAISED or len(sources.offsets) <= _VERY_FEW_SOURCES
-        raised = holds and is_worth_it and raise_to_lines(distance, self._V, self._F, sources)
+        raised = self._holds and is_worth_it and raise_to_lines(distance, self._V, self._F, sources)
         return AnswerCheck(shortfall, largest, shortest, steepness, steepest, raised)
 
 

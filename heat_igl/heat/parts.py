@@ -252,7 +252,6 @@ class SolverParts:
     fitted: bool
     checker: Checker
     comparisons: Comparisons | None
-    is_default: bool
     plan: Plan
     diagnostics: Diagnostics
 
@@ -336,8 +335,7 @@ def prepare(
         time_steps=np.broadcast_to(step, domain.n_components),
         t_damping=t_damping,
         fitted=fitted,
-        checker=Checker(domain, V),
-        is_default=options.holds_to_bounds,
+        checker=Checker(domain, V, options.holds_to_bounds),
         comparisons=Comparisons(domain) if is_comparable and options.holds_to_bounds else None,
         plan=heat_plan(domain.n_given, domain.n, domain.is_surface, diagnostics.t, domain.mean_edge_length),
         diagnostics=diagnostics,

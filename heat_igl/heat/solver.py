@@ -213,11 +213,6 @@ class HeatMethodSolver(BatchedSolver):
         return replace(self._parts.diagnostics, compared=None if comparisons is None else comparisons.worst)
 
     @property
-    def n_vertices(self) -> int:
-        """Length of a distance array: the vertices of the mesh. The operators may have more."""
-        return self._parts.operators.n_given
-
-    @property
     def _n_faces(self) -> int:
         return len(self._parts.operators.weights)
 
@@ -228,7 +223,7 @@ class HeatMethodSolver(BatchedSolver):
         if part is not None and faces is not None:
             faces = part.whole
         mesh = self._domain if isinstance(self._domain, Mesh) and part is None and faces is not None else None
-        chosen = source_set(sources, self.n_vertices, faces, mesh, part=part, originals=self._originals)
+        chosen = source_set(sources, self.operators.n_given, faces, mesh, part=part, originals=self._originals)
         return require_resolved(chosen, self._parts.operators.mean_edge_length)
 
     def _answers(
@@ -238,18 +233,8 @@ class HeatMethodSolver(BatchedSolver):
         threads: int = 1,  # noqa: ARG002 - the linear solver's
     ) -> tuple[FloatArray, list[AnswerCheck]]:
         """Distances (k, n) from k sets of sources, and by how much they left bounds: the method from end to end."""
-        terms = self._source_terms(source_sets)
-        distances = self._distances_from_heat(terms, self._heat(terms))
-        checks = [self._checked(*pair) for pair in zip(distances, source_sets, strict=True)]
+        *_, distances, checks = self._solved(source_sets)
         return self._with_copies(distances), checks
-
-    def _checked(self, distance: FloatArray, sources: SourceSet) -> AnswerCheck:
-        """Check one answer (n,), and move it inside the bounds that it violates.
-
-        A field of length 1 is the paper's method, and a time step or a boundary that was asked for has a purpose: their
-        answers are left as they are.
-        """
-        return self._parts.checker.check(distance, sources, holds=self._parts.is_default)
 
     def _compared(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck) -> AnswerCheck:
         """The check of an answer (n,), which is compared with another engine where it may be wrong."""
@@ -262,18 +247,13 @@ class HeatMethodSolver(BatchedSolver):
     def _complaint(self, distance: FloatArray, sources: SourceSet, check: AnswerCheck | None) -> str | None:
         return check and self._compared(distance, sources, check).complaint(self.operators.is_surface)
 
-    def _source_terms(self, source_sets: list[SourceSet]) -> list[SourceTerm]:
-        """Initial heat of each set, and what is known near it."""
-        terms = [self._parts.assembler.term(sources) for sources in source_sets]
-        return [drop_overtaken(term, self._parts.heat_flow, self.operators.n) for term in terms]
-
-    def _heat(self, terms: list[SourceTerm]) -> FloatArray:
-        """Heat at all vertices of the operators, for k terms: step 1."""
-        return self._parts.heat_flow.solve(right_hand_side(self.operators.n, terms))
-
-    def _distances_from_heat(self, terms: list[SourceTerm], u: FloatArray) -> FloatArray:
-        """Distances (k, n) from the heat of `_heat`: steps 2 and 3."""
+    def _solved(
+        self, source_sets: list[SourceSet]
+    ) -> tuple[list[SourceTerm], FloatArray, FloatArray, list[AnswerCheck]]:
+        """Of k sets, initial heat and what is known near it, heat (n, k), distances (k, n), and checks of these."""
         parts, domain = self._parts, self.operators
+        terms = [drop_overtaken(parts.assembler.term(each), parts.heat_flow, domain.n) for each in source_sets]
+        u = parts.heat_flow.solve(right_hand_side(domain.n, terms))
         if any(term.seen.any() for term in terms):
             X, magnitude = _damped_field(parts, terms, u)
             divergence = np.asarray(domain.D @ (X * np.tile(magnitude, (domain.dimension, 1))))
@@ -287,7 +267,8 @@ class HeatMethodSolver(BatchedSolver):
         distances = np.ascontiguousarray(phi.T)
         for term, distance, of_term in zip(terms, distances, u.T, strict=True):
             _pin_level(parts, term, distance, of_term)
-        return distances[:, : self.n_vertices]
+        distances = distances[:, : domain.n_given]
+        return terms, u, distances, [parts.checker.check(*each) for each in zip(distances, source_sets, strict=True)]
 
     @names_guessed
     def voronoi(self, sources: Sources, *, cutoff: float | None = None) -> LabelledDistance:
@@ -298,10 +279,9 @@ class HeatMethodSolver(BatchedSolver):
         """
         limit = checked_cutoff(cutoff)
         chosen = self._source_set(sources)
-        terms = self._source_terms([chosen])
-        distance = self._distances_from_heat(terms, self._heat(terms))[0]
-        labels = warmest_sources(terms[0], self._parts.heat_flow, self.operators.n)[: self.n_vertices]
-        warn_of(self._complaint(distance, chosen, self._checked(distance, chosen)))
+        (term,), _, (distance,), (check,) = self._solved([chosen])
+        labels = warmest_sources(term, self._parts.heat_flow, self.operators.n)[: self.n_vertices]
+        warn_of(self._complaint(distance, chosen, check))
         distance = self._with_copies(distance)
         distance[distance > limit] = np.inf
         labels = self._with_copies(labels)
@@ -311,11 +291,9 @@ class HeatMethodSolver(BatchedSolver):
     def solve(self, sources: Sources) -> HeatSolution:
         """All three steps from `sources`, for a closer look; arguments and errors as for `distance`."""
         chosen = self._source_set(sources)
-        terms = self._source_terms([chosen])
-        u = self._heat(terms)
+        terms, u, (distance,), (check,) = self._solved([chosen])
         X, magnitude = _damped_field(self._parts, terms, u)
-        distance = self._distances_from_heat(terms, u)[0]
-        check = self._compared(distance, chosen, self._checked(distance, chosen))
+        check = self._compared(distance, chosen, check)
         warn_of(check.complaint(self.operators.is_surface))
         with np.errstate(under="ignore"):
             heat = (u[:, 0] / terms[0].unit / self._parts.heat_flow.mean_mass)[: self.n_vertices]

@@ -351,16 +351,13 @@ def damping(
         Factor of X on each face, between 0 and 1; 1 if u is not positive. On faces with a corner on the boundary, which
         mirrors the front if it is insulated, a slower rate is enough, and the factor is 1 if the flow is not `fitted`.
     """
-    return _share_of_rate(operators, u, lowest_full_rate(operators, t, fitted, full_rate))
-
-
-def _share_of_rate(operators: Operators, u: FloatArray, full_rate: FloatArray) -> FloatArray:
-    """|grad log u| over `full_rate` (m,), 1 if it is more, `full_rate` is 0 or u is not positive."""
+    lowest = lowest_full_rate(operators, t, fitted, full_rate)
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = operators.gradient_rows @ np.log(u)
         components = gradient.reshape(operators.dimension, len(operators.weights), *u.shape[1:])
         rate = np.sqrt(np.einsum("k...,k...->...", components, components))
-        share = (rate.T / full_rate).T
+        share = (rate.T / lowest).T
+    # 1 also if the lowest rate is 0, or u is not positive.
     return np.asarray(np.where(share < 1, share, 1.0))
 
 
@@ -406,11 +403,11 @@ class NormalizedDivergence:
         fitted: bool = False,
     ) -> None:
         self._arguments = operators, t, order, fitted
-        self._full_rate = np.zeros(len(operators.weights)) if t is None else lowest_full_rate(operators, t, fitted)
         self._tables: tuple[AnyArray, FloatArray] | None = None
         if isinstance(operators.gradient, TriangleElements):
             self._order = np.arange(operators.n) if order is None else order
-            self._tables = _divergence_tables(operators.gradient, operators.weights, self._full_rate, self._order)
+            lowest = np.zeros(len(operators.weights)) if t is None else lowest_full_rate(operators, t, fitted)
+            self._tables = _divergence_tables(operators.gradient, operators.weights, lowest, self._order)
         else:
             _ = operators.D  # made on first use otherwise, in the middle of the first query
 
@@ -429,7 +426,7 @@ class NormalizedDivergence:
             column = np.ascontiguousarray(column)
             X = normalize(operators, column, fitted)
             if t is not None:
-                X *= np.tile(_share_of_rate(operators, column, self._full_rate), operators.dimension)
+                X *= np.tile(damping(operators, column, t, fitted=fitted), operators.dimension)
             of_column[:] = operators.D @ X
         return divergence
 
