@@ -11,17 +11,17 @@ import io
 import re
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from heat_igl.errors import MeshError, MissingExtraError
-from heat_igl.io.contents import Cells, Contents, check, numbered, select
+from heat_igl.io.contents import Cells, Contents, Text, check, integers, numbered, ragged, select
 from heat_igl.io.storage import form_suffix
 from heat_igl.mesh import Mesh
-from heat_igl.typing import FloatArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 _FACET = re.compile(
     rb"\s*facet\s+normal(?:[ \t]+\S+){3}\s+outer\s+loop(?:\s+vertex(?:[ \t]+\S+){3}[ \t\r]*\n){3}\s*endloop\s+endfacet"
@@ -31,6 +31,7 @@ _BINARY_STL = 84, 50  # bytes of the header, and of a triangle
 _CORNERS = {15: 1, 1: 2, 8: 3, 2: 3, 3: 4, 4: 4}
 # 800 MB in meshio's tables.
 _LARGEST_NODE = 10**8
+_DAMAGED = ": the file is cut short or damaged, or its counts are wrong"
 
 
 def _stl(path: Path, data: bytes) -> bytes:
@@ -75,90 +76,84 @@ def _msh(path: Path, data: bytes) -> bytes:
             raise MeshError(f"{path}: ${name.decode()} is missing or has no end: the file is cut short, or no MSH file")
         parts.append(part)
     form = re.match(rb"\$MeshFormat\s+(2|4)\S*\s+0\b", parts[0][0])
-    if form:
-        for part in parts[1:]:
-            line = data.count(b"\n", 0, part.start()) + 1
-            rows = _Rows(path, [(i, row) for i, row in enumerate(part[0].splitlines(), line) if row.strip()][1:-1])
-            (_check_version_2 if form[1] == b"2" else _check_version_4)(rows, part is parts[1])
-            rows.end()
+    for part in parts[1:] if form else ():
+        # Line breaks replace what is above, so that errors give the right line numbers.
+        text = Text(path, b"\n" * data.count(b"\n", 0, part.start()) + part[0])
+        check_part = _check_version_2 if form and form[1] == b"2" else _check_version_4
+        end = check_part(text, part is parts[1])
+        if end < len(text) - 1:
+            raise text.error(end, f"more lines than announced, from here on{_DAMAGED}")
     # Without data of nodes and elements, which are not used, and which meshio does not always read.
     return b"\n".join([*(part[0] for part in parts), b""])
 
 
-class _Rows:
-    """The lines of a section of a text file in MSH: meshio takes lines of any length, and any number of them."""
-
-    def __init__(self, path: Path, rows: list[tuple[int, bytes]]) -> None:
-        self._path, self._rows, self._at = path, rows, 0
-
-    def line(self, width: int = 0) -> list[bytes]:
-        """The numbers of the next line, `width` if that is given."""
-        if self._at == len(self._rows):
-            self.fail("fewer lines follow than announced")
-        self._at += 1
-        tokens = self._rows[self._at - 1][1].split()
-        if width and len(tokens) != width:
-            self.fail(f"expected {width} numbers")
-        return tokens
-
-    def whole(self, width: int = 0) -> list[int]:
-        """The same for whole numbers."""
-        tokens = self.line(width)
-        if not all(re.fullmatch(rb"-?\d{1,18}", token) for token in tokens):
-            self.fail("expected whole numbers")
-        return [int(token) for token in tokens]
-
-    def nodes(self, numbers: Sequence[int]) -> None:
-        """Check numbers of nodes: meshio takes 0 for the last one, and tables as long as the largest number."""
-        for number in numbers:
-            if not 0 < number <= _LARGEST_NODE:
-                self.fail(f"node number {number}, but they run from 1 to {_LARGEST_NODE}: renumber them in Gmsh")
-
-    def end(self) -> None:
-        """Check that no line is left."""
-        if self._at < len(self._rows):
-            self._at += 1
-            self.fail("more lines than announced, from here on")
-
-    def fail(self, message: str) -> NoReturn:
-        i, row = self._rows[max(self._at - 1, 0)] if self._rows else (0, b"")
-        shown = row.strip()[:60].decode("utf-8", "backslashreplace")
-        raise MeshError(
-            f"{self._path}, line {i} ({shown}): {message}: the file is cut short or damaged, or its counts are wrong"
-        )
+def _announced(text: Text, first: int, n: int) -> IntArray:
+    """The `n` lines from `first` on that a section announces; its last line is its end."""
+    if not 0 <= n < len(text) - first:
+        raise text.error(min(first, len(text) - 1), f"fewer lines follow than announced{_DAMAGED}")
+    return np.arange(first, first + n)
 
 
-def _check_version_2(rows: _Rows, is_nodes: bool) -> None:
-    for _ in range(rows.whole(1)[0]):
-        if is_nodes:
-            number = rows.line(4)[0]
-            rows.nodes([int(number) if number.isdigit() else 0])
-        else:
-            element = rows.whole()
-            begin = 3 + element[2] if len(element) > 3 else len(element)
-            if not 3 <= begin < len(element) or len(element) - begin != _CORNERS.get(element[1], len(element) - begin):
-                rows.fail("too many or too few numbers for an element of this type")
-            rows.nodes(element[begin:])
+def _whole(text: Text, lines: IntArray, width: int = 0) -> tuple[IntArray, IntArray]:
+    """The whole numbers in some lines, `width` in each if that is given, and the index of the first of each line."""
+    if width:
+        text.refuse(lines, text.count[lines] != width, f"expected {width} numbers{_DAMAGED}")
+    values, start = text.numbers(lines)
+    owner = np.repeat(lines, text.count[lines])
+    return integers(values, lambda i: text.where(owner[i]), "number"), start
 
 
-def _check_version_4(rows: _Rows, is_nodes: bool) -> None:
-    n_blocks, announced, *_ = rows.whole(4)
-    found = 0
+def _check_nodes(text: Text, lines: IntArray, numbers: AnyArray) -> None:
+    """Check a number of a node in each line: meshio takes 0 for the last one, and tables as long as the largest."""
+    bad = ~((numbers > 0) & (numbers <= _LARGEST_NODE)) | (numbers != np.rint(numbers))
+    found = f"{numbers[np.argmax(bad)]:.15g}" if bad.any() else ""
+    text.refuse(
+        lines, bad, f"node number {found}, but they run from 1 to {_LARGEST_NODE}: renumber them in Gmsh{_DAMAGED}"
+    )
+
+
+def _check_elements(text: Text, lines: IntArray, values: IntArray, nodes: IntArray, kinds: IntArray) -> None:
+    """Check elements of some types, one in each line, whose nodes are the `values` from the index `nodes` (k,) on."""
+    corners = np.cumsum(text.count[lines]) - nodes
+    expected = [_CORNERS.get(kind, max(k, 1)) for kind, k in zip(kinds.tolist(), corners.tolist(), strict=True)]
+    text.refuse(lines, corners != expected, f"too many or too few numbers for an element of this type{_DAMAGED}")
+    _check_nodes(text, np.repeat(lines, corners), values[ragged(nodes, corners)])
+
+
+def _check_version_2(text: Text, is_nodes: bool) -> int:
+    """Check a section, and return the line after all that it announces."""
+    lines = _announced(text, 2, int(_whole(text, np.array([1]), 1)[0][0]))
+    if is_nodes:
+        text.refuse(lines, text.count[lines] != 4, f"expected 4 numbers{_DAMAGED}")
+        _check_nodes(text, lines, text.numbers(lines)[0][::4])
+    else:
+        values, start = _whole(text, lines)
+        text.refuse(lines, text.count[lines] < 4, f"too few numbers for an element{_DAMAGED}")
+        n_tags = np.maximum(values[start + 2], 0)
+        _check_elements(text, lines, values, start + 3 + n_tags, values[start + 1])
+    return 2 + len(lines)
+
+
+def _check_version_4(text: Text, is_nodes: bool) -> int:
+    """As `_check_version_2`, for lines in blocks."""
+    n_blocks, announced, *_ = _whole(text, np.array([1]), 4)[0].tolist()
+    at, found = 2, 0
     for _ in range(n_blocks):
-        *_, kind, n = rows.whole(4)  # kind: of elements; of nodes, whether they have parameters
-        found += n
-        for _ in range(n):
-            if is_nodes:
-                rows.nodes(rows.whole(1))
-            else:
-                element = rows.whole()
-                if len(element) != 1 + _CORNERS.get(kind, len(element) - 1):
-                    rows.fail("too many or too few numbers for an element of this type")
-                rows.nodes(element[1:])
-        for _ in range(n if is_nodes else 0):
-            rows.line(0 if kind else 3)
+        # The kind is that of the elements; of nodes, whether they have parameters.
+        *_, kind, n = _whole(text, np.array([at]), 4)[0].tolist()
+        lines = _announced(text, at + 1, n)
+        found, at = found + n, at + 1 + n
+        if is_nodes:
+            _check_nodes(text, lines, _whole(text, lines, 1)[0])
+            lines = _announced(text, at, n)
+            at += n
+            text.refuse(lines, (text.count[lines] != 3) & (not kind), f"expected 3 numbers{_DAMAGED}")
+        else:
+            values, start = _whole(text, lines)
+            _check_elements(text, lines, values, start + 1, np.full(n, kind))
     if found != announced:
-        rows.fail(f"{announced} rows are announced at the beginning, but {found} in the blocks")
+        raise text.error(1, f"{announced} rows are announced at the beginning, but {found} in the blocks{_DAMAGED}")
+    return at
 
 
 def _vtu(path: Path, data: bytes) -> bytes:
