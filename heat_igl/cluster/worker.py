@@ -10,7 +10,6 @@ import hashlib
 import os
 import threading
 import time
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -23,13 +22,13 @@ import numpy as np
 import heat_igl
 from heat_igl.cluster.collection import Item, SourcePlan
 from heat_igl.cluster.store import MeshGroup, Store, rows_per_block
-from heat_igl.errors import AccuracyWarning, BatchError
+from heat_igl.errors import BatchError
 from heat_igl.geodesic import DistanceMethod, Solver, SolverChoice
 from heat_igl.heat import HeatMethodSolver
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.linear.backends import factor_bytes
 from heat_igl.mesh import Mesh, PointCloud
-from heat_igl.runtime import release_free_memory
+from heat_igl.runtime import held_warnings, release_free_memory
 from heat_igl.sampling import farthest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import IntArray
@@ -325,14 +324,13 @@ def _solve(
     for block in blocks:
         start = time.perf_counter()
         rows = group.rows(block)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", AccuracyWarning)
+        with held_warnings() as held:
             distances = solver.distances(source_sets[rows]) / unit
         largest = np.max(distances, where=np.isfinite(distances), initial=0)
         if largest > np.finfo(task.dtype).max:
             raise ValueError(f"distances up to {largest:.4g} are no {task.dtype}: normalize them, or take float32")
         group.write(block, distances.astype(task.dtype, copy=False))
-        messages = sorted({str(warning.message) for warning in caught})
+        messages = sorted({message for message, _ in held})
         _send("block", task, block=block, seconds=time.perf_counter() - start, warnings=messages)
 
 

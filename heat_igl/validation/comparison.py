@@ -30,7 +30,6 @@ from heat_igl.runtime import PeakMemory
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
 from heat_igl.validation import metrics
-from heat_igl.validation.metrics import BoundViolations
 from heat_igl.validation.report import ValidationReport, ValidationRow
 
 Progress = Callable[[str, int, int], None]
@@ -225,7 +224,7 @@ def validate(
     except ReferenceSolverError as error:
         # The rest of the report needs no reference.
         label, truths, known, failure = str(reference), None, None, str(error)
-    limits = [(straight_lines(mesh, sources), edge_paths(mesh, sources)) for sources in sets]
+    limits = [np.stack([bound(mesh, sources) for sources in sets]) for bound in (straight_lines, edge_paths)]
     rows, distances = [], {}
     for i, (method, prepare) in enumerate(chosen, start=int(reference is not None)):
         done = i * len(sets)
@@ -295,16 +294,12 @@ def _row(
     label: str,
     distances: FloatArray,
     truths: FloatArray | None,
-    limits: list[tuple[FloatArray, FloatArray]],
+    limits: list[FloatArray],
     cost: Mapping[str, Any],
 ) -> ValidationRow:
     residuals = np.stack([metrics.eikonal_residual(mesh, distance) for distance in distances])
     known = np.isfinite(residuals)
     weights = np.broadcast_to(mesh.measures, residuals.shape)[known]
-    checks = [
-        metrics.bound_violations(mesh, d, sources, pair)
-        for d, sources, pair in zip(distances, sets, limits, strict=True)
-    ]
     asymmetry = triangle = None
     if len(sets) > 1 and all(len(sources) == 1 for sources in sets):
         single = np.array([sources[0] for sources in sets])
@@ -317,12 +312,7 @@ def _row(
         label,
         errors=None if truths is None else metrics.error_summary(mesh, distances, truths, sets),
         eikonal=float(residuals[known] @ weights / weights.sum()) if len(weights) else None,
-        bounds=BoundViolations(
-            sum(check.n_below for check in checks),
-            sum(check.n_above for check in checks),
-            max(check.largest_below for check in checks),
-            max(check.largest_above for check in checks),
-        ),
+        bounds=metrics.beyond(distances, *limits),
         asymmetry=asymmetry,
         triangle_excess=triangle,
         **cost,

@@ -234,17 +234,17 @@ def triangle_violations(distances: ArrayLike, sources: ArrayLike) -> TriangleVio
     return TriangleViolations(count, count / max(n_tried, 1), largest)
 
 
-def bound_violations(
-    mesh: MeshLike, distance: ArrayLike, sources: Sources, limits: tuple[FloatArray, FloatArray] | None = None
-) -> BoundViolations:
+def bound_violations(mesh: MeshLike, distance: ArrayLike, sources: Sources) -> BoundViolations:
     """Check a distance (n,) against the straight line from below and paths along edges from above.
 
-    Vertices at which it is not finite are left out. The `limits` are `straight_lines` and `edge_paths` from these
-    sources, if they are known already.
+    Vertices at which it is not finite are left out.
     """
     mesh = as_simplices(mesh)
-    d = np.asarray(distance, dtype=np.float64)
-    lower, upper = limits or (straight_lines(mesh, sources), edge_paths(mesh, sources))
+    return beyond(np.asarray(distance, dtype=np.float64), straight_lines(mesh, sources), edge_paths(mesh, sources))
+
+
+def beyond(d: FloatArray, lower: FloatArray, upper: FloatArray) -> BoundViolations:
+    """The violations of bounds by distances, all of one shape."""
     inside = np.isfinite(d) & np.isfinite(upper) & (upper > 0)
     d, lower, upper = d[inside], lower[inside], upper[inside]
     # Two vertices in one place: the straight line is 0 and cannot be undercut.
