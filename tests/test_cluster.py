@@ -215,7 +215,7 @@ def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
     (item,) = items({"fan": FAN})
     task = Task(item, tmp_path / "elsewhere", SourcePlan.of("all"), "float32", False, {})
     with pytest.raises(BatchError, match=r"a worker cannot open store .*elsewhere.* Name a folder that .* share"):
-        work([task])
+        work(task)
 
 
 WORKERS = """
@@ -447,20 +447,17 @@ def test_killed_processes_lose_nothing_and_repeat_nothing(processes, tmp_path):
         np.testing.assert_array_equal(got, expected(mesh, range(256)))
 
 
-def test_a_bundle_that_kills_its_workers_is_handed_out_again_mesh_by_mesh():
-    """So that only the mesh to blame ends in the report."""
+def test_a_mesh_that_kills_its_workers_is_a_row():
     from distributed import Future, KilledWorker
 
     from heat_igl.cluster import batch
 
-    future = Mock(spec=Future)
+    future, task = Mock(spec=Future), Mock()
     future.result.side_effect = KilledWorker("task", None, 3)
     run = batch._Run(Mock(), Mock(), Mock())
-    tasks = [Mock(), Mock(), Mock()]
-    left = run._collect(future, tasks)
-    assert left == [[task] for task in tasks]
-    assert not run._collect(future, left[1])
-    assert run._reason == {tasks[1].item.name: "the workers that tried it died: out of memory, or a crash in a library"}
+    assert not run._collect(future, task)
+    reason = "the workers that tried it died: out of memory, or a crash in a library"
+    run._store.fail.assert_called_once_with(task.item.name, task.item.label, reason)
 
 
 def test_a_data_set_is_symmetric_normalized_and_exact(client, tmp_path, capsys, monkeypatch):

@@ -1,4 +1,4 @@
-"""The client's side of a batch: submit bundles of tasks, a few more than threads, until every mesh is done.
+"""The client's side of a batch: submit tasks, a few more than threads, until every mesh is done.
 
 Reports of workers go into the log and onto progress bars.
 """
@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +33,8 @@ DTYPES = ("float16", "float32", "float64")
 
 _CLUSTER_LOST = "the cluster is lost; what is finished stays in the store: run the same again to go on"
 
-# Bundles submitted beyond the number of threads, so that no thread waits for the client.
-_BUNDLES_AHEAD = 2
-# Most meshes of one bundle. On small meshes the overhead of Dask for each task is about a tenth of the work.
-_BUNDLE_SIZE = 4
+# Tasks submitted beyond the number of threads, so that no thread waits for the client.
+_TASKS_AHEAD = 2
 
 
 def distances(
@@ -169,21 +168,8 @@ def watched(client: Any, n_meshes: int, progress: bool) -> Iterator[Watch]:
                 client.unsubscribe_topic(TOPIC)
 
 
-# Tasks that a worker does one after the other, by one call.
-TaskBundle = Sequence[Task]
-
-
-def _bundles(tasks: Sequence[Task], at_once: int) -> Iterator[TaskBundle]:
-    """All meshes to begin, in bundles that become smaller towards the end, so that all workers finish together."""
-    start = 0
-    while start < len(tasks):
-        k = max(1, min(_BUNDLE_SIZE, (len(tasks) - start) // (2 * at_once)))
-        yield tasks[start : start + k]
-        start += k
-
-
 class _Run:
-    """The bundles that are running, and the number of tasks that each mesh still needs."""
+    """The tasks that are running, and the number of tasks that each mesh still needs."""
 
     def __init__(self, client: Any, store: Store, watch: Watch) -> None:
         self._client = client
@@ -191,28 +177,26 @@ class _Run:
         self._watch = watch
         self._tasks_left: dict[str, int] = {}
         self._reason: dict[str, str] = {}
-        self._priority = 0
 
     def all(self, tasks: Sequence[Task]) -> None:
         """Run all tasks, and those that they leave behind; raises `BatchError` if the store or the cluster is lost."""
         _, distributed = dask_modules()
-        waiting: deque[TaskBundle] = deque()
-        running: dict[Any, TaskBundle] = {}
+        waiting = deque(tasks)
+        running: dict[Any, Task] = {}
+        begun = count()
         try:
-            waiting.extend(_bundles(tasks, self._n_threads() + _BUNDLES_AHEAD))
             while waiting or running:
-                most = self._n_threads() + _BUNDLES_AHEAD
+                most = sum(self._client.nthreads().values()) + _TASKS_AHEAD
                 while waiting and len(running) < most:
-                    bundle = waiting.popleft()
-                    self._priority -= 1
+                    task = waiting.popleft()
                     # Not pure: a task writes to the store, which the arguments do not show.
-                    future = self._client.submit(work, bundle, pure=False, priority=self._priority)
-                    running[future] = bundle
+                    running[self._client.submit(work, task, pure=False, priority=-next(begun))] = task
                 with contextlib.suppress(distributed.TimeoutError):
                     distributed.wait(list(running), timeout=1, return_when="FIRST_COMPLETED")
                 if self._client.status != "running":
                     raise BatchError(_CLUSTER_LOST)
                 for future in [future for future in running if future.done()]:
+                    # Blocks of meshes that were begun come first, since a worker has the solver.
                     waiting.extendleft(reversed(self._collect(future, running.pop(future))))
         except (OSError, distributed.CancelledError) as error:
             raise BatchError(f"{_CLUSTER_LOST} ({error or type(error).__name__})") from None
@@ -221,30 +205,13 @@ class _Run:
                 self._client.cancel(list(running), force=True)
                 self._client.run(release)
 
-    def _n_threads(self) -> int:
-        return sum(self._client.nthreads().values())
-
-    def _collect(self, future: Any, bundle: TaskBundle) -> list[TaskBundle]:
-        """Record the outcomes of a bundle; returns the bundles that it leaves.
-
-        Blocks of meshes that were begun come first, since a worker has the solver.
-        """
+    def _collect(self, future: Any, task: Task) -> list[Task]:
+        """Record the outcome of a task, and of its mesh if this was the last task; returns the tasks still to do."""
         _, distributed = dask_modules()
         try:
-            outcomes: list[Outcome] = future.result()
+            outcome: Outcome = future.result()
         except distributed.KilledWorker:
-            if len(bundle) > 1:
-                # One of the tasks kills workers. Alone it will do so again, and the others succeed.
-                return [[task] for task in bundle]
-            reason = "the workers that tried it died: out of memory, or a crash in a library"
-            outcomes = [Outcome(bundle[0].item.name, reason=reason)]
-        done = zip(bundle, outcomes, strict=False)
-        left: list[TaskBundle] = [[rest] for task, outcome in done for rest in self._record(task, outcome)]
-        others = bundle[len(outcomes) :]
-        return [*left, others] if others else left
-
-    def _record(self, task: Task, outcome: Outcome) -> list[Task]:
-        """Record the outcome of a task, and of its mesh if this was the last task; returns the tasks still to do."""
+            outcome = Outcome(reason="the workers that tried it died: out of memory, or a crash in a library")
         name = task.item.name
         remaining = [replace(task, blocks=blocks) for blocks in outcome.remaining]
         self._tasks_left[name] = self._tasks_left.get(name, 1) - 1 + len(remaining)

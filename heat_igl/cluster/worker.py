@@ -168,30 +168,22 @@ class Task:
 class Outcome:
     """The result of a task: the blocks that are left for other tasks, or the reason why there are no distances."""
 
-    name: str
     remaining: tuple[tuple[int, ...], ...] = ()
     reason: str | None = None
 
 
-def work(tasks: Sequence[Task]) -> list[Outcome]:
-    """Do tasks one after the other, and stop after the first of a mesh with other blocks: this worker has the solver.
-
-    A task without blocks begins a mesh.
-    """
-    store = _opened(tasks[0].store)
-    outcomes = []
-    for task in tasks:
-        try:
-            outcome = _resume(task, store) if task.blocks else _begin(task, store)
-        except BatchError:  # the store is lost
-            raise
-        except Exception as error:  # of this mesh alone
-            outcome = Outcome(task.item.name, reason=_reason(error))
-        outcomes.append(outcome)
-        if task.blocks or outcome.remaining:
-            break
+def work(task: Task) -> Outcome:
+    """Begin a mesh, or solve blocks of one that was begun."""
+    store = _opened(task.store)
+    try:
+        outcome = _resume(task, store) if task.blocks else _begin(task, store)
+    except BatchError:  # the store is lost
+        raise
+    except Exception as error:  # of this mesh alone
+        outcome = Outcome(reason=_reason(error))
+    if not task.blocks and not outcome.remaining:
         _SOLVERS.drop_idle()
-    return outcomes
+    return outcome
 
 
 def release() -> None:
@@ -226,7 +218,7 @@ def _begin(task: Task, store: Store) -> Outcome:
         known = {}
     is_done = known.get("status") == "done" and known["fingerprint"] == fingerprint
     if is_done and not store.group(name).damaged_chunk():
-        return Outcome(name)
+        return Outcome()
     with _SOLVERS.solver(mesh, fingerprint, task.choice) as solver:
         identity = {"fingerprint": fingerprint, **_described(solver)}
         found = _continued(name, store, known, identity)
@@ -239,7 +231,7 @@ def _begin(task: Task, store: Store) -> Outcome:
         _send("begun", task, blocks=sum(map(len, spans)))
         if spans:
             _solve(task, mesh, group, source_sets, solver, spans[0])
-        return Outcome(name, remaining=tuple(spans[1:]))
+        return Outcome(tuple(spans[1:]))
 
 
 def _resume(task: Task, store: Store) -> Outcome:
@@ -251,7 +243,7 @@ def _resume(task: Task, store: Store) -> Outcome:
     group = store.group(task.item.name)
     with _SOLVERS.solver(mesh, fingerprint, task.choice) as solver:
         _solve(task, mesh, group, group.source_sets(), solver, task.blocks)
-    return Outcome(task.item.name)
+    return Outcome()
 
 
 def _continued(
