@@ -160,18 +160,13 @@ def batch(
 
     meshes = cluster.folder(folder, points)
     plan = sources if sources == "all" or sources.startswith("farthest:") else cluster.read_source_sets(sources)
-    options: dict[str, Any] = {
-        "method": method,
-        "tolerance": tolerance,
-        "dtype": dtype,
-        "normalize": normalize,
-        "points": points,
-        "progress": Console(stderr=True).is_terminal,
-    }
     with cluster.connected(scheduler, workers, dashboard) as client, _logged(log):
         if dashboard:
             say(f"dashboard: {client.dashboard_link}")
-        report = cluster.distances(meshes, plan, store, client=client, **options)
+        report = cluster.distances(
+            meshes, plan, store, client=client, method=cast(Any, method), tolerance=tolerance, dtype=dtype,
+            normalize=normalize, points=points, progress=Console(stderr=True).is_terminal,
+        )  # fmt: skip
     _finish(report, json_file)
 
 
@@ -191,13 +186,13 @@ def dataset(
     from heat_igl import cluster
 
     meshes = cluster.folder(folder)
-    options: dict[str, Any] = {"method": "exact", "tolerance": 0, "dtype": dtype, "normalize": normalize}
     store = output / "distances.zarr"
     with cluster.connected(None, workers) as client, _logged(None):
         say(_estimate(client, list(meshes.values()), np.dtype(dtype).itemsize, form))
         report = cluster.distances(
-            meshes, "all", store, client=client, progress=Console(stderr=True).is_terminal, **options
-        )
+            meshes, "all", store, client=client, method="exact", tolerance=0, dtype=dtype, normalize=normalize,
+            progress=Console(stderr=True).is_terminal,
+        )  # fmt: skip
     for row in report.rows if form != "zarr" else ():
         if row.status == "done":
             found = cluster.read_distances(store, row.name)

@@ -7,7 +7,6 @@ while several threads need them.
 from __future__ import annotations
 
 import hashlib
-import os
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +27,7 @@ from heat_igl.heat import HeatMethodSolver
 from heat_igl.io import read_mesh_or_cloud
 from heat_igl.linear.backends import factor_bytes
 from heat_igl.mesh import Mesh, PointCloud
-from heat_igl.runtime import held_warnings, release_free_memory
+from heat_igl.runtime import available_memory, held_warnings, release_free_memory
 from heat_igl.sampling import farthest_points
 from heat_igl.sources import vertex_sources
 from heat_igl.typing import IntArray
@@ -60,14 +59,12 @@ def solver_memory(mesh: Mesh | PointCloud, method: DistanceMethod) -> int:
     return int(factors + _BYTES_PER_VERTEX * n + _BYTES_PER_FACE * m + block)
 
 
-def memory_for_solvers() -> int:
+def memory_for_solvers() -> float:
     """Bytes that the solvers of this worker may take together: the memory limit, less `PROCESS_MEMORY`."""
     from distributed import get_worker
 
-    limit = get_worker().memory_manager.memory_limit
-    physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 8 * 2**30
     # A tenth is left for errors of the estimate.
-    return int(0.9 * (limit or physical)) - PROCESS_MEMORY
+    return 0.9 * (get_worker().memory_manager.memory_limit or available_memory()) - PROCESS_MEMORY
 
 
 @dataclass(eq=False)
@@ -122,7 +119,7 @@ class SolverCache:
             self._highest = 0
             release_free_memory()
 
-    def _reserve(self, key: str, needed: int, limit: int) -> CacheEntry:
+    def _reserve(self, key: str, needed: int, limit: float) -> CacheEntry:
         """Reserve memory: free idle solvers first, then wait for other threads to finish with theirs."""
         if needed > limit:
             raise MemoryError(
