@@ -273,7 +273,9 @@ def test_an_index_out_of_range_takes_nothing_down(function):
     # And if it got past that, it would take the child only.
     options = {"t": None, "intrinsic_delaunay": False} if function == "igl_heat" else {}
     with pytest.raises(ReferenceSolverError, match=f"native:{function} (died with|failed with)"):
-        guarded.call(f"heat_igl.reference.native:{function}", {"V": mesh.V, "F": F, "sources": np.array([0])}, options)
+        guarded.call(
+            f"heat_igl.reference.native:{function}", {"V": mesh.V, "F": F, "sources": np.array([0]), **options}
+        )
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signal.pause")
@@ -288,8 +290,8 @@ def test_a_hang_is_stopped():
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the bound needs Linux")
 def test_memory_is_bounded():
     with pytest.raises(ReferenceSolverError, match=r"numpy:ones needs more than 0\.25 GiB: raise memory"):
-        guarded.call("numpy:ones", {}, {"shape": 2**27}, memory=2**28)
-    assert (guarded.call("numpy:ones", {}, {"shape": 2**27}, memory=2**31).peak_memory or 2**30) > 2**29
+        guarded.call("numpy:ones", {"shape": 2**27}, memory=2**28)
+    assert (guarded.call("numpy:ones", {"shape": 2**27}, memory=2**31).peak_memory or 2**30) > 2**29
     mesh = shapes.icosphere(5)
     with pytest.raises(ReferenceSolverError, match=r"(died with|needs more than).* GiB"):
         reference.exact(mesh, 0, solver="pygeodesic", memory=2**24)

@@ -113,7 +113,7 @@ def _own_mesh(curves: Curves) -> Mesh:
 
 def _plane(mesh: Mesh, path: Path) -> FloatArray:
     """Directions of x and y in the plane of a flat mesh, (2, 3)."""
-    axes, off, extent = _flatness(mesh)
+    axes, off, extent = flatness(mesh)
     if off > _FLAT * extent:
         raise ValueError(
             f"{path}: a drawing needs a flat mesh, and this one reaches {off:.3g} off its plane: pass a projection, "
@@ -122,7 +122,7 @@ def _plane(mesh: Mesh, path: Path) -> FloatArray:
     return np.eye(2, 3) if np.ptp(mesh.V[mesh.referenced, 2]) <= _FLAT * extent else axes[:2]
 
 
-def _flatness(mesh: Mesh) -> tuple[FloatArray, float, float]:
+def flatness(mesh: Mesh) -> tuple[FloatArray, float, float]:
     """The principal axes (3, 3) of the vertices, how far one is off the plane of the first two, and their extent."""
     used = mesh.V[mesh.referenced]
     centred = used - used.mean(axis=0)
@@ -132,7 +132,7 @@ def _flatness(mesh: Mesh) -> tuple[FloatArray, float, float]:
 
 def is_flat(mesh: Mesh) -> bool:
     """Whether all vertices that faces use lie in one plane."""
-    _, off, extent = _flatness(mesh)
+    _, off, extent = flatness(mesh)
     return off <= _FLAT * extent
 
 

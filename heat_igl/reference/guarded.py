@@ -22,7 +22,6 @@ from typing import Any, NamedTuple
 
 from heat_igl.errors import ReferenceSolverError
 from heat_igl.runtime import PeakMemory
-from heat_igl.typing import AnyArray
 
 #: Seconds that a call may take, and bytes by which it may let the child's address space grow, unless told otherwise.
 TIMEOUT = 600.0
@@ -46,27 +45,21 @@ class Reply(NamedTuple):
 
 
 def call(
-    function: str,
-    arrays: Mapping[str, AnyArray],
-    parameters: Mapping[str, Any] | None = None,
-    *,
-    library: str = "",
-    timeout: float = TIMEOUT,
-    memory: float = MEMORY,
+    function: str, arguments: Mapping[str, Any], *, library: str = "", timeout: float = TIMEOUT, memory: float = MEMORY
 ) -> Reply:
     """Call a function in a child process, and wait until it returns.
 
-    `function` is ``"module:name"``, imported in the child. It is called with all arrays and parameters as keyword
-    arguments, and returns a mapping of names to values. `library` is a module that is imported before memory is
-    measured. The child is killed after `timeout` seconds. Its address space may grow by `memory` bytes during the call:
-    held on Linux; other systems have no bound that a process can set for itself.
+    `function` is ``"module:name"``, imported in the child. It is called with the arguments as keywords, and returns a
+    mapping of names to values. `library` is a module that is imported before memory is measured. The child is killed
+    after `timeout` seconds. Its address space may grow by `memory` bytes during the call: held on Linux; other systems
+    have no bound that a process can set for itself.
 
     A ReferenceSolverError if the function raised, if the child died, or if the time is over.
     """
     with tempfile.TemporaryDirectory(prefix="heat_igl_") as name:
         folder = Path(name)
         seconds = min(timeout, _LONGEST)
-        request = function, {**arrays, **(parameters or {})}, library, seconds, int(min(memory, _NO_BOUND))
+        request = function, dict(arguments), library, seconds, int(min(memory, _NO_BOUND))
         with (folder / "request").open("wb") as file:  # in which arrays are not copied first
             pickle.dump(request, file, protocol=5)
         try:

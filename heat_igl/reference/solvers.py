@@ -146,8 +146,7 @@ def measured(
 
     reply = guarded.call(
         f"heat_igl.reference.native:{chosen.function}",
-        {"V": mesh.V, "F": mesh.F, "sources": seeds, "components": mesh.components},
-        options,
+        {"V": mesh.V, "F": mesh.F, "sources": seeds, "components": mesh.components, **options},
         library=chosen.module,
         timeout=timeout,
         memory=memory,

@@ -21,6 +21,7 @@ from functools import partial
 import numpy as np
 
 from heat_igl.errors import ReferenceSolverError
+from heat_igl.io.curves import flatness
 from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import ArrayLike, FloatArray
@@ -53,13 +54,10 @@ def plane(mesh: MeshLike, sources: Sources) -> FloatArray:
         If the sources name no vertex of the mesh.
     """
     mesh = as_simplices(mesh)
-    used = mesh.V[mesh.referenced]
-    centred = used - used.mean(axis=0)
-    _, _, axes = np.linalg.svd(centred, full_matrices=False)
-    extent = float(np.ptp(centred @ axes[0]))
-    if mesh.is_tetrahedral or np.abs(centred @ axes[2]).max() > _TOLERANCE * extent:
+    axes, off, extent = flatness(mesh)
+    if mesh.is_tetrahedral or off > _TOLERANCE * extent:
         raise ReferenceSolverError("the mesh does not lie in a plane: use reference.exact")
-    _require_convex(centred @ axes[:2].T, float(mesh.measures.sum()))
+    _require_convex(mesh.V[mesh.referenced] @ axes[:2].T, float(mesh.measures.sum()))
     return _nearest(mesh, sources, partial(straight, mesh.V))
 
 
@@ -216,17 +214,6 @@ def around_the_edge(V: FloatArray, source: int) -> FloatArray:
     angle = np.mod(np.arctan2(y, x) - np.pi / 2, 2 * np.pi)
     bent = np.hypot(np.hypot(x, y) + np.hypot(x[source], y[source]), z)
     return np.where(np.abs(angle - angle[source]) > np.pi, bent, straight(V, source))
-
-
-def around_the_wall(V: FloatArray, source: int, wall: float, end: float) -> FloatArray:
-    """Distance around a wall at wall < x < wall + 1, y < end, parallel to z; the source has x < wall, y < end."""
-    x, y, z = (V - V[source]).T
-    wall, end = wall - V[source, 0], end - V[source, 1]
-    past_one = np.hypot(wall, end) + np.hypot(x - wall, y - end)
-    past_both = np.hypot(wall, end) + 1 + np.hypot(x - wall - 1, y - end)
-    is_seen = (x <= wall) | (y * wall >= end * x)
-    flat = np.where(is_seen, np.hypot(x, y), np.where(y >= end, past_one, past_both))
-    return np.asarray(np.hypot(flat, z))
 
 
 def _nearest(mesh: Mesh, sources: Sources, distance_from: Callable[[int], FloatArray]) -> FloatArray:
