@@ -21,7 +21,8 @@ import heat_igl
 from heat_igl import Mesh, PolygonMesh, fibre_metric, image_domain, metric_operators, shapes, speed_operators
 from heat_igl.geodesic import SolverChoice
 from heat_igl.geodesic.choice import Solver
-from heat_igl.validation.closed_forms import around_the_wall, by_fermat, straight
+from heat_igl.typing import FloatArray
+from heat_igl.validation.closed_forms import by_fermat, straight
 from heat_igl.validation.construction import tetrahedra
 
 METHODS = ("exact", "sweep", "heat")
@@ -256,6 +257,17 @@ def _concave_polygons() -> Domain:
     rows = np.stack([at, below[at], right, beside[right], up + 1, below[up], up, beside[at]], axis=1)
     V = np.pad(V / n, ((0, 0), (0, 1)))
     return Domain("polygons", V, [row[row >= 0] for row in rows], truth=partial(straight, V))
+
+
+def around_the_wall(V: FloatArray, source: int, wall: float, end: float) -> FloatArray:
+    """Distance around a wall at wall < x < wall + 1, y < end, parallel to z; the source has x < wall, y < end."""
+    x, y, z = (V - V[source]).T
+    wall, end = wall - V[source, 0], end - V[source, 1]
+    past_one = np.hypot(wall, end) + np.hypot(x - wall, y - end)
+    past_both = np.hypot(wall, end) + 1 + np.hypot(x - wall - 1, y - end)
+    is_seen = (x <= wall) | (y * wall >= end * x)
+    flat = np.where(is_seen, np.hypot(x, y), np.where(y >= end, past_one, past_both))
+    return np.asarray(np.hypot(flat, z))
 
 
 def _wall(shape: tuple[int, ...], spacing: tuple[float, ...], rows: int) -> Domain:

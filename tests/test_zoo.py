@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from conformance import around_the_wall
 from conftest import mean_error, zoo
 
 import heat_igl
@@ -14,7 +15,7 @@ from heat_igl.heat.source_terms import SourceAssembler, drop_overtaken
 from heat_igl.intrinsic import mollify
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.closed_forms import around_the_wall, by_fermat
+from heat_igl.validation.closed_forms import by_fermat
 from heat_igl.validation.construction import delaunay
 from heat_igl.validation.zoo import FAMILIES, SHAPES
 

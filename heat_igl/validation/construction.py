@@ -35,10 +35,14 @@ def planar(points: FloatArray, height: AnyArray | float = 0.0) -> Mesh:
     return Mesh(raised(points, height), delaunay(points))
 
 
-def revolved(radius: FloatArray, height: FloatArray, around: int) -> Mesh:
-    """A surface of revolution without caps: a ring of vertices for each radius (k,) and height (k,)."""
-    x, y = ring(around).T
-    return lattice_mesh(radius[:, None] * x, radius[:, None] * y, height[:, None], wrap_columns=True)
+def revolved(radius: FloatArray, height: FloatArray, around: int, turn: float = 0.0) -> Mesh:
+    """A surface of revolution without caps: a ring of vertices for each radius (k,) and height (k,).
+
+    Each ring is turned by an angle against the one before.
+    """
+    angle = 2 * np.pi * np.arange(around) / around + turn * np.arange(len(radius))[:, None]
+    x, y = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
+    return lattice_mesh(x, y, height[:, None], wrap_columns=True)
 
 
 def tube(centre: FloatArray, along: FloatArray, radius: float, around: int, up: ArrayLike = (0.31, 0.21, 0.93)) -> Mesh:

@@ -298,9 +298,7 @@ def _stored(rng: Generator, mesh: Mesh) -> Mesh:
 def _turned_rings(rng: Generator, radius: FloatArray, height: FloatArray, around: int) -> Mesh:
     """Rings of vertices with these radii and heights, each rotated against the one before by the same angle."""
     turn = rng.choice([0.0, np.pi / around, rng.uniform(0, 1)])
-    angle = 2 * np.pi * np.arange(around) / around + turn * np.arange(len(radius))[:, None]
-    x, y = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
-    return _stored(rng, lattice_mesh(x, y, height[:, None], wrap_columns=True))
+    return _stored(rng, build.revolved(radius, height, around, turn))
 
 
 def _rings(rng: Generator) -> tuple[int, int]:

@@ -239,22 +239,19 @@ def with_slivers(mesh: Mesh, seed: int) -> Mesh:
     follow them.
     """
     rng = np.random.default_rng(seed)
-    faces_of: list[list[tuple[int, int]]] = [[] for _ in mesh.edges]
-    for f, row in enumerate(mesh.facets.of_face):
-        for c, e in enumerate(row):
-            faces_of[e].append((f, c))
+    around = np.split(np.argsort(mesh.facets.of_face, axis=None, kind="stable"), np.cumsum(mesh.facets.n_faces)[:-1])
     alive = np.ones(mesh.n_faces, bool)
-    points, added = [], []
+    points: list[FloatArray] = []
+    added: list[list[int]] = []
     for e in rng.permutation(len(mesh.edges))[: len(mesh.edges) // 10]:
-        if not all(alive[f] for f, _ in faces_of[e]):
-            continue
-        i, j = rng.permutation(mesh.edges[e])
-        points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
-        new = mesh.n_vertices + len(points) - 1
-        for f, c in faces_of[e]:
+        f, corner = np.divmod(around[e], 3)
+        if alive[f].all():
+            i, j = rng.permutation(mesh.edges[e])
+            new = mesh.n_vertices + len(points)
+            points.append(mesh.V[i] + 1e-4 * (mesh.V[j] - mesh.V[i]))
             alive[f] = False
-            w, a, b = mesh.F[f, c], mesh.F[f, (c + 1) % 3], mesh.F[f, (c + 2) % 3]
-            added += [[w, a, new], [w, new, b]]
+            for w, a, b in mesh.F[f[:, None], (corner[:, None] + np.arange(3)) % 3]:
+                added += [[w, a, new], [w, new, b]]
     return Mesh(np.concatenate([mesh.V, points]), np.concatenate([mesh.F[alive], added]))
 
 
