@@ -170,7 +170,7 @@ class Tracer:
             raise SourceError(f"source must be one point, or one for each of the {k} vectors, not {len(begin.faces)}")
         turn, size = self.directions("vectors", begin, array)
         self.refuse_endless("vectors", begin.faces, size)
-        faces, barycentric, lengths = self._room(k)
+        faces, barycentric, lengths = np.empty(k, np.int64), np.empty((k, 3)), np.empty(k)
 
         def work(part: slice) -> None:
             given = (begin.faces[part], begin.barycentric[part], turn[part], size[part])
@@ -180,11 +180,6 @@ class Tracer:
         if (lengths < 0).any():
             raise MeshError(f"the line along vectors[{np.argmax(lengths < 0)}] {_LOST}")
         return SurfacePoints(*on_one_side(faces, barycentric, self._mesh.n_faces))
-
-    @staticmethod
-    def _room(k: int) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Room for the ends of k geodesics, faces and barycentric coordinates, and for their lengths."""
-        return np.empty(k, np.int64), np.empty((k, 3)), np.empty(k)
 
     def refuse_endless(self, name: str, faces: IntArray, lengths: FloatArray) -> None:
         """Raise ValueError for lengths (k,) that would take minutes to trace, which another unit is the reason of."""
@@ -244,10 +239,9 @@ class Tracer:
 
     def curve(self, start: _Starts, turn: FloatArray, length: FloatArray) -> SurfaceCurve:
         """Trace one geodesic."""
-        given: tuple[Any, ...] = (start.faces, start.barycentric, turn, length)
-        ends = self._room(1)
-        faces, points = kernel.trace(self._triangles, *given, *ends, True)
-        if ends[2][0] < 0:
+        ends: tuple[Any, ...] = np.empty(1, np.int64), np.empty((1, 3)), np.empty(1)
+        faces, points = kernel.trace(self._triangles, start.faces, start.barycentric, turn, length, *ends, True)
+        if ends[2] < 0:
             raise MeshError(f"the line from start {_LOST}")
         faces, points = on_one_side(faces, points, self._mesh.n_faces)
         return SurfaceCurve(faces, points[:, 0], points[:, 1], mesh=self._mesh)

@@ -200,6 +200,7 @@ def _circumcenter(t: Flips, f: cython.int) -> Location:
     dx: cython.double = v * c + w * apex - x
     dy: cython.double = w * height - y
     left: cython.double = sqrt(dx * dx + dy * dy)
+    at: cython.double[3]
     ray: Heading = Heading(3 * f + 2, INSIDE, x, y, dx / left, dy / left)
     for _ in range(_MOST_STEPS):
         h: cython.int = ray.h
@@ -214,12 +215,8 @@ def _circumcenter(t: Flips, f: cython.int) -> Location:
             at_apex: cython.double = (ray.y + left * ray.dy) * t.length[h] / (2.0 * size)
             apex = foot(t.length[h], t.length[previous_half_edge(h)], t.length[next_half_edge(h)])
             at_head: cython.double = (ray.x + left * ray.dx - at_apex * apex) / t.length[h]
-            at_tail: cython.double = 1.0 - at_apex - at_head
-            if h % 3 == 0:
-                return Location(h // 3, at_apex, at_tail, at_head)
-            if h % 3 == 1:
-                return Location(h // 3, at_head, at_apex, at_tail)
-            return Location(h // 3, at_tail, at_head, at_apex)
+            at[h % 3], at[(h + 1) % 3], at[(h + 2) % 3] = at_apex, 1.0 - at_apex - at_head, at_head
+            return Location(h // 3, at[0], at[1], at[2])
         left -= step
         h = t.twin[way.h]
         if h < 0:

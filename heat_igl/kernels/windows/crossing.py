@@ -211,54 +211,42 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
 
 @cython.cfunc
 @cython.nogil
-def _leads(
+def _loses_nothing(
     w: cython.pointer(Window),
-    at: cython.double,
     apex: cython.pointer(Apex),
+    windows: cython.pointer(Window),
     out: cython.pointer(Window),
-    place: cython.double,
     to_left: cython.bint,
 ) -> cython.bint:
-    """Whether w leads through `at` to the point `place` of the left or right side by a path no longer than `out`."""
-    x: cython.double = place * apex.cos_left
-    y: cython.double = place * apex.sin_left
-    if not to_left:
-        x = apex.length - (apex.right_length - place) * apex.cos_right
-        y = (apex.right_length - place) * apex.sin_right
-    return is_within(bent(w, at, x, y), out.offset + reach(out, place), apex.longest)
+    """Whether `out`, made of w, lies on its side, and its ends are on the first and the last line of w, or at the apex.
 
-
-@cython.cfunc
-@cython.nogil
-def _continues(
-    w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window), to_left: cython.bint
-) -> cython.bint:
-    """Whether `out` lies on its side, and its ends are on the first and the last line of w, or at the apex.
-
-    Then straight lines through w reach all of `out`, and `out` covers all that they reach.
+    Then straight lines through w reach all of `out`, and `out` covers all that they reach. If `out` is NULL, w was not
+    propagated: whether the one of the `windows` that gives the apex its distance leads to all points that w reaches, by
+    paths no longer.
     """
+    unused: Window
     start: cython.double = w.start
     stop: cython.double = w.stop
-    if not 0.0 <= out.start < out.stop <= (apex.left_length if to_left else apex.right_length):
-        return False
-    if w.side == AROUND_APEX:
+    if out == cython.NULL:
+        out = cython.address(unused)
+        if not (_to_left(w, apex, out) if to_left else _to_right(w, apex, out)):
+            return True
+        w = windows + apex.best
+        start = stop = apex.best_at
+    elif w.side == AROUND_APEX:
         at: cython.double = min(max(backward(w, apex.x, apex.y), w.start), w.stop)
         start, stop = (start, at) if to_left else (at, stop)
-    # Lengths are compared instead of positions, since the intersection with a line along the side is ill-conditioned.
-    return _leads(w, start, apex, out, out.start, to_left) and _leads(w, stop, apex, out, out.stop, to_left)
-
-
-@cython.cfunc
-@cython.nogil
-def _is_behind(
-    w: cython.pointer(Window), apex: cython.pointer(Apex), best: cython.pointer(Window), to_left: cython.bint
-) -> cython.bint:
-    """Whether the window that gives the apex its distance leads to all points that w reaches, by paths no longer."""
-    out: Window
-    if not (_to_left(w, apex, cython.address(out)) if to_left else _to_right(w, apex, cython.address(out))):
-        return True
-    to_start: cython.bint = _leads(best, apex.best_at, apex, cython.address(out), out.start, to_left)
-    return to_start and _leads(best, apex.best_at, apex, cython.address(out), out.stop, to_left)
+    for end in range(2):
+        place: cython.double = out.stop if end else out.start
+        x: cython.double = place * apex.cos_left
+        y: cython.double = place * apex.sin_left
+        if not to_left:
+            x = apex.length - (apex.right_length - place) * apex.cos_right
+            y = (apex.right_length - place) * apex.sin_right
+        # Lengths are compared and no positions, since the intersection with a line along the side is ill-conditioned.
+        if not is_within(bent(w, stop if end else start, x, y), out.offset + reach(out, place), apex.longest):
+            return False
+    return 0.0 <= out.start < out.stop <= (apex.left_length if to_left else apex.right_length)
 
 
 @cython.cfunc
@@ -318,20 +306,20 @@ def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
             or (w.side == LEFT_OF_APEX and not apex.nearest <= bent(w, w.stop, apex.x, apex.y))
         ):
             if _to_left(w, cython.address(apex), s.to_left + n_left):
-                assert _continues(w, cython.address(apex), s.to_left + n_left, True)
+                assert _loses_nothing(w, cython.address(apex), windows, s.to_left + n_left, True)
                 n_left += 1
         else:
-            assert w.side == RIGHT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, True)
+            assert w.side == RIGHT_OF_APEX or _loses_nothing(w, cython.address(apex), windows, cython.NULL, True)
         if w.side != LEFT_OF_APEX and (
             is_best
             or w.stop > apex.best_at
             or (w.side == RIGHT_OF_APEX and not apex.nearest <= bent(w, w.start, apex.x, apex.y))
         ):
             if _to_right(w, cython.address(apex), s.to_right + n_right):
-                assert _continues(w, cython.address(apex), s.to_right + n_right, False)
+                assert _loses_nothing(w, cython.address(apex), windows, s.to_right + n_right, False)
                 n_right += 1
         else:
-            assert w.side == LEFT_OF_APEX or _is_behind(w, cython.address(apex), windows + apex.best, False)
+            assert w.side == LEFT_OF_APEX or _loses_nothing(w, cython.address(apex), windows, cython.NULL, False)
     # Lines that cross as many faces around a vertex as it has corners cross an edge there twice, and no shortest path
     # does: the vertex and the two crossings span a triangle with two sides on the edge, which is shorter than the line.
     # Around the tip of a needle, where lines may differ by less than rounding, they would wind a million times.
