@@ -52,8 +52,6 @@ class DistanceDerivative:
         part: MeshPart | None = None,
     ) -> None:
         self.distance, self._sources, self._sides, self._part = distance, sources, sides, part
-        if surface.faces is None or surface.given_faces is None:
-            raise ValueError("the faces before any flip are not known: make the solver from a mesh or edge lengths")
         self._faces, self._F, self._tables = surface.faces, surface.given_faces, windows.tables
         self.unreachable: IntArray = np.flatnonzero(np.isinf(distance))
         # A path is known by the last vertex or source point before each vertex, from which a straight line leads to it;

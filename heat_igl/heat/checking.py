@@ -236,7 +236,7 @@ class Comparisons:
         if self._domain.n_components == 1:
             return np.zeros(1, np.int64)
         surface, vertices = self._domain.source_surface, [sources.vertices]
-        if surface is not None and surface.given_faces is not None:
+        if surface is not None:
             vertices += [surface.given_faces[places.faces, 0] for places in (sources.points, sources.segments)]
         return np.unique(self._domain.components[np.concatenate(vertices)])
 
@@ -257,9 +257,9 @@ class Checker:
         self._surface, self._F = surface, None if surface is None else surface.given_faces
         self._referenced, self._uses_all = referenced, bool(referenced.all())
         self._vertices = _sample(np.flatnonzero(referenced), _MOST_VERTICES)
-        faces = None if surface is None else surface.faces
         ends, length = np.empty((0, 2)), np.empty(0)
-        if faces is not None:
+        if surface is not None:
+            faces = surface.faces
             edges = _sample(faces.edges, _MOST_EDGES)
             ends, length = np.column_stack([faces.tail(edges), faces.head(edges)]), faces.l.ravel()[edges]
         elif simplices is not None:
@@ -304,8 +304,8 @@ def naming_thinnest(surface: Surface | None) -> Iterator[None]:
 
 
 def thinnest(surface: Surface | None) -> str:
-    """The first face with the least area for its size, and what to do; "" where faces are unknown."""
-    if surface is None or surface.faces is None or surface.given_faces is None:
+    """The first face with the least area for its size, and what to do; "" without a surface."""
+    if surface is None:
         return ""
     F, longest = surface.given_faces, surface.faces.l.max(axis=1)
     share = np.divide(surface.faces.areas, longest**2, out=np.zeros(len(longest)), where=longest > 0)

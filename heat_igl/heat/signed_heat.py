@@ -270,7 +270,7 @@ def _oriented_domain(mesh: Mesh) -> tuple[Operators, IntrinsicTriangulation, Int
         raise MeshError("curves have a left and a right on triangles, but the mesh is tetrahedral")
     domain = operators(mesh, "intrinsic-delaunay")
     surface = domain.surface
-    if surface is None or surface.faces is None or surface.uncovered is not None:
+    if surface is None or surface.uncovered is not None:
         facets = mesh.facets
         crowded = np.flatnonzero(facets.n_faces > 2)
         edge = "" if not len(crowded) else " {} - {}".format(*facets.vertices[crowded[0]].tolist())

@@ -324,20 +324,13 @@ def _damped_field(parts: SolverParts, terms: list[SourceTerm], u: FloatArray) ->
 
 def _impose_near_field(domain: Operators, term: SourceTerm, X: FloatArray, magnitude: FloatArray) -> None:
     """Near points and curves, replace the field X (d m,) of length `magnitude` (m,) by that of the known distances."""
-    if not term.seen.any():
+    if domain.surface is None or not term.seen.any():
         return
     m, known = len(magnitude), np.zeros(domain.n, np.int8)
     known[term.near.vertex] = 1
     known[term.near.vertex[term.seen]] = 2
-    if domain.surface is None:
-        # Of polygons, those of which all corners are known: G has them in each triangle of the polygon.
-        of_face = abs(domain.G.tocsr())
-        unknown, seen = (of_face @ (known == kind) for kind in (0, 2))
-        unknown, seen = (rows.reshape(domain.dimension, -1).sum(axis=0) for rows in (unknown, seen))
-        faces = np.flatnonzero((unknown == 0) & (seen > 0))
-    else:
-        corners = known[domain.surface.triangulation.F]
-        faces = np.flatnonzero((corners > 0).all(axis=1) & (corners == 2).any(axis=1))
+    corners = known[domain.surface.triangulation.F]
+    faces = np.flatnonzero((corners > 0).all(axis=1) & (corners == 2).any(axis=1))
     gradient = (domain.G[:, term.near.vertex] @ term.near.value).reshape(-1, m)[:, faces]
     length = np.linalg.norm(gradient, axis=0)
     X.reshape(-1, m)[:, faces] = gradient / np.where(length > 0, length, 1)

@@ -129,20 +129,19 @@ class SourceAssembler:
         # Of each component, if each has a time step.
         self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
         surface = domain.surface
-        given = domain.given_surface
-        self._faces = None if given is None else given.faces
+        self._faces = None if surface is None else surface.faces
         # In edges of the mesh: if vertices were added, the operators have shorter ones.
         self._radius = NEAR_RADIUS
-        if surface is not None and surface.faces is not None and surface.faces.n < domain.n:
+        if surface is not None and surface.faces.n < domain.n:
             self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
 
     @cached_property
     def edges(self) -> Any:
         """The edges that are straight lines: of all triangulations, and on polygons of their triangles."""
         surface = self._domain.surface
-        if surface is not None and surface.faces is self._faces and surface.uncovered is None:
-            return surface.paths
-        return edge_paths(self._faces, *(() if surface is None else (surface.triangulation, surface.uncovered)))
+        if surface is None or surface.uncovered is None:
+            return surface and surface.paths
+        return edge_paths(surface.faces, surface.triangulation, surface.uncovered)
 
     @cached_property
     def windows(self) -> ExactSurface:
@@ -229,7 +228,7 @@ class SourceAssembler:
         Only if there are points or curves; for vertices alone, the ring of edges is enough, but beside an edge of
         more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
         """
-        surface = self._domain.given_surface
+        surface = self._domain.surface
         if surface is None or self._faces is None:
             return _NONE, _NONE
         if sources.on_vertices_alone:
@@ -260,8 +259,8 @@ class SourceAssembler:
         """Vertices, shares, labels and offsets of the initial heat: the hat functions at points, and along curves."""
         vertices = sources.vertices[rim]
         of_vertices = vertices, np.ones(len(vertices)), sources.vertex_label[rim], sources.vertex_offset[rim]
-        surface = self._domain.given_surface
-        if sources.on_vertices_alone or surface is None or surface.given_faces is None or self._faces is None:
+        surface = self._domain.surface
+        if sources.on_vertices_alone or surface is None or self._faces is None:
             return of_vertices
         h = self._h_at(surface.given_faces[sources.segments.faces, 0])
         along, lengths = samples(self._faces, sources.segments, h * _SPACING)

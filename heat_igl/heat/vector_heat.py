@@ -397,11 +397,9 @@ class HeatTransport:
 
 
 class OutwardField:
-    """Radial fields around the vertices of an oriented manifold of triangles, whose faces are known."""
+    """Radial fields around the vertices of an oriented manifold of triangles."""
 
     def __init__(self, surface: Surface) -> None:
-        if surface.faces is None:
-            raise ValueError("a radial field needs the faces of the mesh, which this domain does not have")
         self._triangulation = surface.triangulation
         self._angles = carried_angles(polar_angles(surface.faces), surface.triangulation)
         self._turn = transport_angles(self._triangulation, self._angles)

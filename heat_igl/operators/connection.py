@@ -117,7 +117,7 @@ def face_rotations(domain: Operators) -> tuple[AnyArray, AnyArray]:
     """
     triangulation, angles = _triangles(domain)
     surface = domain.surface
-    if surface is None or surface.faces is None or surface.faces is triangulation:
+    if surface is None or surface.faces is triangulation:
         both = _corner_rotations(triangulation, angles)
         return both, both
     of_faces = _corner_rotations(surface.faces, polar_angles(surface.faces))
@@ -136,7 +136,7 @@ def _corner_rotations(triangulation: IntrinsicTriangulation, angles: PolarAngles
 
 def _triangles(domain: Operators) -> tuple[IntrinsicTriangulation, PolarAngles]:
     surface = domain.surface
-    if surface is None or surface.faces is None or surface.uncovered is not None:
+    if surface is None or surface.uncovered is not None:
         raise MeshError("tangent vectors need the triangles of an oriented manifold, which this domain does not have")
     angles = polar_angles(surface.faces)
     return surface.triangulation, carried_angles(angles, surface.triangulation)

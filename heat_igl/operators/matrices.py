@@ -34,8 +34,8 @@ class Surface:
     ----------
     triangulation : IntrinsicTriangulation
         The triangles that the operators belong to: their edges are straight lines from sources.
-    faces : IntrinsicTriangulation or None
-        The triangles before any flip, but each once: points and curves are carried to them. None if not known.
+    faces : IntrinsicTriangulation
+        The triangles before any flip, but each once: points and curves are carried to them.
     uncovered : IntrinsicTriangulation or None
         The surface itself, each face once and without added vertices, if `triangulation` is the tufted cover, which
         has each face twice, or a refinement.
@@ -44,7 +44,7 @@ class Surface:
     """
 
     triangulation: IntrinsicTriangulation
-    faces: IntrinsicTriangulation | None = None
+    faces: IntrinsicTriangulation
     uncovered: IntrinsicTriangulation | None = None
     V: FloatArray | None = None
 
@@ -59,10 +59,8 @@ class Surface:
         return edge_paths(self.unfolding, self.faces)
 
     @cached_property
-    def given_faces(self) -> IntArray | None:
-        """Vertices (m, 3) of the triangles that points and curves refer to; None without `faces`."""
-        if self.faces is None:
-            return None
+    def given_faces(self) -> IntArray:
+        """Vertices (m, 3) of the triangles that points and curves refer to."""
         F = self.faces.F
         for move in self.faces.history:
             if isinstance(move, Merged):
@@ -70,14 +68,13 @@ class Surface:
         return F
 
 
-def edge_paths(*triangulations: IntrinsicTriangulation | None) -> Any:
-    """Paths along the edges of triangulations of the same vertices, each edge once; None without triangulations."""
-    known = [each for each in triangulations if each is not None]
+def edge_paths(*triangulations: IntrinsicTriangulation) -> Any:
+    """Paths along the edges of triangulations of the same vertices, each edge once."""
     kernel: Any = checking.EdgePaths
-    paths = kernel(np.empty((0, 2), np.int32), np.empty(0), max((each.n for each in known), default=0))
-    for each in known:
+    paths = kernel(np.empty((0, 2), np.int32), np.empty(0), max(each.n for each in triangulations))
+    for each in triangulations:
         paths = paths.joined(np.ascontiguousarray(each.F), np.ascontiguousarray(each.l).ravel(), each.twin)
-    return paths if known else None
+    return paths
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +184,7 @@ class Operators:
     metric : MetricSides or None
         The lengths of triangles in a metric per face, to be differentiated; None without one, and without a `surface`.
     drawn_on : Surface or None
-        The triangles that points and curves refer to, where these are not `surface`: those of polygons.
+        The triangles that points and curves refer to, where these are not `surface`, beside it: those of polygons.
     fans : PolygonFans or None
         Of polygons, the triangles of `surface` before any flip, to which points and curves are carried.
     originals : (n_given,) int64 or None
@@ -241,11 +238,6 @@ class Operators:
         return self.n
 
     @property
-    def given_surface(self) -> Surface | None:
-        """The triangles around sources: `surface`, or `drawn_on`."""
-        return self.surface if self.surface is not None else self.drawn_on
-
-    @property
     def source_surface(self) -> Surface | None:
         """The triangles that points and curves refer to as they are given: `drawn_on`, or `surface`."""
         return self.surface if self.drawn_on is None else self.drawn_on
@@ -259,7 +251,7 @@ class Operators:
     def n_given(self) -> int:
         """Number of vertices of the mesh; n if none were added by refinement or as virtual ones."""
         given = self.source_surface
-        return self.n if given is None or given.faces is None else given.faces.n
+        return self.n if given is None else given.faces.n
 
     @property
     def has_copies(self) -> bool:

@@ -121,7 +121,8 @@ def intrinsic_operators(
     """The operators of triangles that are known by their edge lengths, gradients in the plane of each (d = 2).
 
     `paths` gives the components and the longest path along edges, on the same vertices or the first of them; without it
-    both are found along the edges of the triangulation. `on_laplacian` is called with L as soon as it is known.
+    both are found along the edges of the triangulation. `on_laplacian` is called with L as soon as it is known. In the
+    `surface`, points refer to these triangles.
     """
     F, lengths, n = triangulation.F, triangulation.l, triangulation.n
     L = cotangent_laplacian(igl.cotmatrix_entries(lengths), F, n)
@@ -152,7 +153,7 @@ def intrinsic_operators(
         longest_distance=float(longest.max()),
         longest_distances=longest,
         lengths=elements,
-        surface=Surface(triangulation, faces=None if triangulation.history else triangulation),
+        surface=Surface(triangulation, triangulation),
     )
 
 

@@ -66,12 +66,10 @@ class PathAngles(NamedTuple):
 class PathDirections:
     """Converts directions in triangles to polar angles at the vertices of the mesh, an oriented manifold.
 
-    A MeshError if the faces of the mesh are not known, or if it has no polar angles, see `polar_angles`.
+    A MeshError if it has no polar angles, see `polar_angles`.
     """
 
     def __init__(self, surface: Surface) -> None:
-        if surface.faces is None:
-            raise MeshError("directions need the faces of the mesh, which this domain does not know")
         given = polar_angles(surface.faces)
         #: Polar angles of the half-edges around the vertices of the triangulation.
         self.angles: PolarAngles = (

@@ -65,14 +65,13 @@ class Triangles(ABC):
 
     @property
     def given_faces(self) -> IntArray:
-        """Vertices (m, 3) of the triangles that points and curves refer to; (0, 3) if they are not known."""
-        faces = self.surface.given_faces
-        return np.empty((0, 3), np.int64) if faces is None else faces
+        """Vertices (m, 3) of the triangles that points and curves refer to."""
+        return self.surface.given_faces
 
     @property
     def faces(self) -> IntrinsicTriangulation:
         """The triangles before any flip."""
-        return self.surface.unfolding if self.surface.faces is None else self.surface.faces
+        return self.surface.faces
 
 
 class MeshTriangles(Triangles):
@@ -120,12 +119,11 @@ class OperatorTriangles(Triangles):
     def surface(self) -> Surface:
         """The triangles with their history."""
         surface = cast("Surface", self._domain.surface)
-        given, faces = surface.given_faces, surface.faces
         # The margin of the heat method would lengthen paths. Lengths without positions are those of another metric.
-        if surface.V is not None and given is not None and faces is not None and faces.lengthening != 0:
+        if surface.V is not None and surface.faces.lengthening != 0:
             from heat_igl.operators import unfolding_surface
 
-            return unfolding_surface(Mesh(surface.V, given), MARGIN)
+            return unfolding_surface(Mesh(surface.V, surface.given_faces), MARGIN)
         return surface
 
     @property
