@@ -149,7 +149,7 @@ def signs(i: int) -> Rows:
 def logarithm_of_heat(mesh: Mesh, sources: Any, t: float) -> np.ndarray:
     """-sqrt(t) log v with v = u / u_source, u of equation (delta t); t is raised if heat would underflow."""
     domain, initial = operators(mesh), np.zeros(mesh.n_vertices)
-    t = max(t, smallest_time_step(domain))
+    t = max(t, smallest_time_step(domain.longest_distance, domain.mean_edge_length))
     initial[sources] = 1e290
     u = diffuse(domain, initial, t)
     return -np.sqrt(t) * np.log(u / u[sources].max())

@@ -185,7 +185,7 @@ def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[
     explicit t had to be raised for the heat to cross the domain.
     """
     if options.t is not None:
-        step = max(options.t, smallest_time_step(domain, fitted))
+        step = max(options.t, smallest_time_step(domain.longest_distance, domain.mean_edge_length, fitted))
         if step > options.t:
             warn_caller(
                 f"t = {options.t:.4g} is too small for heat to cross the mesh in double precision; using {step:.4g}",
