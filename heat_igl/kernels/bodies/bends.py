@@ -384,7 +384,8 @@ class _Bends(Ray):
         """The shortest way to a point of edge i whose last line stays inside, or `most`.
 
         It bends last around an edge at an end of i, around an edge around which the way to such an end or to one of its
-        neighbours does, or around an edge at a triangle that hides another candidate. Or it is the straight line from
+        neighbours does, around one that shares an end with such an edge, or around an edge at a triangle that hides
+        another candidate. Or it is the straight line from
         the source of an end, if one of them sees a source.
         """
         self.n_near, self.point = 0, self.point + 1
@@ -419,9 +420,12 @@ class _Bends(Ray):
                 slope: cython.double = self.slope_along(i)
                 origin: cython.int = front - self.n_edges if front >= self.n_edges else self.label_at(front)
                 if front >= self.n_edges or self.holds(front):
-                    self.slope, self.front, self.origin = slope, front, origin
-                    return value
-                self.refuted = front
+                    self.slope, self.front, self.origin, most = slope, front, origin, value
+                    # Edges that share an end with it may give shorter ways.
+                    for c in range(2 if front < self.n_edges else 0):
+                        self.add_at(i, self.edges[front, c], x, most)
+                else:
+                    self.refuted = front
                 continue
             for c in range(1, 4):
                 self.add_at(i, self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
