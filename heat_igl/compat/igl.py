@@ -15,7 +15,7 @@ import numpy as np
 from heat_igl.geodesic import geodesic_distance
 from heat_igl.heat import HeatMethodSolver
 from heat_igl.intrinsic import checked_indices
-from heat_igl.mesh import Mesh
+from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.typing import ArrayLike, FloatArray, IntArray
 
 __all__ = ["HeatGeodesicsData", "exact_geodesic", "heat_geodesic", "heat_geodesics_precompute", "heat_geodesics_solve"]
@@ -122,31 +122,20 @@ def exact_geodesic(
         If V and F are no triangle mesh, or an index is out of range.
     SourceError
         If there are targets and no source.
-
-    Notes
-    -----
-    A centroid becomes a vertex: its triangle is divided into three, which lie in its plane, so no distance changes.
     """
     mesh = Mesh(V, F)
     if not np.size(VT) + np.size(FT):
         # The older form; the present igl makes face sources of it, and returns no distances.
         FS, VT = (), FS
-    n, m = mesh.n_vertices, mesh.n_faces
-    vertex_sources, vertex_targets = checked_indices("VS", VS, n), checked_indices("VT", VT, n)
-    face_sources, face_targets = checked_indices("FS", FS, m), checked_indices("FT", FT, m)
-    if not len(vertex_targets) + len(face_targets):
-        return np.empty(0)
-    divided, place = np.unique(np.concatenate([face_sources, face_targets]), return_inverse=True)
-    centroids = n + place
-    sources = np.concatenate([vertex_sources, centroids[: len(face_sources)]])
-    targets = np.concatenate([vertex_targets, centroids[len(face_sources) :]])
-    return np.asarray(geodesic_distance(_with_centroids(mesh, divided), sources, method="exact")[targets])
+    sources, targets = _places(mesh, "S", VS, FS), _places(mesh, "T", VT, FT)
+    given: Any = sources[0] if len(sources) == 1 else sources
+    parts = [geodesic_distance(mesh, given, method="exact", targets=part) for part in targets]
+    return np.concatenate([np.empty(0), *parts])
 
 
-def _with_centroids(mesh: Mesh, faces: IntArray) -> Mesh:
-    """The mesh with the centroids of `faces` (k,) as vertices n, n + 1, ...; each of these faces becomes three."""
-    corners = mesh.F[faces]
-    center = np.broadcast_to(mesh.n_vertices + np.arange(len(faces))[:, None], corners.shape)
-    parts = np.stack([corners, np.roll(corners, -1, axis=1), center], axis=2).reshape(-1, 3)
-    V = np.concatenate([mesh.V, mesh.V[corners].mean(axis=1)])
-    return Mesh(V, np.concatenate([np.delete(mesh.F, faces, axis=0), parts]))
+def _places(mesh: Mesh, kind: str, vertices: ArrayLike, faces: ArrayLike) -> list[IntArray | SurfacePoints]:
+    """Vertices, and the centroids of faces, if there are any of each."""
+    chosen = checked_indices(f"V{kind}", vertices, mesh.n_vertices)
+    of_faces = checked_indices(f"F{kind}", faces, mesh.n_faces)
+    centroids = [SurfacePoints(of_faces, np.full((len(of_faces), 3), 1 / 3))] if len(of_faces) else []
+    return [chosen, *centroids] if len(chosen) else [*centroids]
