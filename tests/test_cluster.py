@@ -20,7 +20,7 @@ from conftest import killed_at
 
 import heat_igl
 from heat_igl import Mesh, cluster
-from heat_igl.cluster.collection import SourcePlan, items
+from heat_igl.cluster.collection import items
 from heat_igl.cluster.store import Store, rows_per_block
 from heat_igl.cluster.worker import Task, work
 from heat_igl.errors import BatchError
@@ -213,7 +213,7 @@ def test_the_format_of_a_store_is_one_that_can_be_read(client, tmp_path):
 
 def test_a_worker_that_does_not_see_the_store_ends_the_batch(tmp_path):
     (item,) = items({"fan": FAN})
-    task = Task(item, tmp_path / "elsewhere", SourcePlan.of("all"), "float32", False, {})
+    task = Task(item, tmp_path / "elsewhere", None, "float32", False, {})
     with pytest.raises(BatchError, match=r"a worker cannot open store .*elsewhere.* Name a folder that .* share"):
         work(task)
 

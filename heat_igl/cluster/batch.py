@@ -16,7 +16,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from heat_igl.cluster.collection import SourcePlan, items
+from heat_igl.cluster.collection import items, plan_text, source_plan
 from heat_igl.cluster.connection import connected, dask_modules
 from heat_igl.cluster.report import BatchReport, rows
 from heat_igl.cluster.store import Store, locked
@@ -103,11 +103,11 @@ def distances(
     processor, the bits are those of ``solver.distances(...).astype(dtype)``, however often the batch is interrupted.
     """
     require_choice("dtype", dtype, DTYPES)
-    plan = SourcePlan.of(sources)
+    plan = source_plan(sources)
     choice = SolverChoice.of(method, tolerance, **options)
     solver = {"method": choice.method, "tolerance": tolerance, **options}
     with locked(Path(store)):
-        opened = Store(store, {"sources": str(plan), "dtype": dtype, "normalize": normalize, "solver": solver})
+        opened = Store(store, {"sources": plan_text(plan), "dtype": dtype, "normalize": normalize, "solver": solver})
         tasks = [Task(item, opened.path.resolve(), plan, dtype, normalize, choice) for item in items(meshes, points)]
         with ExitStack() as stack:
             client = stack.enter_context(connected()) if client is None else client

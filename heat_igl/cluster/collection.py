@@ -19,6 +19,9 @@ from heat_igl.sources import Sources, vertex_sources
 # Names that a zarr group cannot have: they stand for the store itself, the folder above it, or its metadata.
 _RESERVED_NAMES = ("", ".", "..", "zarr.json")
 
+SourcePlan = int | tuple[tuple[int, ...], ...] | None
+"""The sources of each mesh: a number of farthest points, the same source sets, or None for every vertex."""
+
 
 @dataclass(frozen=True, eq=False)
 class Item:
@@ -94,38 +97,30 @@ def _held(mesh: MeshLike, label: str) -> Path | Mesh | PointCloud | tuple[Any, A
         return as_simplices(mesh)
 
 
-@dataclass(frozen=True)
-class SourcePlan:
-    """The sources of each mesh: every vertex, a number of farthest points, or the same list of source sets."""
+def source_plan(sources: str | Sequence[Sources]) -> SourcePlan:
+    """The plan that `sources` of `distances` describes; a SourceError if it describes none."""
+    if isinstance(sources, str):
+        kind, _, count = sources.partition(":")
+        if sources != "all" and (kind != "farthest" or not count.isdecimal() or int(count) < 1):
+            raise SourceError(f"sources must be 'all', 'farthest:K' with K at least 1, or a list, not {sources!r}")
+        return int(count) if count else None
+    if isinstance(sources, int | np.integer):
+        sources = [sources]
+    if not hasattr(sources, "__len__") or not len(sources):
+        raise SourceError(f"sources must be 'all', 'farthest:K' or a list of source sets, not {sources!r}")
+    sets = []
+    for i, one in enumerate(sources):
+        with errors_at(f"sources[{i}]"):
+            # The number of vertices of a mesh is not known yet.
+            sets.append(tuple(int(v) for v in vertex_sources(one, np.iinfo(np.int64).max)))
+    return tuple(sets)
 
-    farthest: int | None = None
-    source_sets: tuple[tuple[int, ...], ...] | None = None
 
-    @classmethod
-    def of(cls, sources: str | Sequence[Sources]) -> SourcePlan:
-        """The plan that `sources` of `distances` describes; a SourceError if it describes none."""
-        if isinstance(sources, str):
-            kind, _, count = sources.partition(":")
-            if sources == "all":
-                return cls()
-            if kind != "farthest" or not count.isdecimal() or int(count) < 1:
-                raise SourceError(f"sources must be 'all', 'farthest:K' with K at least 1, or a list, not {sources!r}")
-            return cls(farthest=int(count))
-        if isinstance(sources, int | np.integer):
-            sources = [sources]
-        if not hasattr(sources, "__len__") or not len(sources):
-            raise SourceError(f"sources must be 'all', 'farthest:K' or a list of source sets, not {sources!r}")
-        sets = []
-        for i, one in enumerate(sources):
-            with errors_at(f"sources[{i}]"):
-                # The number of vertices of a mesh is not known yet.
-                sets.append(tuple(int(v) for v in vertex_sources(one, np.iinfo(np.int64).max)))
-        return cls(source_sets=tuple(sets))
-
-    def __str__(self) -> str:
-        if self.source_sets is not None:
-            return " ".join(",".join(map(str, vertices)) for vertices in self.source_sets)
-        return "all" if self.farthest is None else f"farthest:{self.farthest}"
+def plan_text(plan: SourcePlan) -> str:
+    """A plan as text, as a store has it."""
+    if isinstance(plan, tuple):
+        return " ".join(",".join(map(str, vertices)) for vertices in plan)
+    return "all" if plan is None else f"farthest:{plan}"
 
 
 def read_source_sets(path: str | os.PathLike[str]) -> list[list[int]]:

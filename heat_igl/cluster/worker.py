@@ -281,15 +281,11 @@ def _described(solver: Solver) -> dict[str, Any]:
 
 def _source_sets(plan: SourcePlan, mesh: Mesh | PointCloud, solver: Solver) -> list[IntArray]:
     n = mesh.n_vertices
-    if plan.source_sets is not None:
+    if isinstance(plan, tuple):
         # A set is sorted, so the last vertex tells whether the mesh has all of them.
-        return [
-            vertex_sources(list(vertices), n) if vertices[-1] >= n else np.array(vertices)
-            for vertices in plan.source_sets
-        ]
-    if plan.farthest is None:
-        return list(np.arange(n).reshape(-1, 1))
-    return list(farthest_points(solver, min(plan.farthest, n)).reshape(-1, 1))
+        return [vertex_sources(list(vertices), n) if vertices[-1] >= n else np.array(vertices) for vertices in plan]
+    chosen = np.arange(n) if plan is None else farthest_points(solver, min(plan, n))
+    return list(chosen.reshape(-1, 1))
 
 
 def _spans(group: MeshGroup) -> list[tuple[int, ...]]:

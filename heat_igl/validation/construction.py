@@ -30,6 +30,13 @@ def ring(around: int, begin: float = 0.0) -> FloatArray:
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
+def inside(outline: FloatArray, points: FloatArray) -> BoolArray:
+    """Whether points (k, 2) lie inside a polygon (e, 2)."""
+    corner = np.arange(len(outline))
+    sides = np.stack([corner, np.roll(corner, -1)], axis=1)
+    return np.asarray(np.abs(igl.winding_number(outline, sides, points)) > 0.5)
+
+
 def planar(points: FloatArray, height: AnyArray | float = 0.0) -> Mesh:
     """The Delaunay triangles of points (k, 2) in the plane, at heights (k,)."""
     return Mesh(raised(points, height), delaunay(points))

@@ -13,24 +13,17 @@ import igl
 import numpy as np
 
 from heat_igl.mesh import Mesh
-from heat_igl.typing import BoolArray, FloatArray, IntArray
+from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation import construction as build
 from heat_igl.validation.construction import Generator
 from heat_igl.validation.shapes import grid, icosphere, lattice_mesh
 
 
-def _bounded(outline: FloatArray, points: FloatArray) -> BoolArray:
-    """Whether points (k, 2) lie inside a polygon (e, 2)."""
-    corner = np.arange(len(outline))
-    sides = np.stack([corner, np.roll(corner, -1)], axis=1)
-    return np.asarray(np.abs(igl.winding_number(outline, sides, points)) > 0.5)
-
-
 def _filled(outline: FloatArray, inner: FloatArray) -> tuple[FloatArray, IntArray]:
     """The corners (e, 2) of a polygon with the points that are inside, and the Delaunay triangles inside."""
-    points = np.concatenate([outline, inner[_bounded(outline, inner)]])
+    points = np.concatenate([outline, inner[build.inside(outline, inner)]])
     F = build.delaunay(points)
-    return points, F[_bounded(outline, points[F].mean(axis=1))]
+    return points, F[build.inside(outline, points[F].mean(axis=1))]
 
 
 def _tetrahedra_surface(points: FloatArray, T: IntArray) -> Mesh:

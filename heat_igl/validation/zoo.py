@@ -159,14 +159,11 @@ def _needle_fan() -> Mesh:
 
 def _gear() -> Mesh:
     """A toothed wheel of 24 teeth with a bore, extruded; its faces are Delaunay triangles between bore and teeth."""
-    angle = 2 * np.pi * np.arange(96) / 96
-    radius = np.where((np.arange(96) // 2) % 2 == 0, 3.0, 2.6)
-    rim = np.concatenate([radius[:, None] * build.ring(96), build.ring(48)])
+    teeth, bore = np.where((np.arange(96) // 2) % 2 == 0, 3.0, 2.6)[:, None] * build.ring(96), build.ring(48)
+    rim = np.concatenate([teeth, bore])
     F = build.delaunay(rim)
     middle = rim[F].mean(axis=1)
-    r, at = np.linalg.norm(middle, axis=1), np.arctan2(middle[:, 1], middle[:, 0]) % (2 * np.pi)
-    F = F[(r > 0.998) & (r < np.interp(at, np.append(angle, 2 * np.pi), np.append(radius, radius[0])))]
-    return build.extruded(rim, F, 1.0)
+    return build.extruded(rim, F[build.inside(teeth, middle) & ~build.inside(bore, middle)], 1.0)
 
 
 def _stairs() -> Mesh:
