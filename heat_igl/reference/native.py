@@ -12,7 +12,7 @@ import contextlib
 import io
 import time
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,8 @@ from heat_igl.typing import FloatArray, IntArray
 # that matter: with lengths divided by a thousand the cow is wrong by 0.2 %. With edges of about a thousand units
 # all thresholds are below rounding. A power of two keeps every bit.
 _EDGE_OF_EXACT = 1024.0
+# With edges of about 1, and centred, a mesh survives the filters of MeshLab that go through float32.
+_EDGE_OF_MESHLAB = 1.0
 
 # MeshLab stops its front at half the bounding box's diagonal unless told otherwise, and leaves 0 beyond.
 _NO_CUTOFF = 1e30
@@ -30,8 +32,11 @@ _NO_CUTOFF = 1e30
 _Solve = Callable[[], Any]
 
 
-def _by_components(prepare: Callable[..., _Solve]) -> Callable[..., dict[str, Any]]:
-    """Solve on each component that holds a source: solvers fail at vertices without faces and on other components."""
+def _by_components(prepare: Callable[..., _Solve], edge: float | None = None) -> Callable[..., dict[str, Any]]:
+    """Solve on each component that holds a source: solvers fail at vertices without faces and on other components.
+
+    With `edge` a component is scaled by the power of two that brings the mean edge nearest to it.
+    """
 
     @wraps(prepare)
     def whole(
@@ -47,62 +52,50 @@ def _by_components(prepare: Callable[..., _Solve]) -> Callable[..., dict[str, An
             if not len(faces):
                 continue
             number = np.cumsum(inside) - 1
+            mean = float(np.linalg.norm(V[faces] - V[np.roll(faces, 1, axis=1)], axis=2).mean())
+            scale = 1.0 if edge is None else float(2.0 ** np.round(np.log2(edge / mean)))
             # pygeodesic prints an error message and returns None.
             with contextlib.redirect_stdout(io.StringIO()) as said:
                 times = [time.perf_counter()]
-                solve = prepare(V[inside], number[faces], number[sources[inside[sources]]], **options)
+                solve = prepare(V[inside] * scale, number[faces], number[sources[inside[sources]]], **options)
                 times.append(time.perf_counter())
                 found = solve()
                 times.append(time.perf_counter())
             if found is None:
                 raise ValueError(said.getvalue())
-            distance[inside] = found
+            distance[inside] = found / scale
             seconds += np.diff(times)
         return {"distance": distance, "precompute_seconds": float(seconds[0]), "solve_seconds": float(seconds[1])}
 
     return whole
 
 
-def _binary_scale(V: FloatArray, F: IntArray, edge: float) -> float:
-    """The power of two that brings the mean edge nearest to `edge`."""
-    mean = float(np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean())
-    return float(2.0 ** np.round(np.log2(edge / mean)))
-
-
-@_by_components
+@partial(_by_components, edge=_EDGE_OF_EXACT)
 def pygeodesic_exact(V: FloatArray, F: IntArray, sources: IntArray) -> _Solve:
     """Exact distance by pygeodesic (Mitchell, Mount and Papadimitriou 1987, Kirsanov's implementation)."""
     from pygeodesic.geodesic import PyGeodesicAlgorithmExact
 
-    scale = _binary_scale(V, F, _EDGE_OF_EXACT)
-    solver = PyGeodesicAlgorithmExact(V * scale, F)
-
-    def solve() -> Any:
-        distance, _ = solver.geodesicDistances(sources)
-        return None if distance is None else distance / scale
-
-    return solve
+    solver = PyGeodesicAlgorithmExact(V, F)
+    return lambda: solver.geodesicDistances(sources)[0]
 
 
-@_by_components
+@partial(_by_components, edge=_EDGE_OF_EXACT)
 def gdist_exact(V: FloatArray, F: IntArray, sources: IntArray) -> _Solve:
     """Exact distance by tvb-gdist (the same implementation)."""
     import gdist
 
-    scale = _binary_scale(V, F, _EDGE_OF_EXACT)
-    positions, faces, seeds = V * scale, F.astype(np.int32), sources.astype(np.int32)
-    return lambda: gdist.compute_gdist(positions, faces, source_indices=seeds) / scale
+    faces, seeds = F.astype(np.int32), sources.astype(np.int32)
+    return lambda: gdist.compute_gdist(V, faces, source_indices=seeds)
 
 
-@_by_components
+@partial(_by_components, edge=_EDGE_OF_EXACT)
 def igl_exact(V: FloatArray, F: IntArray, sources: IntArray) -> _Solve:
     """Exact distance by libigl: the length of the path that the same implementation traces back from each vertex."""
     import igl
 
-    scale = _binary_scale(V, F, _EDGE_OF_EXACT)
-    positions, targets = V * scale, np.arange(len(V))
+    targets = np.arange(len(V))
     # Without keywords the targets land in the argument for source faces, and the result is empty.
-    return lambda: igl.exact_geodesic(V=positions, F=F, VS=sources, VT=targets) / scale
+    return lambda: igl.exact_geodesic(V=V, F=F, VS=sources, VT=targets)
 
 
 @_by_components
@@ -129,7 +122,7 @@ def potpourri3d_heat(
     return lambda: solver.compute_distance_multisource(sources)
 
 
-@_by_components
+@partial(_by_components, edge=_EDGE_OF_MESHLAB)
 def meshlab_front(V: FloatArray, F: IntArray, sources: IntArray) -> _Solve:
     """MeshLab's front from selected vertices, without the cutoff."""
     import pymeshlab
@@ -139,13 +132,13 @@ def meshlab_front(V: FloatArray, F: IntArray, sources: IntArray) -> _Solve:
     return _filtered(V, F, sources, name, maxdistance=cutoff)
 
 
-@_by_components
+@partial(_by_components, edge=_EDGE_OF_MESHLAB)
 def meshlab_border(V: FloatArray, F: IntArray, _: IntArray) -> _Solve:
     """MeshLab's front from all vertices of the border, which are the sources."""
     return _filtered(V, F, None, "compute_scalar_by_border_distance_per_vertex")
 
 
-@_by_components
+@partial(_by_components, edge=_EDGE_OF_MESHLAB)
 def meshlab_heat(V: FloatArray, F: IntArray, sources: IntArray, m: float = 1.0) -> _Solve:
     """MeshLab's heat method, in single precision."""
     return _filtered(V, F, sources, "compute_scalar_by_heat_geodesic_distance_from_selection_per_vertex", m=m)
@@ -154,9 +147,7 @@ def meshlab_heat(V: FloatArray, F: IntArray, sources: IntArray, m: float = 1.0) 
 def _filtered(V: FloatArray, F: IntArray, sources: IntArray | None, name: str, **parameters: Any) -> _Solve:
     import pymeshlab
 
-    # Centred in the bounding box and with edges of about 1, the mesh survives the filters that go through float32.
-    scale = _binary_scale(V, F, 1.0)
-    positions = (V - (V.min(axis=0) + V.max(axis=0)) / 2) * scale
+    positions = V - (V.min(axis=0) + V.max(axis=0)) / 2
     marks = np.zeros(len(V))
     if sources is not None:
         marks[sources] = 1.0
@@ -174,6 +165,6 @@ def _filtered(V: FloatArray, F: IntArray, sources: IntArray | None, name: str, *
         distance = meshes.current_mesh().vertex_scalar_array()
         if sources is not None and np.array_equal(distance, marks):
             raise ValueError("MeshLab's filter failed without saying so and left the old scalars in place")
-        return distance / scale
+        return distance
 
     return solve
