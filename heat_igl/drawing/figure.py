@@ -240,7 +240,7 @@ def mark_dots(axes: Any, dots: FloatArray, depth: FloatArray) -> BoolArray:
     if not len(dots):
         return np.zeros(0, bool)
     fine = dots * OVERSAMPLING
-    is_seen = visible(fine, depth, np.arange(len(dots)), 0.01 * max(depth.shape))
+    is_seen = visible(fine, depth, 0.01 * max(depth.shape))
     size = 16.0 if len(dots) <= 20 else 4.0
     for chosen, fill in ((is_seen, SOURCE), (~is_seen, "none")):
         x, y = dots[chosen, :2].T

@@ -48,7 +48,7 @@ def default_rotation(V: FloatArray, F: IntArray, used: IntArray, marked: IntArra
         turn = rotation(float(azimuth), 20.0)
         points = to_pixels(V @ turn.T, 96 / 2 / np.sqrt(3), np.array([47.5, 47.5]))
         depth = rasterize(points, sample, 96, 96).depth
-        seen = 1.0 if marked is None else float(visible(points, depth, marked, 2.0).mean())
+        seen = 1.0 if marked is None else float(visible(points[marked], depth, 2.0).mean())
         score = float(np.isfinite(depth).mean()) * (0.3 + seen)
         if score > best_score * 1.001:
             best, best_score = turn, score
@@ -143,11 +143,11 @@ def _candidates(low: IntArray, high: IntArray) -> Iterator[tuple[IntArray, IntAr
         start = stop
 
 
-def visible(points: FloatArray, depth: FloatArray, vertices: IntArray, tolerance: float) -> BoolArray:
-    """Mask of the vertices that are at most `tolerance` pixels behind the visible surface."""
-    column, row = np.rint(points[vertices, :2]).astype(np.int64).T
+def visible(points: FloatArray, depth: FloatArray, tolerance: float) -> BoolArray:
+    """Mask of the points that are at most `tolerance` pixels behind the visible surface."""
+    column, row = np.rint(points[:, :2]).astype(np.int64).T
     row, column = np.clip(row, 0, depth.shape[0] - 1), np.clip(column, 0, depth.shape[1] - 1)
-    return np.asarray(points[vertices, 2] >= depth[row, column] - tolerance)
+    return np.asarray(points[:, 2] >= depth[row, column] - tolerance)
 
 
 def visible_runs(points: FloatArray, depth: FloatArray, tolerance: float) -> list[tuple[bool, FloatArray]]:
@@ -162,7 +162,7 @@ def visible_runs(points: FloatArray, depth: FloatArray, tolerance: float) -> lis
     along = np.concatenate([np.arange(count) / count for count in pieces] + [np.ones(1)])[:, None]
     fine = (1 - along) * points[place] + along * points[place + 1]
     middle = (fine[:-1] + fine[1:]) / 2
-    is_seen = visible(middle, depth, np.arange(len(middle)), tolerance)
+    is_seen = visible(middle, depth, tolerance)
     cuts = np.flatnonzero(np.diff(is_seen)) + 1
     starts, stops = np.concatenate([[0], cuts]), np.concatenate([cuts, [len(middle)]])
     return [(bool(is_seen[start]), fine[start : stop + 1]) for start, stop in zip(starts, stops, strict=True)]

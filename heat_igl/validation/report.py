@@ -105,20 +105,15 @@ class ValidationRow:
         """The cells of a table below some of the columns of `ValidationReport.to_markdown`, the method first."""
         if self.failure is not None:
             return [self.method, "failed"] + ["-"] * (len(columns) - 1)
-        found = []
-        for column in columns:
-            path, factor = _COLUMNS[column]
-            value: Any = self
-            for name in path.split("."):
-                value = None if value is None else getattr(value, name)
-            found.append(
-                "-"
-                if value is None
-                else f"{value:d}"
-                if factor == 1 and isinstance(value, int)
-                else f"{factor * value:.3g}"
-            )
-        return [self.method, *found]
+        return [self.method, *(self._cell(*_COLUMNS[column]) for column in columns)]
+
+    def _cell(self, path: str, factor: float) -> str:
+        value: Any = self
+        for name in path.split("."):
+            value = getattr(value, name, None)
+        if value is None:
+            return "-"
+        return str(value) if factor == 1 and isinstance(value, int) else f"{factor * value:.3g}"
 
 
 @dataclass(frozen=True, eq=False)

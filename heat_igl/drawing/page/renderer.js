@@ -89,7 +89,6 @@ class Renderer {
     const { gl, canvas } = this, ratio = window.devicePixelRatio || 1;
     const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
     if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
-    gl.viewport(0, 0, width, height);
     gl.clearColor(1, 1, 1, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const across = Math.floor(width / panels.length);
@@ -101,10 +100,11 @@ class Renderer {
     });
   }
 
-  // Take a program into use, and place what it draws.
-  use(owner, camera) {
+  // Take a program and its arrays into use, and place what it draws.
+  use(owner, arrays, camera) {
     const gl = this.gl, scale = 2 * camera.pixelsPerUnit();
     gl.useProgram(owner.made);
+    gl.bindVertexArray(arrays);
     gl.uniformMatrix3fv(owner.turn, true, camera.turn.flat());
     gl.uniform2f(owner.zoom, scale / camera.panelWidth(), scale / this.canvas.clientHeight);
     gl.uniform2f(owner.pan, ...camera.pan);
@@ -112,34 +112,26 @@ class Renderer {
 
   drawField(panel, camera, style, asPoints, ratio) {
     const gl = this.gl, owner = asPoints ? this.discProgram : this.surfaceProgram;
-    this.use(owner, camera);
+    this.use(owner, asPoints ? panel.onDiscs : panel.onSurface, camera);
     for (const name of ["low", "high", "spacing", "row"]) gl.uniform1f(owner[name], panel[name]);
     gl.uniform1f(owner.lineWidth, 1.3 * ratio);
     gl.uniform1i(owner.style, style);
     gl.uniform1i(owner.isMap, panel.isMap);
-    if (asPoints) {
-      gl.uniform1f(owner.pixels, camera.pixelsPerUnit() * ratio);
-      gl.bindVertexArray(panel.onDiscs);
-      gl.drawArrays(gl.POINTS, 0, this.nVertices);
-    } else {
-      gl.bindVertexArray(panel.onSurface);
-      gl.drawElements(gl.TRIANGLES, this.nCorners, gl.UNSIGNED_INT, 0);
-    }
+    gl.uniform1f(owner.pixels, camera.pixelsPerUnit() * ratio);
+    if (asPoints) gl.drawArrays(gl.POINTS, 0, this.nVertices);
+    else gl.drawElements(gl.TRIANGLES, this.nCorners, gl.UNSIGNED_INT, 0);
   }
 
   drawNeedles(panel, camera) {
-    if (!panel.nNeedles) return;
-    this.use(this.needleProgram, camera);
-    this.gl.bindVertexArray(panel.onNeedles);
+    this.use(this.needleProgram, panel.onNeedles, camera);
     this.gl.drawArrays(this.gl.TRIANGLES, 0, panel.nNeedles);
   }
 
   // Dots behind the surface are drawn too, as shaders.js has it.
   drawDots(panel, camera, ratio) {
     const gl = this.gl;
-    this.use(this.dotProgram, camera);
+    this.use(this.dotProgram, panel.onDots, camera);
     gl.uniform1f(this.dotProgram.size, (panel.nDots <= 20 ? 11 : 5) * ratio);
-    gl.bindVertexArray(panel.onDots);
     gl.depthMask(false);
     for (const [isHidden, compare] of [[1, gl.GREATER], [0, gl.LEQUAL]]) {
       gl.depthFunc(compare);
