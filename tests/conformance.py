@@ -21,7 +21,7 @@ import heat_igl
 from heat_igl import Mesh, PolygonMesh, fibre_metric, image_domain, metric_operators, shapes, speed_operators
 from heat_igl.geodesic import SolverChoice
 from heat_igl.geodesic.choice import Solver
-from heat_igl.typing import FloatArray
+from heat_igl.typing import ArrayLike, BoolArray, FloatArray
 from heat_igl.validation.closed_forms import by_fermat, straight
 from heat_igl.validation.construction import tetrahedra
 
@@ -259,15 +259,26 @@ def _concave_polygons() -> Domain:
     return Domain("polygons", V, [row[row >= 0] for row in rows], truth=partial(straight, V))
 
 
+def crosses_box(p: FloatArray, q: FloatArray, low: ArrayLike, high: ArrayLike) -> BoolArray:
+    """Whether the segments from p to q pass through the inside of a box."""
+    corners, way = np.add([low, high], [[1e-9], [-1e-9]]), q - p
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = [(corner - p) / way for corner in corners]
+    is_between = (corners[0] < p) & (p < corners[1])
+    enters = np.where(way == 0, np.where(is_between, -np.inf, np.inf), np.minimum(*at)).max(axis=-1)
+    leaves = np.where(way == 0, np.inf, np.maximum(*at)).min(axis=-1)
+    return np.maximum(enters, 0) < np.minimum(leaves, 1)
+
+
 def around_the_wall(V: FloatArray, source: int, wall: float, end: float) -> FloatArray:
-    """Distance around a wall at wall < x < wall + 1, y < end, parallel to z; the source has x < wall, y < end."""
-    x, y, z = (V - V[source]).T
-    wall, end = wall - V[source, 0], end - V[source, 1]
-    past_one = np.hypot(wall, end) + np.hypot(x - wall, y - end)
-    past_both = np.hypot(wall, end) + 1 + np.hypot(x - wall - 1, y - end)
-    is_seen = (x <= wall) | (y * wall >= end * x)
-    flat = np.where(is_seen, np.hypot(x, y), np.where(y >= end, past_one, past_both))
-    return np.asarray(np.hypot(flat, z))
+    """Distance around a wall at wall < x < wall + 1, y < end, parallel to z."""
+    P, low, high = V[:, :2], [wall, -np.inf], [wall + 1, end]
+    straight = lambda p, q: np.where(crosses_box(p, q, low, high), np.inf, np.linalg.norm(q - p, axis=-1))  # noqa: E731
+    edges = np.array([[wall, end], high])
+    to_edges = straight(P[source], edges)
+    to_edges = np.minimum(to_edges, to_edges[::-1] + 1)
+    flat = np.minimum(straight(P[source], P), (to_edges + straight(P[:, None], edges)).min(axis=1))
+    return np.hypot(flat, V[:, 2] - V[source, 2])
 
 
 def _wall(shape: tuple[int, ...], spacing: tuple[float, ...], rows: int) -> Domain:
