@@ -11,7 +11,7 @@ import numpy as np
 from heat_igl.errors import SourceError, errors_at, raise_at_first
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
 from heat_igl.mesh.surface_points import require_faces, rows_in_space
-from heat_igl.sources.source_sets import on_simplex
+from heat_igl.sources.source_sets import concatenated, on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 _ACCEPTED = (
@@ -122,9 +122,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
             segments.append((faces, start, end, np.full(len(faces), i)))
     no_segments = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64))
     no_points = (np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64), np.empty((0, 3)))
-    faces, start, end, label = (np.concatenate(column) for column in zip(no_segments, *segments, strict=True))
-    at, barycentric, label_at, normals = (np.concatenate(column) for column in zip(no_points, *points, strict=True))
-    return OrientedSet(faces, start, end, label, at, barycentric, label_at, normals)
+    return OrientedSet(*concatenated([no_segments, *segments]), *concatenated([no_points, *points]))
 
 
 def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -148,8 +146,5 @@ def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray
         )
     with errors_at(name):
         loops = region_boundary(mesh, vertices=mask) if len(mask) == n else region_boundary(mesh, faces=mask)
-    return (
-        np.concatenate([loop.faces for loop in loops]),
-        np.concatenate([loop.start for loop in loops]),
-        np.concatenate([loop.end for loop in loops]),
-    )
+    faces, start, end = concatenated([(loop.faces, loop.start, loop.end) for loop in loops])
+    return faces, start, end

@@ -30,7 +30,7 @@ class SourcePoints(NamedTuple):
 
     def joined(self, other: SourcePoints) -> SourcePoints:
         """These points and others."""
-        return SourcePoints(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+        return SourcePoints(*concatenated([self, other]))
 
 
 class SourceSegments(NamedTuple):
@@ -44,12 +44,8 @@ class SourceSegments(NamedTuple):
 
     def ends(self) -> SourcePoints:
         """Starts and ends of segments."""
-        return SourcePoints(
-            np.tile(self.faces, 2),
-            np.concatenate([self.start, self.end]),
-            np.tile(self.label, 2),
-            np.tile(self.offset, 2),
-        )
+        places = [(self.faces, place, self.label, self.offset) for place in (self.start, self.end)]
+        return SourcePoints(*concatenated(places))
 
 
 NO_POINTS = SourcePoints(_NOWHERE, np.empty((0, 3)), _NOWHERE, np.empty(0))
@@ -330,7 +326,7 @@ class _Builder:
 
     def finish(self) -> SourceSet:
         points = self._points_in_faces() if self._points else NO_POINTS
-        vertices, label = _concatenated(self._vertices)
+        vertices, label = concatenated(self._vertices)
         # A vertex that is named twice is the one with the smallest offset; of equal ones, the first.
         kept = nearest_first(vertices, self._offset[label], label)
         label = label[kept]
@@ -345,7 +341,7 @@ class _Builder:
 
     def _points_in_faces(self) -> SourcePoints:
         """All points but those in a vertex, which are counted among the vertices."""
-        faces, barycentric, label = _concatenated([(p.faces, p.barycentric, label) for p, label in self._points])
+        faces, barycentric, label = concatenated([(p.faces, p.barycentric, label) for p, label in self._points])
         barycentric = on_simplex(barycentric)
         in_vertex = barycentric.max(axis=1) == 1
         if self._F is not None and in_vertex.any():
@@ -356,7 +352,7 @@ class _Builder:
         return SourcePoints(faces[inside], barycentric[inside], label, self._offset[label])
 
     def _all_segments(self) -> SourceSegments:
-        faces, start, end, label = _concatenated(
+        faces, start, end, label = concatenated(
             [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves]
         )
         return SourceSegments(faces, on_simplex(start), on_simplex(end), label, self._offset[label])
@@ -368,7 +364,8 @@ def on_simplex(barycentric: FloatArray) -> FloatArray:
     return np.asarray(kept / kept.sum(axis=1, keepdims=True))
 
 
-def _concatenated(rows: Sequence[tuple[Any, ...]]) -> list[AnyArray]:
+def concatenated(rows: Sequence[tuple[Any, ...]]) -> list[AnyArray]:
+    """The arrays of all rows, column by column."""
     return [np.concatenate(column) for column in zip(*rows, strict=True)]
 
 
