@@ -1,11 +1,9 @@
 """Shapes that no default was tuned for, and the check that every answer by heat gets."""
 
-import math
 import re
 
 import numpy as np
 import pytest
-from conformance import around_the_wall
 from conftest import mean_error, zoo
 
 import heat_igl
@@ -206,10 +204,3 @@ def test_refracted_time_obeys_snells_law():
     V = np.concatenate([[[0.3, 0.1]], end])
     time = by_fermat(np.column_stack([V, np.zeros(5)]), 0, left, right)
     np.testing.assert_allclose(time[1:], 0.2 / np.cos(incidence) / left + 0.3 / right, rtol=1e-6)
-
-
-def test_a_wall_is_passed_at_both_corners():
-    V = np.array([[0.0, 0, 0], [3.0, 1, 0], [5.0, 9, 0], [5.0, 4, 0], [5.0, 4, 3], [4.5, 6, 0]]) - [7, 8, 9]
-    to_end = math.hypot(4, 6)
-    expected = [0, math.hypot(3, 1), math.hypot(5, 9), to_end + 1 + 2, math.hypot(to_end + 3, 3), to_end + 0.5]
-    np.testing.assert_allclose(around_the_wall(V, 0, -3.0, -2.0), expected)
