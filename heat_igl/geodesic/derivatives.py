@@ -120,8 +120,7 @@ class DistanceDerivative:
             If the solver has no positions.
         """
         slopes = self._place_slopes
-        (row,) = gradient_rows(g, self.distance, 1)
-        _, by_place = self._by_sides(row)
+        _, by_place = self._by_sides(*gradient_rows(g, self.distance, 1))
         return np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
     def by_metric(self, g: ArrayLike) -> FloatArray:
@@ -130,14 +129,12 @@ class DistanceDerivative:
         Symmetric on each face. Raises a ValueError without a metric, and if g has another shape or is not finite.
         """
         metric = self._metric("metric_operators(mesh, metric), with a metric on each face for windows")
-        (row,) = gradient_rows(g, self.distance, 1)
-        return metric.by_metric(self._by_sides(row)[0])
+        return metric.by_metric(self._by_sides(*gradient_rows(g, self.distance, 1))[0])
 
     def by_speed(self, g: ArrayLike) -> FloatArray:
         """The gradient (m,) by the speeds that were given to `speed_operators`; `g` (n,), errors as for `by_metric`."""
         metric = self._metric("speed_operators(mesh, speed)")
-        (row,) = gradient_rows(g, self.distance, 1)
-        return metric.by_speed(self._by_sides(row)[0])
+        return metric.by_speed(self._by_sides(*gradient_rows(g, self.distance, 1))[0])
 
     def _metric(self, function: str) -> MetricSides:
         if not isinstance(self._sides, MetricSides):

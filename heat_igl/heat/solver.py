@@ -10,7 +10,7 @@ from heat_igl.errors import AccuracyWarning, checked_cutoff, names_guessed
 from heat_igl.heat.batches import BatchedSolver, LabelledDistance, warn_of
 from heat_igl.heat.checking import AnswerCheck
 from heat_igl.heat.parts import Diagnostics, HeatSolution, Magnitude, SolverOptions, SolverParts, prepare, prepare_mesh
-from heat_igl.heat.source_terms import Seeds, SourceTerm, drop_overtaken, right_hand_side, warmest_sources
+from heat_igl.heat.source_terms import SourceTerm, drop_overtaken, right_hand_side, warmest_sources
 from heat_igl.heat.steps import Boundary, damping, normalize
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh
@@ -361,8 +361,13 @@ def _pin_level(parts: SolverParts, term: SourceTerm, phi: FloatArray, u: FloatAr
         begin = lowest[components[far.vertex]]
         taken = far.value - begin < (distance[far.vertex] - begin) * (1 + _HEAT_ERROR)
         distance[far.vertex[taken]] = far.value[taken]
-    if parts.t_damping is not None or not term.sources.on_vertices_alone:
-        _bound_by_edges(parts, term.near, distance)
+    is_bounded = parts.t_damping is not None or not term.sources.on_vertices_alone
+    if is_bounded and domain.surface is not None:
+        # Across an edge from a known value, distance changes by no more than the length of the edge.
+        which, ends, lengths = parts.assembler.edges.around(term.near.vertex)
+        value = term.near.value[which]
+        np.maximum.at(distance, ends, value - lengths)
+        np.minimum.at(distance, ends, value + lengths)
     distance[term.near.vertex] = term.near.value
 
 
@@ -386,16 +391,6 @@ def _level_of_source(parts: SolverParts, term: SourceTerm, excess: FloatArray, u
     part = parts.heat_flow.solve(weighted)[:, 0]
     warm = u > 0  # always, but for noise under "cotan" and a cold boundary
     return low + (high - low) * np.clip(np.divide(part, u, out=np.zeros_like(u), where=warm), 0.0, 1.0)
-
-
-def _bound_by_edges(parts: SolverParts, near: Seeds, distance: FloatArray) -> None:
-    """Across an edge from a known value, distance changes by no more than the length of the edge."""
-    if parts.operators.surface is None:
-        return
-    which, ends, lengths = parts.assembler.edges.around(near.vertex)
-    value = near.value[which]
-    np.maximum.at(distance, ends, value - lengths)
-    np.minimum.at(distance, ends, value + lengths)
 
 
 def _warn_if_cold(parts: SolverParts, term: SourceTerm, u: FloatArray) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from heat_igl.heat.steps import HeatFlow
-from heat_igl.operators import Operators
+from heat_igl.operators import Operators, Surface
 from heat_igl.operators.matrices import edge_paths
 from heat_igl.plan import NEAR_RADIUS
 from heat_igl.runtime import SOURCE_HEAT
@@ -129,7 +129,6 @@ class SourceAssembler:
         # Of each component, if each has a time step.
         self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
         surface = domain.surface
-        self._faces = None if surface is None else surface.faces
         # In edges of the mesh: if vertices were added, the operators have shorter ones.
         self._radius = NEAR_RADIUS
         if surface is not None and surface.faces.n < domain.n:
@@ -146,9 +145,7 @@ class SourceAssembler:
     @cached_property
     def windows(self) -> ExactSurface:
         """Exact distance on the faces before any flip, in which points and curves lie."""
-        if self._faces is None:
-            raise ValueError("windows need triangles")
-        return ExactSurface(self._faces)
+        return ExactSurface(cast(Surface, self._domain.surface).faces)
 
     def term(self, sources: SourceSet) -> SourceTerm:
         """Initial heat of `sources`, and the distances known around them."""
@@ -229,18 +226,19 @@ class SourceAssembler:
         more than two faces it is not: the tufted cover leads over it from a face to two of the others alone.
         """
         surface = self._domain.surface
-        if surface is None or self._faces is None:
+        if surface is None:
             return _NONE, _NONE
+        faces = surface.faces
         if sources.on_vertices_alone:
             is_covered = surface.uncovered is not None and not self._plain
-            if not (is_covered and self._faces.meets_shared_edge(sources.vertices[rim])):
+            if not (is_covered and faces.meets_shared_edge(sources.vertices[rim])):
                 return _NONE, _NONE
         begin = sources.offsets.min()
-        radius = self._radius * self._h_at(np.arange(self._faces.n))
+        radius = self._radius * self._h_at(np.arange(faces.n))
         # The corners of the sources' own faces are known, too, however far they are.
         places = sources.points.joined(sources.segments.ends())
-        own, _ = self._faces.locate(places.faces, places.barycentric)
-        reach = max(float(radius.max()), float(self._faces.l[own].max(initial=0.0)))
+        own, _ = faces.locate(places.faces, places.barycentric)
+        reach = max(float(radius.max()), float(faces.l[own].max(initial=0.0)))
         at_rim = {name: getattr(sources, name)[rim] for name in ("vertices", "vertex_label", "vertex_offset")}
         started = replace(sources, **at_rim)
         found = self.windows.solve(
@@ -250,7 +248,7 @@ class SourceAssembler:
         value = found.distance + begin
         is_near = value - offset <= radius
         is_far = np.zeros(len(value), bool)
-        is_far[self._faces.F[own]] = True
+        is_far[faces.F[own]] = True
         is_far &= np.isfinite(value) & ~is_near
         all_of_them = Seeds(np.arange(len(value)), value, label)
         return all_of_them.at(is_near), all_of_them.at(is_far)
@@ -260,10 +258,10 @@ class SourceAssembler:
         vertices = sources.vertices[rim]
         of_vertices = vertices, np.ones(len(vertices)), sources.vertex_label[rim], sources.vertex_offset[rim]
         surface = self._domain.surface
-        if sources.on_vertices_alone or surface is None or self._faces is None:
+        if sources.on_vertices_alone or surface is None:
             return of_vertices
         h = self._h_at(surface.given_faces[sources.segments.faces, 0])
-        along, lengths = samples(self._faces, sources.segments, h * _SPACING)
+        along, lengths = samples(surface.faces, sources.segments, h * _SPACING)
         h = self._h_at(surface.given_faces[along.faces, 0])
         amount = np.concatenate([np.ones(len(sources.points.faces)), lengths / (h * _EDGES_PER_POINT)])
         points = sources.points.joined(along)

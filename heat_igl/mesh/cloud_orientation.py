@@ -133,12 +133,6 @@ def _folds(P: FloatArray, F: IntArray, pairs: IntArray, runs_alike: BoolArray) -
     return np.asarray(np.einsum("kx,kx->k", *ends) * np.where(runs_alike, 1, -1))
 
 
-def is_oriented_manifold(surface: Mesh) -> bool:
-    """Whether a surface with at most two faces per edge is oriented consistently, with one fan of faces per vertex."""
-    F, n = surface.F, surface.n_vertices
-    return not (glued_sides(F, n)[2].any() or len(pinched_vertices(F, n)))
-
-
 def _points_between(F: IntArray, pairs: IntArray) -> IntArray:
     """The common points (k,) of the two triangles of each pair."""
     common = (F[pairs[:, 0], :, None] == F[pairs[:, 1], None]).any(axis=2)
@@ -153,9 +147,10 @@ def folded_points(surface: Mesh) -> IntArray:
     return _points_between(surface.F, pairs[folds > _FOLDED_BACK])
 
 
-def two_sided_cover(surface: Mesh) -> Mesh:
+def two_sided_cover(surface: Mesh) -> Mesh | None:
     """The orientation double cover of a surface with m triangles, n vertices and at most two triangles per edge.
 
+    None if the surface needs none: neighbours are oriented alike, and there is one fan of triangles at each vertex.
     Neighbours may be oriented inconsistently, and a vertex may have several fans of triangles. The cover has 2 m
     triangles: f is the front of triangle f, and m + f its back. Vertex v is in the largest fan around v, and n + v in
     the back of this fan. Smaller fans get vertices of their own, from 2 n on, so that each vertex has one fan. The
@@ -163,6 +158,8 @@ def two_sided_cover(surface: Mesh) -> Mesh:
     """
     F, n = surface.F, surface.n_vertices
     first, second, runs_alike = glued_sides(F, n)
+    if not (runs_alike.any() or len(pinched_vertices(F, n))):
+        return None
     # Corner h is h in front, and h + 3 m on the back. If two neighbours are inconsistent, the front of one is glued to
     # the back of the other.
     pairs = []

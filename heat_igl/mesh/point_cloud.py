@@ -226,12 +226,12 @@ class PointCloud:
 
         Tangent vectors, and what follows them, live on it.
         """
-        from heat_igl.mesh.cloud_orientation import is_oriented_manifold, two_sided_cover
+        from heat_igl.mesh.cloud_orientation import two_sided_cover
 
-        surface = self.triangles
-        if is_oriented_manifold(surface):
+        surface, n = self.triangles, len(self.P)
+        cover = two_sided_cover(surface)
+        if cover is None:
             return None
-        cover, n = two_sided_cover(surface), len(self.P)
         originals = np.arange(cover.n_vertices)
         originals[: 2 * n] = np.concatenate([surface.originals, surface.originals + n])
         return cover.with_originals(originals)

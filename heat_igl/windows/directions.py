@@ -87,7 +87,7 @@ class PathDirections:
         """
         origin, vertices = found.origin, np.arange(len(found.distance))
         if origin.place is not None:
-            return self._of_curves(self.of_ways(vertices, origin), origin)
+            return self._of_curves(self.of_ways(vertices, origin), origin, origin.place)
         # The last entry stands for no source, whose label is -1.
         corner, points, nothing = self._first[sources.vertices], sources.points, np.zeros(1, np.int64)
         faces = np.concatenate([corner // 3, points.faces, nothing])
@@ -95,9 +95,9 @@ class PathDirections:
         starts = unchecked_points(faces[origin.label], barycentric[origin.label])
         return self.of_ways(vertices, origin, points), starts
 
-    def _of_curves(self, angles: PathAngles, origin: Origin) -> tuple[PathAngles, SurfacePoints]:
+    def _of_curves(self, angles: PathAngles, origin: Origin, place: FloatArray) -> tuple[PathAngles, SurfacePoints]:
         """`of_windows` for paths from segments."""
-        root, corner, place = origin.root, _known(origin.corner), _known(origin.place)
+        root, corner = origin.root, origin.corner
         n, first = len(root), first_parts(root)
         start = root[first]
         at_vertex = np.flatnonzero((start >= 0) & (start < n))
@@ -119,9 +119,9 @@ class PathDirections:
         Roots in `ways` are indices of the paths to the last bend or to the source vertex, and n + i for source point i.
         Without `points`, the departure of a path from a point inside a face is measured in the triangle of the point.
         """
-        angles, n, corner = self.angles, len(vertex), _known(ways.corner)
+        angles, n, corner = self.angles, len(vertex), ways.corner
         row = np.flatnonzero((corner >= 0) & (ways.root >= 0))
-        corner, root, (x, y) = corner[row], ways.root[row], _known(ways.direction)[row].T
+        corner, root, (x, y) = corner[row], ways.root[row], ways.direction[row].T
         departure, back = np.full((2, n), np.nan)
         at_vertex = root < n
         seen = np.arctan2(y, x)
@@ -178,12 +178,6 @@ class PathDirections:
             if isinstance(flips, Moved):  # surfaces with other changes have no polar angles
                 faces, barycentric = flips.carry(faces, barycentric, turn)
         return turn
-
-
-def _known(part: AnyArray | None) -> AnyArray:
-    if part is None:
-        raise ValueError("angles of paths need a solution with directed=True")
-    return part
 
 
 def first_parts(root: IntArray) -> IntArray:

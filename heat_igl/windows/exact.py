@@ -155,7 +155,7 @@ class Searched(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """Origins of the shortest paths to k vertices or points. The optional fields are set in directed searches.
+    """Origins of the shortest paths to k vertices or points. The fields with defaults are set in directed searches.
 
     Attributes
     ----------
@@ -169,10 +169,10 @@ class Origin(NamedTuple):
         the path has length 0 or runs inside one face.
     crossing : (k,) float64
         Distance of the crossing from the tail of this half-edge, in the unit of the mesh.
-    corner : (k,) int64, optional
+    corner : (k,) int64
         Corner ``3 f + c`` of the triangulation through which the last straight part leaves the root, on consistently
         oriented faces; ``3 f`` for a source point in face f; -1 for none.
-    direction : (k, 2) float64, optional
+    direction : (k, 2) float64
         The direction in the frame of this corner, not normalized. The first axis is the side to the next corner.
     turn : (k,) float64, optional
         Angle to be added to a direction in this triangle to get it in the first triangle of the source point.
@@ -184,8 +184,8 @@ class Origin(NamedTuple):
     root: IntArray
     entered: IntArray
     crossing: FloatArray
-    corner: IntArray | None = None
-    direction: FloatArray | None = None
+    corner: IntArray = _NO_VERTICES
+    direction: FloatArray = np.empty((0, 2))
     turn: FloatArray | None = None
     place: FloatArray | None = None
 

@@ -32,19 +32,24 @@ def glue(F: cython.const[cython.longlong][:, ::1], V: cython.const[cython.double
     with cython.nogil:
         # Half-edges sorted by the lower end, each with the upper one; in the end, ``begin[v]`` is where those of v end.
         for f in range(m):
-            for c in range(3):
-                vertex[3 * f + c] = F[f, c]
-            for c in range(3):
-                begin[min(vertex[3 * f + (c + 1) % 3], vertex[3 * f + (c + 2) % 3]) + 1] += 1
+            vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2] = F[f, 0], F[f, 1], F[f, 2]
+            a, b, c = vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2]
+            begin[min(b, c) + 1] += 1
+            begin[min(c, a) + 1] += 1
+            begin[min(a, b) + 1] += 1
         for v in range(n):
             begin[v + 1] += begin[v]
         for f in range(m):
-            for c in range(3):
-                a: cython.int = vertex[3 * f + (c + 1) % 3]
-                b: cython.int = vertex[3 * f + (c + 2) % 3]
-                at: cython.int = begin[min(a, b)]
-                begin[min(a, b)] = at + 1
-                sides[at, 0], sides[at, 1] = 3 * f + c, max(a, b)
+            a, b, c = vertex[3 * f], vertex[3 * f + 1], vertex[3 * f + 2]
+            at: cython.int = begin[min(b, c)]
+            begin[min(b, c)] = at + 1
+            sides[at, 0], sides[at, 1] = 3 * f, max(b, c)
+            at = begin[min(c, a)]
+            begin[min(c, a)] = at + 1
+            sides[at, 0], sides[at, 1] = 3 * f + 1, max(c, a)
+            at = begin[min(a, b)]
+            begin[min(a, b)] = at + 1
+            sides[at, 0], sides[at, 1] = 3 * f + 2, max(a, b)
         # Those that have both ends in common are glued.
         for lower in range(n):
             first: cython.int = i
