@@ -146,7 +146,8 @@ class _Bends(Ray):
     are `near`, on ways of `near_value`. Edges begin from one end if it `is_lone`.
     The edges that end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`; `followed` (e,)
     are the points of an edge whose ways have been followed, in bits, and `refuted` is an edge at which one was hidden.
-    `front` is the edge or source from which the last point has its way, as of `front_at`.
+    Of the last point, `front` is the edge or source from which it has its way, as of `front_at`, `slope` that of
+    distance along the edge, and `origin` the source.
     """
 
     edges: cython.const[cython.int][:, ::1]
@@ -234,7 +235,9 @@ class _Bends(Ray):
         edge.count = 0
         for j in range(5):
             if j > 0 and follows and not edge.fits:
-                hidden: cython.bint = self.is_hidden(i, j, front[j - 1]) or self.is_hidden(i, j - 1, front[j])
+                hidden: cython.bint = front[j - 1] != front[j]
+                hidden = hidden and (self.is_hidden(i, j, front[j - 1]) or self.is_hidden(i, j - 1, front[j]))
+                self.origin = label[j]
                 self.meet(i, j, slope[j - 1], slope[j], hidden)
             self.add_piece(i, j * part, edge.at[j], label[j])
 
@@ -304,10 +307,9 @@ class _Bends(Ray):
         """The source of the point of an edge at its `share`: that of the beginning of a piece next to it."""
         edge: cython.pointer[_Edge] = cython.address(self.edge[i])
         best: cython.int = 0
+        place: cython.double = self.share * edge.length
         for j in range(1, edge.count):
-            if fabs(edge.pieces[j].begin - self.share * edge.length) < fabs(
-                edge.pieces[best].begin - self.share * edge.length
-            ):
+            if fabs(edge.pieces[j].begin - place) < fabs(edge.pieces[best].begin - place):
                 best = j
         return edge.pieces[best].label
 
