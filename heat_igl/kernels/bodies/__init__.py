@@ -8,8 +8,9 @@ ends have distances.
 - `sight`: from near to far, each vertex looks for the sources of its neighbours, the nearest first, and takes the
   shortest line that stays inside. Then neighbours that do not see this source look again, until nothing changes. A
   vertex that sees no source stays at infinity.
+- `edge_distances`: distance along an edge is that from one point beside it, if this agrees at the middle and the
+  quarters, else interpolated between these and the places at which two fronts meet. The points take ways as vertices
+  do. Where both ends see one source, the points between are presumed to, until a way bends there.
 - `bends`: each edge, from near to far, whose ends have got shorter distances is fitted, and vertices around it take the
-  ways around it as far as they see it; until no end gets shorter. Points of an edge take ways as vertices do.
-  Distance along it is that from one point beside it, if this agrees at the middle and the quarters, else interpolated.
-  Where both ends see one source, the points between are presumed to, until a way bends there.
+  ways around it as far as they see it; until no end gets shorter.
 """
