@@ -330,6 +330,47 @@ def _sum_products(
                     to[j + k] += mean[j + k]
 
 
+@cython.cfunc
+@cython.nogil
+def _sum_around(
+    v: cython.int,
+    corners: cython.const[cython.int][:, ::1],
+    first: cython.const[cython.int][::1],
+    incident: cython.const[cython.int][::1],
+    at: cython.const[cython.double][:, ::1],
+    near: cython.int[::1],
+    met: cython.int[::1],
+    mean: cython.pointer[cython.double],
+) -> cython.double:
+    """Set `mean` (42,) to the sum of `at` (n, c) over the corners of simplices at v; returns how many others they meet.
+
+    `near` and `met` (n,) are room to work in, the latter 0 before and after.
+    """
+    size: cython.int = corners.shape[1]
+    others: cython.double = -1.0
+    n_met: cython.int = 0
+    for j in range(42):
+        mean[j] = 0.0
+    for i in range(first[v], first[v + 1]):
+        t: cython.int = simplex_of(incident[i], size)
+        for c in range(size):
+            u: cython.int = corners[t, c]
+            # Overwritten by the next one, if it was met before.
+            near[n_met] = u
+            n_met += met[u] == 0
+            met[u] += 1
+    for i in range(n_met):
+        u = near[i]
+        others += cython.cast(cython.double, first[u + 1] - first[u]) / size
+        times: cython.double = met[u]
+        of = cython.address(at[u, 0])
+        for j in range(0, at.shape[1], 6):
+            for k in range(6):
+                mean[j + k] += times * of[j + k]
+        met[u] = 0
+    return others
+
+
 def fits_around(
     corners: cython.const[cython.int][:, ::1],
     X: cython.const[cython.double][:, ::1],
@@ -365,27 +406,7 @@ def fits_around(
     with cython.nogil:
         _sum_products(corners, X, W, group, level, origin, at)
         for v in range(X.shape[0]):
-            others: cython.double = -1.0
-            for k in range(42):
-                mean[k] = 0.0
-            n_met: cython.int = 0
-            for i in range(first[v], first[v + 1]):
-                t: cython.int = simplex_of(incident[i], size)
-                for c in range(size):
-                    u: cython.int = corners[t, c]
-                    # Overwritten by the next one, if it was met before.
-                    near[n_met] = u
-                    n_met += met[u] == 0
-                    met[u] += 1
-            for i in range(n_met):
-                u = near[i]
-                others += cython.cast(cython.double, first[u + 1] - first[u]) / size
-                times: cython.double = met[u]
-                of = cython.address(at[u, 0])
-                for j in range(0, n_columns, 6):
-                    for k in range(6):
-                        mean[j + k] += times * of[j + k]
-                met[u] = 0
+            others: cython.double = _sum_around(v, corners, first, incident, at, near, met, mean)
             total: cython.double = max(mean[0], 1.0)
             for k in range(n_columns):
                 mean[k] /= total
