@@ -87,7 +87,7 @@ class HopfLaxEngine(SimplexEngine):
         crossings: tuple[AnyArray, ...] = np.zeros(of.n + 1, np.int32), np.empty((0, 3), np.int32), np.empty(0)
         if (mark != 0).any():
             crossings = self._crossings(mark, kernel(corners, *metric))
-        return corners, self._first, self._incident, crossings, *metric
+        return corners, *self._incident, crossings, *metric
 
     def _marks(self) -> AnyArray:
         """A number (m,) for the metric of each simplex, to seven digits as equal ones may differ by rounding; or 0.

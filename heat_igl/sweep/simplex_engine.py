@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,8 +31,12 @@ class SimplexEngine(Engine):
     def __init__(self, simplices: MetricSimplices) -> None:
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
-        known: Any = simplices.incident
-        self._first, self._incident = known or incidence.corners_by_vertex(self._corners, simplices.n)
+
+    @cached_property
+    def _incident(self) -> tuple[AnyArray, AnyArray]:
+        """The corners that meet in each vertex, as `MetricSimplices.incident` has them."""
+        found: tuple[AnyArray, AnyArray] | None = self._simplices.incident
+        return found or incidence.corners_by_vertex(self._corners, self._simplices.n)
 
     @abstractmethod
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:

@@ -1,4 +1,4 @@
-"""`Sweep`: distance by unfolding two triangles at a time, in an order of the vertices that is found on the way.
+"""`SweepEngine`: distance by unfolding two triangles at a time, in an order of the vertices that is found on the way.
 
 A vertex gets its distance from neighbours that are nearer to the source, by laying triangles out in the plane.
 docs/engines_theory.md has the update and its error.
