@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -40,15 +39,13 @@ LEAST = 0.01
 WRONG, RIGHT = 5, 2
 
 
-METHODS: dict[str, Callable[[Mesh], Query]] = {
-    "heat": ours("heat"),
-    "sweep": ours("sweep"),
-    "windows": ours("windows"),
-    "meshlab": lambda mesh: partial(reference.meshlab, mesh),
-    "meshlab_heat": lambda mesh: partial(reference.meshlab_heat, mesh),
-    "igl": lambda mesh: partial(reference.igl_heat, mesh),
-    "potpourri3d": lambda mesh: partial(reference.potpourri3d_heat, mesh),
-}
+def theirs(name: str) -> Callable[[Mesh], Query]:
+    return lambda mesh: lambda source: reference.measured(name, mesh, source).distance
+
+
+METHODS: dict[str, Callable[[Mesh], Query]] = {name: ours(name) for name in ("heat", "sweep", "windows")}
+METHODS |= {name.removesuffix("_heat"): theirs(name) for name in ("meshlab", "igl_heat", "potpourri3d_heat")}
+METHODS["meshlab_heat"] = theirs("meshlab_heat")
 
 
 def field(

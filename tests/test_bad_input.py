@@ -54,7 +54,7 @@ from heat_igl.io.by_nibabel import FREESURFER_SUFFIXES
 from heat_igl.io.curves import read_polylines
 from heat_igl.io.files import MESH_SUFFIXES
 from heat_igl.linear import analyse
-from heat_igl.operators import operators
+from heat_igl.operators import edge_length_operators, operators
 from heat_igl.sampling import dual_triangulation, farthest_cells
 from heat_igl.sources import source_set, vertex_sources
 from heat_igl.validation import closed_forms, metrics
@@ -273,7 +273,7 @@ CURVE = SurfaceCurve([0, 1], [[1, 0, 0], [0, 0.5, 0.5]], [[0.5, 0.5, 0], [0.2, 0
 CENTRE = [[1 / 3] * 3]
 GRID = heat_igl.shapes.grid(4)
 TRIANGLE, SQUARE, ROW = [[0, 1, 2]], V4[[0, 1, 3, 2]], np.outer(np.arange(30), [1.0, 2, 3])
-BY_LENGTHS = GeodesicSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]])
+BY_LENGTHS = GeodesicSolver(edge_length_operators(TRIANGLE, [[1, 1, 1]]))
 SPHERE, BOX, BOOK = heat_igl.shapes.icosphere(4), heat_igl.shapes.box(1), heat_igl.shapes.book(3, 2)
 PYGEODESIC = pygeodesic.PyGeodesicAlgorithmExact(twice(BALL).V, twice(BALL).F)
 TWISTED, TWO, TORUS = moebius_strip(8, 1), twice(BALL), heat_igl.shapes.torus(20, 60)
@@ -382,7 +382,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     ),
     # Edge lengths and gluing.
     *(
-        (lambda _, given=given: HeatMethodSolver.from_edge_lengths(TRIANGLE, given), pattern)
+        (lambda _, given=given: edge_length_operators(TRIANGLE, given), pattern)
         for given, pattern in (
             ([[1.0, 1.0]], r"one length per side of F, .* shape \(1, 2\)"),
             ([[1.0, np.nan, 1.0]], r"l\[0, 1\] = nan is not a length"),
@@ -390,17 +390,14 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
         )
     ),
     *(
-        (
-            lambda _, twin=twin: HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=twin),
-            pattern,
-        )
+        (lambda _, twin=twin: edge_length_operators([[0, 1, 1]], [[1, 3, 3]], twin=twin), pattern)
         for twin, pattern in (
             ([[-1, 2, -1]], r"twin\[0, 1\] = 2 is no half-edge .* glued back to 1 \(1 entries"),
             ([[0, 2, 1]], r"twin\[0, 0\] = 0 is no half-edge"),
             ([[1, 0, -1]], r"twin\[0, 0\] = 1 is no half-edge that ends at the same vertices"),
         )
     ),
-    (lambda _: HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]], laplacian="graph"), "laplacian must be"),
+    (lambda _: edge_length_operators(TRIANGLE, [[1, 1, 1]], laplacian="graph"), "laplacian must be"),
     # Tangent vectors.
     (
         lambda m: tangent_frames(m).to_world(np.ones((3, 2))),
@@ -713,8 +710,8 @@ ACCEPTED: dict[str, Callable[[heat_igl.Mesh], Any]] = {
     "long lines": lambda _: heat_igl.exp_map(heat_igl.shapes.cylinder(3, 1, 1e6), 0, [[9, 4e5], [4e5, 9]]),
     "polygons": lambda _: PolygonMesh(SQUARE, [[0, 1, 2, 3]]),
     "last face": lambda m: SurfacePoints([0, 79], CENTRE * 2).positions(m),
-    "edge lengths": lambda _: HeatMethodSolver.from_edge_lengths(TRIANGLE, [[1, 1, 1]]),
-    "gluing": lambda _: HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]]),
+    "edge lengths": lambda _: edge_length_operators(TRIANGLE, [[1, 1, 1]]),
+    "gluing": lambda _: edge_length_operators([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]]),
     "one tangent vector": lambda m: tangent_frames(m).to_world([1.0, 0], [0]),
     "corners in one place": lambda _: (
         np.testing.assert_allclose(geodesic_distance(POINTED, 0, cutoff=0.4)[RING], 0, atol=1e-9),

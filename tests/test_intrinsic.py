@@ -28,7 +28,7 @@ from heat_igl.intrinsic import (
     transport_angles,
     tufted_cover,
 )
-from heat_igl.operators import intrinsic_operators, operators, tufted_operators
+from heat_igl.operators import edge_length_operators, intrinsic_operators, operators, tufted_operators
 from heat_igl.operators.matrices import edge_paths
 from heat_igl.typing import FloatArray, IntArray
 from heat_igl.validation.construction import joined
@@ -222,17 +222,17 @@ def test_edge_lengths_and_gluing_of_triangles_that_meet_themselves():
     given = {"F": flipped.F, "lengths": flipped.l, "twin": flipped.twin.reshape(-1, 3)}
     truth = exact_distance(mesh.V, mesh.F, 7)
     for made, bound in ((GeodesicSolver, 1e-10), (HeatMethodSolver, 0.1)):
-        found = made.from_edge_lengths(**given).distance(7)
+        found = made(edge_length_operators(**given)).distance(7)
         assert np.abs(found - truth).max() < bound * truth.max()
 
 
 def test_a_triangle_rolled_up_to_a_cone():
     """Two of its sides are glued, and the third is a loop at one vertex, the boundary."""
-    solver = HeatMethodSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]])
+    cone = edge_length_operators([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]])
+    solver = HeatMethodSolver(cone)
     assert solver.distance(0) == pytest.approx([0, 3])
     assert solver.operators.M.diagonal().sum() == pytest.approx(0.5 * np.sqrt(9 - 0.25))
-    exact = GeodesicSolver.from_edge_lengths([[0, 1, 1]], [[1, 3, 3]], twin=[[-1, 2, 1]], method="exact")
-    assert exact.distance(1) == pytest.approx([3, 0])
+    assert GeodesicSolver(cone, method="exact").distance(1) == pytest.approx([3, 0])
 
 
 # --- Intrinsic Delaunay refinement: angles, the surface that stays the same, and points that are carried along
@@ -481,7 +481,7 @@ def test_obtuse_triangles_at_the_boundary_take_the_cover():
 
 def test_edge_lengths_alone_are_refined_too():
     mesh = stretched()
-    by_lengths = HeatMethodSolver.from_edge_lengths(mesh.F, igl.edge_lengths(mesh.V, mesh.F), t_coef=0.5)
+    by_lengths = HeatMethodSolver(edge_length_operators(mesh.F, igl.edge_lengths(mesh.V, mesh.F)), t_coef=0.5)
     assert by_lengths.n_vertices == mesh.n_vertices < by_lengths.operators.n
     # With a time step that was asked for, heat is not held to bounds, for which positions are needed.
     assert np.abs(by_lengths.distance(5) - HeatMethodSolver(mesh, t_coef=0.5).distance(5)).max() < 1e-9

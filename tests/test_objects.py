@@ -320,7 +320,7 @@ CALLS: dict[str, Call] = {
 NOT_CALLED = {"CutMesh", "ImageDomain", "MeshPiece", "SurfaceCurve", "Terrain", "ValidationReport"}
 # Called in the tests of curves, with stand-ins for the libraries.
 NOT_CALLED |= {"to_open3d", "to_pyvista", "to_trimesh"}
-IN_PROCESSES = {"igl_heat", "measured", "meshlab", "meshlab_border", "meshlab_heat", "potpourri3d_heat"}
+IN_PROCESSES = {"measured", "meshlab", "meshlab_border", "meshlab_heat"}
 
 
 def written(write: Callable[[Path], Any], name: str) -> str:

@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import igl
@@ -19,7 +18,6 @@ from heat_igl import Mesh, MeshError, read_mesh, reference, shapes
 from heat_igl.errors import MissingExtraError, ReferenceSolverError
 from heat_igl.reference import guarded, solvers
 from heat_igl.runtime import PeakMemory
-from heat_igl.typing import FloatArray
 from heat_igl.validation import closed_forms
 
 SOLVERS = ("windows", *reference.EXACT_SOLVERS)
@@ -220,23 +218,15 @@ def test_heat_filter_of_meshlab_survives_an_offset(cow):
     assert relative_error(reference.meshlab_heat(far, 5), near).max() < 1e-2
 
 
-INEXACT: dict[str, Callable[..., FloatArray]] = {
-    "meshlab": reference.meshlab,
-    "meshlab_heat": reference.meshlab_heat,
-    "igl_heat": reference.igl_heat,
-    "potpourri3d_heat": reference.potpourri3d_heat,
-}
-
-
 @pytest.mark.usefixtures("in_this_process")
-@pytest.mark.parametrize("name", INEXACT)
+@pytest.mark.parametrize("name", ["meshlab", "meshlab_heat", "igl_heat", "potpourri3d_heat"])
 def test_unreachable_is_inf_in_all(cow, name):
     n = cow.n_vertices
     pair = Mesh(np.vstack([twice(cow).V, [[0, 0, 0]]]), twice(cow).F)
-    distance = INEXACT[name](pair, [3, 900])
+    distance = reference.measured(name, pair, [3, 900]).distance
     assert np.isinf(distance[n:]).all()
     assert relative_error(distance[:n], reference.exact(cow, [3, 900])).mean() < 0.1
-    both = INEXACT[name](pair, [3, n + 900])
+    both = reference.measured(name, pair, [3, n + 900]).distance
     assert np.isfinite(both[: 2 * n]).all()
     assert np.isinf(both[2 * n])
 
@@ -248,7 +238,7 @@ def test_igl_heat_is_what_libigl_computes(cow):
         data.use_intrinsic_delaunay = intrinsic
         igl.heat_geodesics_precompute(cow.V, cow.F, 1e-3, data)
         direct = igl.heat_geodesics_solve(data, np.array([7]))
-        found = reference.igl_heat(cow, 7, t=1e-3, intrinsic_delaunay=intrinsic)
+        found = reference.measured("igl_heat", cow, 7, t=1e-3, intrinsic_delaunay=intrinsic).distance
         np.testing.assert_allclose(found, direct, atol=1e-12)
 
 
@@ -327,7 +317,7 @@ def test_a_missing_package_names_its_extra(monkeypatch):
     with pytest.raises(MissingExtraError, match="needs pymeshlab: pip install pymeshlab"):
         reference.meshlab(mesh, 0)
     with pytest.raises(MissingExtraError, match="needs potpourri3d: pip install potpourri3d"):
-        reference.potpourri3d_heat(mesh, 0)
+        reference.measured("potpourri3d_heat", mesh, 0)
     for solver in ("windows", "igl"):  # these are always there
         np.testing.assert_allclose(reference.exact(mesh, 0, solver=solver), closed_forms.plane(mesh, 0))
 

@@ -28,6 +28,7 @@ from heat_igl import (
 from heat_igl.geodesic import SolverChoice
 from heat_igl.heat.source_terms import SourceTerm
 from heat_igl.heat.steps import fitted_laplacian
+from heat_igl.operators import edge_length_operators
 from heat_igl.sources import Sources, source_set, vertex_sources
 
 
@@ -361,9 +362,8 @@ def test_the_dirac_of_a_curve_is_its_length():
 
 
 def from_edge_lengths(F, lengths, method):
-    if method == "heat":
-        return HeatMethodSolver.from_edge_lengths(F, lengths, t_coef=0.5)
-    return GeodesicSolver.from_edge_lengths(F, lengths, method=method)
+    domain = edge_length_operators(F, lengths)
+    return HeatMethodSolver(domain, t_coef=0.5) if method == "heat" else GeodesicSolver(domain, method=method)
 
 
 @pytest.mark.parametrize("name", ["cow", pytest.param("bunny", marks=pytest.mark.slow)])

@@ -216,30 +216,6 @@ class GeodesicSolver(BatchedSolver):
         self._engine: Engine
         self._plan, self._engine = self._prepared()
 
-    @classmethod
-    def from_edge_lengths(
-        cls,
-        F: ArrayLike,
-        lengths: ArrayLike,
-        *,
-        n: int | None = None,
-        twin: ArrayLike | None = None,
-        method: Method = "auto",
-        tolerance: float = 1e-5,
-    ) -> GeodesicSolver:
-        """A solver on triangles that are known by their edge lengths alone; positions are not needed.
-
-        Parameters
-        ----------
-        F, lengths, n, twin
-            As for `HeatMethodSolver.from_edge_lengths`, with its errors.
-        method, tolerance
-            As for the class.
-        """
-        from heat_igl.operators import edge_length_operators
-
-        return cls(edge_length_operators(F, lengths, n, twin=twin), method=method, tolerance=tolerance)
-
     def _prepared(self) -> tuple[Plan, Engine]:
         """The plan for the domain, and the engine that it names."""
         domain, method, tolerance = self._domain, self._method, self._tolerance

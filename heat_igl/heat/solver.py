@@ -14,7 +14,7 @@ from heat_igl.heat.source_terms import SourceTerm, drop_overtaken, right_hand_si
 from heat_igl.heat.steps import Boundary, damping, normalize
 from heat_igl.linear import Backend
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, as_mesh
-from heat_igl.operators import Laplacian, Operators, edge_length_operators
+from heat_igl.operators import Laplacian, Operators
 from heat_igl.plan import Plan
 from heat_igl.runtime import LOWEST_HEAT, warn_caller
 from heat_igl.sources import Sources, SourceSet, require_resolved, source_set
@@ -34,7 +34,7 @@ class HeatMethodSolver(BatchedSolver):
     mesh : mesh, Operators or (n, 3) array_like
         Whatever `as_mesh` takes, or the positions V of a mesh whose faces are `F`. Polygons are solved on the triangles
         around a virtual vertex in each, points on the triangles between them. Or the operators of a metric, a speed or
-        another domain, as `metric_operators` returns them.
+        edge lengths alone, as `metric_operators` or `edge_length_operators` return them.
     F : (m, 3) or (m, 4) array_like, optional
         Faces, when `mesh` is V.
     t_coef : float, optional
@@ -123,48 +123,6 @@ class HeatMethodSolver(BatchedSolver):
         else:
             self._parts = prepare_mesh(domain, options)
         self._domain = self.operators if isinstance(domain, PolygonMesh) else domain
-
-    @classmethod
-    def from_edge_lengths(
-        cls,
-        F: ArrayLike,
-        lengths: ArrayLike,
-        *,
-        n: int | None = None,
-        twin: ArrayLike | None = None,
-        t_coef: float | None = None,
-        t: float | None = None,
-        laplacian: Laplacian = "auto",
-        boundary: Boundary = "neumann",
-        magnitude: Magnitude = "auto",
-        backend: Backend = "auto",
-    ) -> HeatMethodSolver:
-        """A solver on triangles that are known by their edge lengths alone; positions are not needed.
-
-        Parameters
-        ----------
-        F : (m, 3) array_like of int
-            Vertices of each triangle.
-        lengths : (m, 3) array_like
-            ``lengths[f, c]`` is that of the side of triangle f opposite its corner c, as `igl.edge_lengths` gives it;
-            both triangles at an edge give it the same length.
-        n : int, optional
-            Number of vertices; one more than the largest in `F` if not given.
-        twin : (m, 3) array_like of int, optional
-            ``twin[f, c]`` is ``3 g + d`` where side c of triangle f is glued to side d of triangle g, and -1 on the
-            boundary. By default sides with the same ends are glued. It is needed where several edges join the same two
-            vertices, or a vertex with itself, as in intrinsic triangulations; then a triangle may repeat a vertex.
-        **options
-            As for the class. Where more than two triangles meet at an edge no tufted cover is made, which takes
-            positions: such edges are not flipped.
-
-        Raises
-        ------
-        MeshError
-            If `F`, `lengths` or `twin` cannot be used; the message names the first offender.
-        """
-        options = SolverOptions(t_coef, t, laplacian, boundary, magnitude, backend)
-        return cls._of(prepare(edge_length_operators(F, lengths, n, options.laplacian, twin), options))
 
     def _moved(self, V: ArrayLike) -> HeatMethodSolver:
         options, fans = self._parts.options, self.operators.fans

@@ -113,7 +113,8 @@ class VectorHeatSolver:
         self._originals: IntArray | None = triangles.originals if triangles.has_copies else None
         triangles = tangent_surface(mesh)
         has_two_sides = triangles.n_vertices > self.n_vertices
-        self._frames: TangentFrames | None = tangent_frames(triangles)
+        #: The frames in which vectors are given.
+        self.frames: TangentFrames = tangent_frames(triangles)
         # Angles are carried over flips, not to added vertices.
         domain = operators(triangles, "intrinsic-delaunay")
         if domain.surface is None:
@@ -123,7 +124,7 @@ class VectorHeatSolver:
         #: How values and vectors travel from the sources: by diffusion, or along the shortest paths.
         self._transport: HeatTransport | PathTransport | TwoSidedTransport
         if method == "windows":
-            self._transport = PathTransport(WindowEngine(MeshTriangles(triangles)), self._frames.angles)
+            self._transport = PathTransport(WindowEngine(MeshTriangles(triangles)), self.frames.angles)
         else:
             triangulation = domain.surface.triangulation
             # Thirds of the triangles: with Voronoi areas, transport on spheres is wrong by 5 to 10 % more.
@@ -132,43 +133,8 @@ class VectorHeatSolver:
                 self._distance_solver, edge_rotations(domain), mass.astype(np.float64), OutwardField(domain.surface)
             )
         if has_two_sides:
-            self._transport = TwoSidedTransport(self._transport, self._frames, self.n_vertices)
-            self._frames = self._transport.frames
-
-    @classmethod
-    def from_operators(
-        cls,
-        domain: Operators,
-        rotations: sp.csc_matrix,
-        *,
-        t_coef: float | None = None,
-        t: float | None = None,
-        backend: Backend = "auto",
-    ) -> VectorHeatSolver:
-        """A solver on any domain that has operators and a connection.
-
-        Parameters
-        ----------
-        domain : Operators
-            The domain.
-        rotations : (n, n) csc_matrix of complex128
-            Entry (j, i), where L has one, is exp(i rho), with rho the angle by which the components of a vector turn
-            when it is transported from i to j; Hermitian, with 1 on the diagonal.
-        t_coef, t, backend
-            As for the class.
-
-        Raises
-        ------
-        ValueError
-            If `rotations` has another shape than L.
-        """
-        if rotations.shape != domain.L.shape:
-            raise ValueError(f"rotations must have the shape of L, {domain.L.shape}, not {rotations.shape}")
-        solver = cls.__new__(cls)
-        solver._frames, solver.n_vertices, solver._originals = None, domain.n, None
-        solver._domain, solver._options = domain, SolverOptions(t_coef, t, backend=backend)
-        solver._transport = HeatTransport(solver._distance_solver, rotations)
-        return solver
+            self._transport = TwoSidedTransport(self._transport, self.frames, self.n_vertices)
+            self.frames = self._transport.frames
 
     @cached_property
     def _distance_solver(self) -> HeatMethodSolver:
@@ -177,13 +143,6 @@ class VectorHeatSolver:
 
     def __repr__(self) -> str:
         return f"VectorHeatSolver({self.n_vertices} vertices, {type(self._transport).__name__})"
-
-    @property
-    def frames(self) -> TangentFrames:
-        """The frames in which vectors are given."""
-        if self._frames is None:
-            raise ValueError("this solver was made from operators, and their frames are not known to it")
-        return self._frames
 
     @property
     def operators(self) -> Operators:
@@ -292,8 +251,6 @@ class VectorHeatSolver:
         ------
         SourceError
             If `source` is not one vertex of the mesh.
-        MeshError
-            If the solver was made from operators without triangles.
 
         Notes
         -----
@@ -319,16 +276,12 @@ class VectorHeatSolver:
 class HeatTransport:
     """Extension, transport and the logarithmic map by heat flows, factored when made.
 
-    `rotations` are the connection, see `VectorHeatSolver.from_operators`, and `mass` (n,) is that of each vertex for
-    the flow of vectors, by default that of the operators. `outward` is needed for `log_map`.
+    `rotations` are the connection, as of `edge_rotations`, and `mass` (n,) is that of each vertex for the flow of
+    vectors.
     """
 
     def __init__(
-        self,
-        solver: HeatMethodSolver,
-        rotations: sp.csc_matrix,
-        mass: FloatArray | None = None,
-        outward: OutwardField | None = None,
+        self, solver: HeatMethodSolver, rotations: sp.csc_matrix, mass: FloatArray, outward: OutwardField
     ) -> None:
         parts = solver._parts
         t = parts.diagnostics.t * (_VECTOR_STEP if parts.options.default_time_step else 1.0)
@@ -367,8 +320,6 @@ class HeatTransport:
 
     def log_map(self, vertex: int) -> FloatArray:
         """Vectors (n, 2) from `vertex`, by the angle between the radial field and a transported axis."""
-        if self._outward is None:
-            raise MeshError("the log map needs the triangles around the source, which this domain does not have")
         at, outward = self._outward.dipole(vertex)
         b = np.zeros((self._solver.operators.n, 2), complex)
         largest = np.abs(outward).max(initial=0.0)

@@ -189,23 +189,26 @@ def edge_length_operators(
     F: ArrayLike,
     lengths: ArrayLike,
     n: int | None = None,
-    laplacian: Laplacian = "intrinsic-delaunay",
+    laplacian: Laplacian = "auto",
     twin: ArrayLike | None = None,
 ) -> Operators:
-    """The operators of triangles that are given by their edge lengths.
+    """The operators of triangles that are known by their edge lengths alone; positions are not needed.
 
     Parameters
     ----------
     F : (m, 3) array_like of int
         Vertices of each triangle.
     lengths : (m, 3) array_like
-        ``lengths[f, c]`` is that of the side of triangle f opposite corner c.
+        ``lengths[f, c]`` is that of the side of triangle f opposite corner c, as `igl.edge_lengths` gives it; both
+        triangles at an edge give it the same length.
     n : int, optional
         Number of vertices; one more than the largest in `F` if not given.
-    laplacian : {"intrinsic-delaunay", "intrinsic-delaunay-refined", "auto", "cotan"}
-        As for `operators`. If more than two faces meet at an edge, nothing is refined.
+    laplacian : {"auto", "intrinsic-delaunay", "intrinsic-delaunay-refined", "cotan"}
+        As for `operators`. Where more than two faces meet at an edge, nothing is refined, and no tufted cover is made.
     twin : (m, 3) array_like of int, optional
-        Which sides are glued, as for `intrinsic.from_gluing`; by default those that have both ends in common.
+        ``twin[f, c]`` is ``3 g + d`` where side c of triangle f is glued to side d of triangle g, and -1 on the
+        boundary. By default sides with the same ends are glued. It is needed where several edges join the same two
+        vertices, or a vertex with itself, as in intrinsic triangulations; then a triangle may repeat a vertex.
 
     Raises
     ------

@@ -4,10 +4,8 @@ from heat_igl.reference.solvers import EXACT_SOLVERS as EXACT_SOLVERS
 from heat_igl.reference.solvers import Measured as Measured
 from heat_igl.reference.solvers import edge_paths as edge_paths
 from heat_igl.reference.solvers import exact as exact
-from heat_igl.reference.solvers import igl_heat as igl_heat
 from heat_igl.reference.solvers import measured as measured
 from heat_igl.reference.solvers import meshlab as meshlab
 from heat_igl.reference.solvers import meshlab_border as meshlab_border
 from heat_igl.reference.solvers import meshlab_heat as meshlab_heat
-from heat_igl.reference.solvers import potpourri3d_heat as potpourri3d_heat
 from heat_igl.reference.solvers import straight_lines as straight_lines

@@ -106,14 +106,16 @@ def measured(
     Parameters
     ----------
     solver : str
-        "windows" for the windows of this package, one of `EXACT_SOLVERS`, or the name of another function of
-        `heat_igl.reference`: "meshlab", "meshlab_border", "meshlab_heat", "igl_heat", "potpourri3d_heat".
+        "windows" for the windows of this package, one of `EXACT_SOLVERS`, one of MeshLab's, "meshlab",
+        "meshlab_border" or "meshlab_heat", or the heat method of libigl, "igl_heat", or of geometry-central,
+        "potpourri3d_heat". The last two shift by the mean over the sources, so that of several none need read 0.
     mesh, sources
         As for `exact`.
     timeout, memory
         Bounds for native solvers; windows need neither.
     **options
-        As for the function of that name.
+        `m` of "meshlab_heat", the factor in t = m h^2; `t` (a squared length, by default h^2) and `intrinsic_delaunay`
+        of "igl_heat"; `t_coef` and `use_robust` of "potpourri3d_heat".
 
     Returns
     -------
@@ -271,17 +273,17 @@ def exact(
     return measured(solver, mesh, sources, timeout=timeout, memory=memory).distance
 
 
-def meshlab(mesh: MeshLike, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY) -> FloatArray:
+def meshlab(mesh: MeshLike, sources: Sources) -> FloatArray:
     """MeshLab's geodesic distance from selected vertices: a front that unfolds one triangle per step (pymeshlab).
 
     Neither exact nor a bound; 0.05 to 1 % from exact in the mean on ordinary meshes. The time explodes on some
-    meshes with slivers. Parameters, result and errors are those of `exact`, but the result is not checked, and the
-    surface need not be manifold.
+    meshes with slivers: `measured` has a timeout. Mesh, sources, result and errors are those of `exact`, but the result
+    is not checked, and the surface need not be manifold.
     """
-    return measured("meshlab", mesh, sources, timeout=timeout, memory=memory).distance
+    return measured("meshlab", mesh, sources).distance
 
 
-def meshlab_border(mesh: MeshLike, *, timeout: float = TIMEOUT, memory: float = MEMORY) -> FloatArray:
+def meshlab_border(mesh: MeshLike) -> FloatArray:
     """MeshLab's distance to the boundary (n,), through pymeshlab; ``inf`` on components without boundary.
 
     The sources are all boundary vertices, each with a front of its own; at vertices at which fronts of different
@@ -289,51 +291,12 @@ def meshlab_border(mesh: MeshLike, *, timeout: float = TIMEOUT, memory: float = 
     `meshlab`.
     """
     mesh = as_simplices(mesh)
-    return measured("meshlab_border", mesh, mesh.boundary, timeout=timeout, memory=memory).distance
+    return measured("meshlab_border", mesh, mesh.boundary).distance
 
 
-def meshlab_heat(
-    mesh: MeshLike, sources: Sources, *, m: float = 1.0, timeout: float = TIMEOUT, memory: float = MEMORY
-) -> FloatArray:
+def meshlab_heat(mesh: MeshLike, sources: Sources, *, m: float = 1.0) -> FloatArray:
     """MeshLab's heat method, through pymeshlab: single precision, extrinsic, minimum shifted to 0.
 
     `m` is the scale-free factor in t = m h^2. Parameters, result and errors are otherwise those of `meshlab`.
     """
-    return measured("meshlab_heat", mesh, sources, m=m, timeout=timeout, memory=memory).distance
-
-
-def igl_heat(
-    mesh: MeshLike,
-    sources: Sources,
-    *,
-    t: float | None = None,
-    intrinsic_delaunay: bool = False,
-    timeout: float = TIMEOUT,
-    memory: float = MEMORY,
-) -> FloatArray:
-    """The heat method of libigl exactly as it comes, for parity.
-
-    On a mesh with boundary it averages the heat of Neumann and Dirichlet conditions; it shifts by the mean over the
-    sources, so that of several sources none need read 0; `t` (a squared length) defaults to the square of the mean
-    edge length. Parameters, result and errors are otherwise those of `meshlab`.
-    """
-    options = {"t": t, "intrinsic_delaunay": intrinsic_delaunay}
-    return measured("igl_heat", mesh, sources, **options, timeout=timeout, memory=memory).distance
-
-
-def potpourri3d_heat(
-    mesh: MeshLike,
-    sources: Sources,
-    *,
-    t_coef: float = 1.0,
-    use_robust: bool = True,
-    timeout: float = TIMEOUT,
-    memory: float = MEMORY,
-) -> FloatArray:
-    """geometry-central's heat method through potpourri3d, exactly as it comes, for comparison.
-
-    It shifts by the mean over the sources; `use_robust` solves on an intrinsic Delaunay tufted cover. Parameters,
-    result and errors are otherwise those of `meshlab`.
-    """
-    options = {"t_coef": t_coef, "use_robust": use_robust}
-    return measured("potpourri3d_heat", mesh, sources, **options, timeout=timeout, memory=memory).distance
+    return measured("meshlab_heat", mesh, sources, m=m).distance
