@@ -175,7 +175,8 @@ LARGE_SHARE = 0.55
 # Share of triangles in components with many of these kinds, from which on the components are refined: a scan with a few
 # stray triangles stays as it is.
 UNEVEN_SHARE = 0.01
-# With so few vertices a triangle is large beside the distances that are asked for, and a thousand cost nothing.
+# With so few vertices a triangle of a component is large beside the distances that are asked for, and a thousand for
+# each of some components cost nothing.
 FEW_FOR_HEAT = 64
 ENOUGH_FOR_HEAT = 1000
 # Up to so many vertices, a body around whose edges ways bend is measured on halved tetrahedra as well: of a long edge,

@@ -78,6 +78,18 @@ def test_a_small_component_is_as_accurate_as_alone(ratio, options):
     assert np.abs(solver.distance(point)[:n] - alone.distance(point)).max() < 1e-9
 
 
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+@pytest.mark.parametrize("name", ["hull of 12", "beams", "maze"])
+def test_components_do_not_change_each_other(name):
+    one, other = zoo(name), shapes.icosphere(3)
+    n, far = one.n_vertices, other.V + 3 * np.ptp(one.V, axis=0).max()
+    both = HeatMethodSolver(Mesh(np.concatenate([one.V, far]), np.concatenate([one.F, other.F + n])))
+    for mesh, start in ((one, 0), (other, n)):
+        alone = HeatMethodSolver(mesh).distance(0)
+        together = both.distance(start)[start : start + len(alone)]
+        assert np.abs(together - alone).max() < 0.003 * alone.max()
+
+
 def test_where_heat_has_no_digits_a_face_is_named():
     grid, ball = shapes.grid(3), shapes.icosphere(2)
     point = Mesh([*grid.V, *([[2.0, 2, 2]] * 3)], [*grid.F, [16, 17, 18]])

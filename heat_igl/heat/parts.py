@@ -192,11 +192,11 @@ def time_step(options: SolverOptions, domain: Operators, fitted: bool) -> tuple[
                 AccuracyWarning,
             )
         return step, options.t
-    t_coef = options.t_coef
+    t_coef: float | FloatArray | None = options.t_coef
     if t_coef is None:
         t_coef = plan.T_COEF
         if fitted:
-            t_coef = plan.T_COEF_ROUGH if is_rough_or_narrow(domain) else plan.T_COEF_FITTED
+            t_coef = np.where(is_rough_or_narrow(domain), plan.T_COEF_ROUGH, plan.T_COEF_FITTED)
     requested = t_coef * domain.mean_edge_lengths**2
     steps = np.maximum(requested, smallest_time_steps(domain, fitted))
     used = np.unique(domain.components[domain.referenced])

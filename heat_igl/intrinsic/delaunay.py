@@ -46,7 +46,7 @@ def delaunay_refinement(
     triangulation: IntrinsicTriangulation,
     most_vertices: int,
     *,
-    largest_radius: float = np.inf,
+    largest_radius: float | FloatArray = np.inf,
     unit: FloatArray | None = None,
 ) -> IntrinsicTriangulation:
     """Add circumcenters as vertices until no angle is below 25 degrees (Sharp, Soliman, Crane 2019, section 4.2).
@@ -56,16 +56,17 @@ def delaunay_refinement(
     triangulation stays intrinsic Delaunay. The surface stays the same, and so do the given vertices, which come before
     the new ones. No vertex is added when there are `most_vertices`; `triangulation` itself is returned if none is.
 
-    No circumradius is larger than `largest_radius` times the `unit` (m,) of the face, 1 if not given, which the faces
-    that are made of it inherit. `triangulation` must be intrinsic Delaunay, closed and oriented, so that every
-    half-edge has an aligned twin: a ValueError if it is not.
+    No circumradius is larger than `largest_radius`, one or (m,), times the `unit` (m,) of the face, 1 if not given;
+    faces that are made of it inherit both. Components in an infinite unit are not refined. `triangulation` must be
+    intrinsic Delaunay and oriented, and closed where it is refined: a ValueError if it is not.
     """
-    if (triangulation.twin < 0).any() or not triangulation.aligned.all():
+    unit = np.ones(len(triangulation.F)) if unit is None else unit
+    if (triangulation.twin[np.repeat(np.isfinite(unit), 3)] < 0).any() or not triangulation.aligned.all():
         raise ValueError("refinement needs a closed and oriented surface: take the tufted cover")
     vertex, twin, length, n, kind, numbers = refinement.refine(
         HalfEdges.of(triangulation),
         triangulation.n,
-        np.ones(len(triangulation.F)) if unit is None else unit,
+        unit,
         np.radians(_LEAST_ANGLE),
         largest_radius,
         most_vertices,

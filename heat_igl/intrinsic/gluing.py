@@ -215,18 +215,23 @@ def tufted_cover(mesh: Mesh) -> IntrinsicTriangulation:
     return _cover(triangulation, np.lexsort((_angles(mesh), edge)), mesh.facets.n_faces, along)
 
 
-def closed_cover(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
+def closed_cover(triangulation: IntrinsicTriangulation, closed: BoolArray | None = None) -> IntrinsicTriangulation:
     """The tufted cover of triangles that meet two by two at their edges, without positions; see `tufted_cover`.
 
     Inner edges are glued front to front and back to back, or front to back if the two faces are not aligned, and
-    boundary edges front to back.
+    boundary edges front to back, only those of some faces if a mask (m,) is given: elsewhere L of the cover is twice L.
     """
     # One half-edge of each edge is first; the other runs against it, unless the two faces are not aligned.
     twin, half_edge = triangulation.twin, np.arange(triangulation.F.size)
     first = np.where(twin < 0, half_edge, np.minimum(half_edge, twin))
     order = np.lexsort((half_edge, first))
     count = np.bincount(first, minlength=len(first))
-    return _cover(triangulation, order, count[count > 0], (first == half_edge) | ~triangulation.aligned)
+    cover = _cover(triangulation, order, count[count > 0], (first == half_edge) | ~triangulation.aligned)
+    if closed is not None:
+        apart = np.flatnonzero((twin < 0) & ~np.repeat(closed, 3))
+        cover.twin[cover.twin[apart]] = -1
+        cover.twin[apart] = -1
+    return cover
 
 
 def _cover(

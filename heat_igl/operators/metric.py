@@ -291,7 +291,7 @@ def operators_in_metric(
     # Triangles without area know no metric in their plane.
     if not (mesh.measures > 0).all():
         return _of_triangles(mesh, None, laplacian, given)
-    defect = mean_angle_defect(triangulation, True)
+    defect = mean_angle_defect(triangulation)
     del triangulation
     root = inverse_root(g, mesh) if root is None else root
     del g
@@ -321,7 +321,7 @@ def _of_smooth_metric(mesh: Mesh, g: Any, least: float, root: Any, laplacian: La
     if mesh.is_tetrahedral:
         return _of_groups(mesh, g, least, root)
     # Before the simplices, as both take much memory.
-    defect = mean_angle_defect(intrinsic_triangulation(mesh), True)
+    defect = mean_angle_defect(intrinsic_triangulation(mesh))
     simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
     if _keeps_shape(simplices.edges[1].reshape(-1, 3), np.sqrt(simplices.measured[1])):
         return _unfolded(defect, mesh, simplices, laplacian, None)

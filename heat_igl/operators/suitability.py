@@ -12,6 +12,7 @@ from heat_igl.intrinsic import (
     delaunay_refinement,
     intrinsic_delaunay,
 )
+from heat_igl.mesh import connectivity
 from heat_igl.operators.matrices import Laplacian, Operators
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 
@@ -27,37 +28,52 @@ def fit_for_heat(
     Of an intrinsic Delaunay triangulation, no three faces at an edge, with the component (n,) of each vertex: itself,
     its tufted cover, or a refinement of one of them.
     """
-    n_components = int(component.max(initial=-1)) + 1
-    if laplacian == "intrinsic-delaunay-refined":
-        return refined(triangulation, component, np.ones(n_components, bool))
+    n_components, of_face = int(component.max(initial=-1)) + 1, component[triangulation.F[:, 0]]
+    is_uneven = np.ones(n_components, bool)
     if laplacian == "auto":
         is_uneven = uneven_components(triangulation, component)
-        if is_uneven[component[triangulation.F[:, 0]]].mean() > plan.UNEVEN_SHARE:
-            return refined(triangulation, component, is_uneven)
-    if laplacian == "auto" and has_negative_boundary(triangulation):
-        return intrinsic_delaunay(closed_cover(triangulation))
-    return triangulation
+        is_uneven &= is_uneven[of_face].mean() > plan.UNEVEN_SHARE
+    elif laplacian != "intrinsic-delaunay-refined":
+        return triangulation
+    # Two sheets without a common boundary are as one.
+    is_closed = is_uneven | has_negative_boundary(triangulation, component, n_components)
+    outer = triangulation.twin < 0
+    if outer[np.repeat(is_closed[of_face], 3)].any() or (is_uneven.any() and not triangulation.aligned.all()):
+        triangulation = intrinsic_delaunay(closed_cover(triangulation, is_closed[of_face]))
+    return refined(triangulation, component, is_uneven) if is_uneven.any() else triangulation
 
 
-def has_negative_boundary(triangulation: IntrinsicTriangulation) -> bool:
-    """Whether boundary edges have negative weights that spoil the heat."""
+def has_negative_boundary(triangulation: IntrinsicTriangulation, component: IntArray, k: int) -> BoolArray:
+    """Whether boundary edges of each component (k,) have negative weights that spoil the heat."""
     outer = np.flatnonzero(triangulation.twin == -1)
-    if not len(outer):
-        return False
     angle = corner_angles(triangulation.l[outer // 3])[np.arange(len(outer)), outer % 3]
-    weight = np.minimum(1 / np.tan(angle), 0.0)
-    return bool(weight.min() < plan.STEEPEST_WEIGHT or -weight.sum() > plan.NEGATIVE_SHARE * triangulation.n_used)
+    with np.errstate(divide="ignore"):  # of no angle
+        weight, where = np.minimum(1 / np.tan(angle), 0.0), component[triangulation.tail(outer)]
+    steepest = np.zeros(k)
+    np.minimum.at(steepest, where, weight)
+    few = plan.NEGATIVE_SHARE * _used(triangulation, component, k)
+    return np.asarray((steepest < plan.STEEPEST_WEIGHT) | (-np.bincount(where, weight, k) > few))
+
+
+def _used(triangulation: IntrinsicTriangulation, component: IntArray, k: int) -> IntArray:
+    """Number of vertices of faces (k,) in each component."""
+    used = connectivity.mask_of(triangulation.F, triangulation.n)
+    return np.bincount(component[: triangulation.n][used], minlength=k)
+
+
+def _counted(triangulation: IntrinsicTriangulation, component: IntArray, k: int) -> IntArray:
+    """`_used`, by which coarse components are refined; that of all where too many are coarse to refine each."""
+    used = _used(triangulation, component, k)
+    n_coarse = np.count_nonzero((used > 0) & (used < plan.ENOUGH_FOR_HEAT))
+    too_many = n_coarse * plan.ENOUGH_FOR_HEAT > plan.GROWTH * triangulation.n + plan.MORE
+    return np.where(too_many | (used == 0), used.sum(), used)
 
 
 def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray) -> BoolArray:
-    """Components (k,) of which thin triangles, or ones that are large for the component, cover much.
-
-    All, where there are few triangles at all.
-    """
-    if triangulation.n_used < plan.FEW_FOR_HEAT:
-        return np.ones(int(component.max(initial=-1)) + 1, bool)
+    """Components (k,) that thin triangles, or ones that are large for the component, cover, or of few vertices."""
     thin, large = _thin_and_large(triangulation, component)
-    return np.asarray((thin > plan.THIN_SHARE) | (large > plan.LARGE_SHARE))
+    few = _counted(triangulation, component, len(thin)) < plan.FEW_FOR_HEAT
+    return np.asarray((thin > plan.THIN_SHARE) | (large > plan.LARGE_SHARE) | few)
 
 
 def share_on_large_triangles(triangulation: IntrinsicTriangulation, component: IntArray) -> float:
@@ -87,22 +103,17 @@ def _thin_and_large(triangulation: IntrinsicTriangulation, component: IntArray) 
 def refined(triangulation: IntrinsicTriangulation, component: IntArray, is_chosen: BoolArray) -> IntrinsicTriangulation:
     """Triangles fit for heat in the chosen components (k,), by `delaunay_refinement`.
 
-    Of an intrinsic Delaunay triangulation, no three faces at an edge, with the component (n,) of each vertex; of its
-    tufted cover where the surface is not closed.
+    Of an intrinsic Delaunay triangulation, oriented and in these components closed, with the component (n,) of each
+    vertex.
     """
-    if (triangulation.twin < 0).any() or not triangulation.aligned.all():
-        triangulation = intrinsic_delaunay(closed_cover(triangulation))
-    sheets = 2 if triangulation.is_cover else 1
-    # In an infinite unit no triangle is large.
-    unit = np.where(
-        is_chosen[component[triangulation.F[:, 0]]], _area_per_vertex(triangulation, component) ** 0.5, np.inf
-    )
-    scale = min(1.0, (triangulation.n_used / plan.ENOUGH_FOR_HEAT) ** 0.5)
+    of_face = component[triangulation.F[:, 0]]
+    scale = (_counted(triangulation, component, len(is_chosen)) / plan.ENOUGH_FOR_HEAT) ** 0.5
     made = delaunay_refinement(
         triangulation,
-        sheets * (plan.GROWTH * triangulation.n + plan.MORE),
-        largest_radius=plan.LARGEST_RADIUS * scale if scale < 1 else np.inf,
-        unit=unit,
+        (2 if triangulation.is_cover else 1) * (plan.GROWTH * triangulation.n + plan.MORE),
+        largest_radius=np.where(scale < 1, plan.LARGEST_RADIUS * scale, np.inf)[of_face],
+        # In an infinite unit no triangle is large.
+        unit=np.where(is_chosen[of_face], _area_per_vertex(triangulation, component) ** 0.5, np.inf),
     )
     # Beside vertices in the same place, triangles are cut into ones without area.
     return made if (made.areas > 0).all() else triangulation
@@ -115,41 +126,47 @@ def _area_per_vertex(triangulation: IntrinsicTriangulation, component: IntArray)
     return np.asarray((area / np.bincount(component)[: len(area)])[of_face])
 
 
-def is_rough_or_narrow(domain: Operators) -> bool:
-    """Whether a surface turns so much from vertex to vertex, or is so narrow, that fronts of heat cut corners."""
-    surface = domain.surface
+def is_rough_or_narrow(domain: Operators) -> BoolArray:
+    """Components (k,) that turn so much from vertex to vertex, or are so narrow, that fronts of heat cut corners."""
+    surface, k = domain.surface, domain.n_components
     if surface is None:
-        return False
+        return np.zeros(k, bool)
     triangulation = surface.unfolding
-    added = (domain.n - triangulation.n) / (2 if surface.triangulation.is_cover else 1)
-    n = triangulation.n_used + added
-    n_outer = np.count_nonzero(domain.boundary & domain.referenced)
-    if plan.NARROW * n < n_outer < plan.ONE_CELL_WIDE * n:
-        return True
-    return mean_angle_defect(triangulation) * triangulation.n_used > plan.ROUGH_FOR_HEAT * n
+    component = domain.components[: triangulation.n]
+    n_used = _used(triangulation, component, k)
+    added = np.bincount(domain.components[triangulation.n :], minlength=k)
+    n = n_used + added / (2 if surface.triangulation.is_cover else 1)
+    n_outer = np.bincount(domain.components[domain.boundary & domain.referenced], minlength=k)
+    inner = np.flatnonzero(connectivity.mask_of(triangulation.F, triangulation.n) & ~_is_outer(triangulation))
+    inner = inner[np.argsort(component[inner], kind="stable")]
+    n_inner = np.bincount(component[inner], minlength=k)
+    of, rank = connectivity.enumerate_runs(n_inner)
+    inner = inner[rank % (n_inner[of] // _MOST_SAMPLES + 1) == 0]
+    total = np.bincount(component[inner], np.abs(2 * np.pi - _angle_sums(triangulation, inner)), k)
+    defect = total / np.maximum(np.bincount(component[inner], minlength=k), 1)
+    is_narrow = (plan.NARROW * n < n_outer) & (n_outer < plan.ONE_CELL_WIDE * n)
+    return np.asarray(is_narrow | (defect * n_used > plan.ROUGH_FOR_HEAT * n))
 
 
-def mean_angle_defect(triangulation: IntrinsicTriangulation, at_boundary: bool = False) -> float:
-    """Mean of |2 pi - sum of angles| over inner vertices, or over a thousand of them.
+def mean_angle_defect(triangulation: IntrinsicTriangulation) -> float:
+    """Mean of |2 pi - sum of angles| over vertices; on the boundary the excess over pi, since ways bend there."""
+    vertices = np.unique(triangulation.F)
+    total, at_boundary = _angle_sums(triangulation, vertices), _is_outer(triangulation)[vertices]
+    return float(np.where(at_boundary, np.maximum(total - np.pi, 0.0), np.abs(2 * np.pi - total)).mean())
 
-    `at_boundary`: over all vertices; on the boundary, that by which the sum exceeds pi, since ways bend there.
-    """
-    F, n = triangulation.F, triangulation.n
-    chosen, is_outer = np.zeros(n, bool), np.zeros(n, bool)
-    chosen[F] = True
+
+def _is_outer(triangulation: IntrinsicTriangulation) -> BoolArray:
+    """Mask (n,) of the vertices on the boundary."""
     outer = np.flatnonzero(triangulation.twin < 0)
-    is_outer[triangulation.tail(outer)] = is_outer[triangulation.head(outer)] = True
-    vertices = np.flatnonzero(chosen if at_boundary else chosen & ~is_outer)
-    if not at_boundary:
-        vertices = vertices[:: len(vertices) // _MOST_SAMPLES + 1]
-    if not len(vertices):
-        return 0.0
-    chosen[:] = False
+    return connectivity.mask_of(np.append(triangulation.tail(outer), triangulation.head(outer)), triangulation.n)
+
+
+def _angle_sums(triangulation: IntrinsicTriangulation, vertices: IntArray) -> FloatArray:
+    """The sum of the angles around each of some vertices (k,)."""
+    F, chosen = triangulation.F, np.zeros(triangulation.n, bool)
     chosen[vertices] = True
     faces = np.flatnonzero(chosen[F[:, 0]] | chosen[F[:, 1]] | chosen[F[:, 2]])
-    total = np.zeros(n)
+    total = np.zeros(triangulation.n)
     for some in np.array_split(faces, len(faces) // 2**16 + 1):  # angles take five times the memory of lengths
         np.add.at(total, F[some], corner_angles(triangulation.l[some]))
-    total = total[vertices]
-    defect = np.where(is_outer[vertices], np.maximum(total - np.pi, 0.0), np.abs(2 * np.pi - total))
-    return float(defect.mean())
+    return total[vertices]

@@ -252,9 +252,10 @@ def operators(
         - "intrinsic-delaunay-refined": with more vertices, until no angle is below 25 degrees (`delaunay_refinement`),
           at most four times as many and 4000 more; of a surface with a boundary or without an orientation, on the
           tufted cover. Meshes of fewer than 1000 vertices get about a thousand. `Operators.n_given` are the mesh's.
-        - "auto": refined if triangles with an angle below 20 degrees cover more than 0.3 of the area, if triangles much
-          larger than the mean cover more than 0.55, or if the mesh has fewer than 64 vertices; else the tufted cover if
-          boundary edges have large negative weights; else "intrinsic-delaunay".
+        - "auto", for each component: refined if triangles with an angle below 20 degrees cover more than 0.3 of the
+          area, if triangles much larger than the mean cover more than 0.55, or if it has fewer than 64 vertices, but
+          not if all such components have fewer than 0.01 of the faces; else the tufted cover if boundary edges have
+          large negative weights; else "intrinsic-delaunay".
         - "cotan": the mesh's own faces, as in the paper.
     on_laplacian : callable, optional
         Called with L, or a multiple of it, as soon as it is known.

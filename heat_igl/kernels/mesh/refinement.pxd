@@ -11,9 +11,9 @@ cdef class _Refinement:
     cdef Flips flips
     cdef int n_faces, n_vertices
     cdef PriorityQueue bad
-    cdef double[::1] unit
+    cdef double[::1] unit, largest
     cdef unsigned char[::1] is_sharp
-    cdef double least_sine, largest_radius
+    cdef double least_sine
 
     cdef int run(self, long long most_vertices) except -1 nogil
     cdef void judge(self, int f) noexcept nogil

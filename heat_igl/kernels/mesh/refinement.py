@@ -40,7 +40,8 @@ class _Refinement:
         arrays = [np.empty(3 * rows, np.int32) for _ in range(3)] + [np.empty(3 * rows)]
         for array, given in zip(arrays, (edges.vertex, edges.twin, edges.ring, edges.length), strict=True):
             array[:size] = given
-        self.flips, self.bad, self.unit = Flips(*arrays, tolerance, True), PriorityQueue(rows), np.empty(rows)
+        self.flips, self.bad = Flips(*arrays, tolerance, True), PriorityQueue(rows)
+        self.unit, self.largest = np.empty((2, rows))
         self.is_sharp = np.zeros(n_vertices, np.uint8)
         self.n_faces, self.n_vertices = size // 3, n_vertices
 
@@ -76,7 +77,7 @@ class _Refinement:
             return 0.0
         radius: cython.double = a * b * c / (4.0 * size)
         badness: cython.double = radius / self.unit[f]
-        if badness > self.largest_radius:
+        if badness > self.largest[f]:
             return badness
         shortest: cython.int = 0 if a <= b and a <= c else 1 if b <= c else 2
         # The sine of the smallest angle is the side opposite over the diameter of the circumcircle.
@@ -96,6 +97,7 @@ class _Refinement:
         g: cython.int = self.n_faces
         self.split(f, u / total, v / total, w / total)
         self.unit[g] = self.unit[g + 1] = self.unit[f]
+        self.largest[g] = self.largest[g + 1] = self.largest[f]
         self.judge(f)
         self.judge(g)
         self.judge(g + 1)
@@ -175,6 +177,8 @@ def _find_sharp(t: Flips, n_faces: cython.int, seen: cython.uchar[::1], is_sharp
             b: cython.double = t.length[following]
             d: cython.double = t.length[previous_half_edge(at)]
             total += atan2(4.0 * area(a, b, d), b * b + d * d - a * a)
+            if t.twin[following] < 0:
+                break  # in a part that is not refined
             at = next_half_edge(t.twin[following])
         if 0.0 < total < _SHARPEST:
             is_sharp[t.vertex[first]] = True
@@ -229,15 +233,16 @@ def refine(edges, n, unit, least_angle, largest_radius, most_vertices: cython.lo
     """Refine triangles until none is bad, or there are `most_vertices`.
 
     A triangle is bad if an angle is smaller than `least_angle`, in radians, or if the circumradius is larger than
-    `largest_radius` times the `unit` (m,) of the face, which the faces that are made of it inherit. `edges` are
-    `HalfEdges` on n vertices: intrinsic Delaunay, closed and oriented. `tolerance` is that of `flipping.flip`.
+    `largest_radius` (m,) times the `unit` (m,) of the face; none is in an infinite unit. Faces that are made of a face
+    inherit both. `edges` are `HalfEdges` on n vertices: intrinsic Delaunay, and closed and oriented in finite units.
+    `tolerance` is that of `flipping.flip`.
 
     Returns the vertices, twins and lengths of the new half-edges, the number of vertices, and the moves as `Moved`
     has them.
     """
     one = _Refinement(edges, n, max(most_vertices - n, 0), tolerance)
-    np.asarray(one.unit)[: len(unit)] = unit
-    one.least_sine, one.largest_radius = np.sin(least_angle), largest_radius
+    np.asarray(one.unit)[: len(unit)], np.asarray(one.largest)[: len(unit)] = unit, largest_radius
+    one.least_sine = np.sin(least_angle)
     seen: cython.uchar[::1] = np.zeros(len(edges.twin), np.uint8)
     with cython.nogil:
         _find_sharp(one.flips, one.n_faces, seen, one.is_sharp)
