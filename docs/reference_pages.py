@@ -18,7 +18,7 @@ GROUPS = {
     "Files": """read_mesh read_polygon_mesh read_point_cloud read_attributes write_attributes write_mesh
         write_point_cloud write_curves""",
     "Sources": "SurfacePoints SurfaceCurve OffsetSources curve_on curve_through edge_curve",
-    "Curves": """isolines curves.offset_curves curves.enclosed_areas curves.sublevel_areas shortest_path shortest_paths
+    "Curves": """isolines curves.offset_curves curves.sublevel_areas shortest_path shortest_paths
         geodesic_path straighten curves.GeodesicPathSolver curves.geodesic_bezier trace_geodesic cut
         curves.CutMesh""",
     "Directions and tangent vectors": """tangent_frames intrinsic.TangentFrames log_map exp_map log_maps_within

@@ -557,7 +557,7 @@ REFUSED: tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ...] = (
     (lambda _: heat_igl.reference.exact(BOX, 0), r"closed_forms\.convex_solid"),
     (lambda m: heat_igl.reference.exact(m, 0, solver="magic"), "one of windows, pygeodesic, gdist, igl"),
     (lambda m: heat_igl.reference.measured("magic", m, 0), "'magic' is unknown"),
-    (lambda _: closed_forms.sphere(GRID, 0), "distance from the center varies"),
+    (lambda _: closed_forms.sphere(GRID, 0), "distance from the origin varies"),
     (lambda m: closed_forms.cylinder(m, 0), "distance from the z axis varies"),
     (lambda m: closed_forms.cone(m, 0, apex=(0, 0, 9)), "angle to the axis varies"),
     (lambda m: closed_forms.convex_solid(m, 0), "holds no tetrahedra"),

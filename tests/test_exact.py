@@ -229,13 +229,12 @@ def test_source_points_and_targets_on_flat_domains(name, where):
     sources = on(mesh, OffsetSources(points, offsets))
     for surface in (as_given(mesh), delaunay(mesh)):
         found = surface.solve(sources, targets=targets)
-        for d, label, at in (
-            (found.distance, found.origin.label, mesh.V),
-            (found.target_distance, found.target_origin.label, targets.positions(mesh)),
-        ):
-            truth = np.linalg.norm(at[:, None] - points.positions(mesh), axis=2) + offsets
-            np.testing.assert_allclose(d, truth.min(axis=1), rtol=1e-12, atol=1e-12)
-            np.testing.assert_allclose(truth[np.arange(len(d)), sources.labels[label]], d, rtol=1e-12, atol=1e-12)
+        d = np.append(found.distance, found.target_distance)
+        at = np.concatenate([mesh.V, targets.positions(mesh)])
+        truth = np.linalg.norm(at[:, None] - points.positions(mesh), axis=2) + offsets
+        np.testing.assert_allclose(d, truth.min(axis=1), rtol=1e-12, atol=1e-12)
+        nearest = truth[np.arange(mesh.n_vertices), sources.labels[found.origin.label]]
+        np.testing.assert_allclose(nearest, found.distance, rtol=1e-12, atol=1e-12)
 
 
 def test_points_on_an_edge_of_many_faces():

@@ -10,7 +10,7 @@ from surfaces import assert_connected, nearest_vertex, twice
 
 import heat_igl
 from heat_igl import GeodesicSolver, HeatMethodSolver, Mesh, MeshError, isolines, shapes, write_curves
-from heat_igl.curves import enclosed_areas, offset_curves, sublevel_areas
+from heat_igl.curves import offset_curves, sublevel_areas
 from heat_igl.geodesic import SolverChoice
 
 SQUARE = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -38,7 +38,6 @@ def test_isolines_of_distance_on_a_plane_are_circles(method):
         assert area == pytest.approx(np.pi * r**2, rel=0.01)
         # The polygon, with the low values on its left.
         assert signed_area(mesh, curves[0]) == pytest.approx(area, rel=1e-12)
-        np.testing.assert_allclose(enclosed_areas(mesh, phi, r), area, rtol=1e-12)
 
 
 def test_a_circle_that_leaves_the_plane_loses_nothing():
@@ -112,16 +111,9 @@ def test_an_annulus_has_two_rims_that_share_its_area():
     values = np.abs(np.linalg.norm(mesh.V, axis=1) - 0.6)
     curves = isolines(mesh, values, 0.2)[0]
     assert [curve.is_closed for curve in curves] == [True, True]
-    areas = enclosed_areas(mesh, values, 0.2)
-    np.testing.assert_allclose(areas, np.pi * (0.8**2 - 0.4**2), rtol=5e-3)
-    assert sum(signed_area(mesh, curve) for curve in curves) == pytest.approx(areas[0], rel=1e-12)
-
-
-def test_separate_regions_have_areas_of_their_own():
-    mesh = shapes.strip(40, 4)
-    values = np.minimum(mesh.V[:, 0], 0.5 * (mesh.V[:, 0].max() - mesh.V[:, 0]))
-    width = np.ptp(mesh.V[:, 1])
-    assert sorted(enclosed_areas(mesh, values, 2.0)) == pytest.approx([2 * width, 4 * width], rel=1e-12)
+    (area,) = sublevel_areas(mesh, values, 0.2)
+    assert area == pytest.approx(np.pi * (0.8**2 - 0.4**2), rel=5e-3)
+    assert sum(signed_area(mesh, curve) for curve in curves) == pytest.approx(area, rel=1e-12)
 
 
 def test_an_unreachable_component_is_left_out():

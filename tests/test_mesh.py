@@ -12,6 +12,7 @@ from surfaces import assert_connected, moebius_strip, quads, twice
 import heat_igl
 from heat_igl import Mesh, MeshError, SourceError, SurfacePoints, closest_points, curve_on, edge_curve, shapes
 from heat_igl.mesh import connectivity
+from heat_igl.reference import edge_paths
 from heat_igl.validation.construction import tetrahedra
 
 TETRAHEDRON_V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -272,10 +273,9 @@ def test_facets_of_tetrahedra_are_opposite_their_corner():
 def test_distance_along_edges_of_length_zero():
     """Two vertices in one place are at distance 0 from each other, however the edge between them is stored."""
     mesh = Mesh([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 2, 0], [5, 5, 5]], [[0, 1, 2], [1, 0, 3]])
-    assert connectivity.edge_distance(mesh.edge_graph, np.array([0])).tolist() == [0, 0, 1, 2, np.inf]
-    assert connectivity.edge_distance(mesh.edge_graph, np.array([2, 3])).tolist() == [1, 1, 0, 0, np.inf]
-    counted = connectivity.edge_distance(mesh.edge_graph, np.array([2]), count_edges=True)
-    assert counted.tolist() == [1, 1, 0, 2, np.inf]
+    assert edge_paths(mesh, 0).tolist() == [0, 0, 1, 2, np.inf]
+    assert edge_paths(mesh, [2, 3]).tolist() == [1, 1, 0, 0, np.inf]
+    assert edge_paths(mesh, 2, count_edges=True).tolist() == [1, 1, 0, 2, np.inf]
 
 
 @pytest.mark.parametrize("count", [0, 1, 300])

@@ -269,7 +269,6 @@ CALLS: dict[str, Call] = {
     "distances_within": lambda mesh: heat_igl.distances_within(mesh, 0.5),
     "dual_triangulation": lambda mesh: heat_igl.sampling.dual_triangulation(mesh, CELLS).V,
     "edge_curve": lambda mesh: heat_igl.edge_curve(mesh, MESH.edges[7]).positions(MESH),
-    "enclosed_areas": lambda mesh: heat_igl.curves.enclosed_areas(mesh, PHI, 0.3),
     "exp_map": lambda mesh: heat_igl.exp_map(mesh, 0, [[0.1, 0.2]]).barycentric,
     "farthest_cells": lambda mesh: heat_igl.farthest_cells(mesh, 4).labels,
     "farthest_points": lambda mesh: heat_igl.farthest_points(mesh, 4),

@@ -9,8 +9,8 @@ from test_exact import FLAT
 from heat_igl import GeodesicSolver, Mesh, OffsetSources, SurfacePoints, shapes
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.kernels.sweep import sweeping
-from heat_igl.mesh import connectivity
 from heat_igl.operators import unfolding_surface
+from heat_igl.reference import edge_paths
 from heat_igl.sources import source_set
 from heat_igl.sweep import SweepEngine
 from heat_igl.sweep.sweep import numbered_spokes
@@ -136,7 +136,7 @@ def test_what_leaves_the_bounds_is_brought_back():
     mesh = TORUS
     surface = unfolding_surface(mesh)
     sources = source_set(5, mesh.n_vertices, mesh.F)
-    along_edges = connectivity.edge_distance(mesh.edge_graph, np.array([5]))
+    along_edges = edge_paths(mesh, 5)
     straight = np.linalg.norm(mesh.V - mesh.V[5], axis=1)
     d = 2 * along_edges
     surface.paths.shorten(d)

@@ -75,18 +75,17 @@ def described(path: Path, mesh: Mesh | PointCloud) -> Row:
 
 
 def print_rows(rows: Sequence[Row], json_file: Path | None = None) -> None:
-    """Print names and texts as two columns; also as JSON to a file, or to standard output in their place."""
+    """Print names and texts as two columns; also as JSON to a file, or to standard output in their place.
+
+    JSON has _ for spaces in names, and lists for what stands in several rows, and for the files written.
+    """
     width = max(len(row[0]) for row in rows)
     lines = [Text.assemble((f"{name:{width}}", "bold"), f"  {text}\n") for name, text, *_ in rows]
-    print_report(as_dictionary(rows), Text.assemble(*lines), json_file)
-
-
-def as_dictionary(rows: Sequence[Row]) -> dict[str, Any]:
-    """The rows by name, with _ for spaces; what stands in several rows, and all files written, as lists."""
     found: dict[str, list[Any]] = {}
     for name, text, *value in rows:
         found.setdefault(name.replace(" ", "_"), []).append(value[0] if value else text)
-    return {name: values if len(values) > 1 or name == "wrote" else values[0] for name, values in found.items()}
+    content = {name: values if len(values) > 1 or name == "wrote" else values[0] for name, values in found.items()}
+    print_report(content, Text.assemble(*lines), json_file)
 
 
 def print_report(content: Mapping[str, Any], text: str | Text, json_file: Path | None) -> None:

@@ -171,7 +171,13 @@ class Outcome:
 
 def work(task: Task) -> Outcome:
     """Begin a mesh, or solve blocks of one that was begun."""
-    store = _opened(task.store)
+    try:
+        store = Store(task.store)
+    except Exception as error:
+        raise BatchError(
+            f"a worker cannot open store {task.store}: {_reason(error)}. Name a folder that the client and all workers "
+            "share"
+        ) from None
     try:
         outcome = _resume(task, store) if task.blocks else _begin(task, store)
     except BatchError:  # the store is lost
@@ -186,15 +192,6 @@ def work(task: Task) -> Outcome:
 def release() -> None:
     """Free the solver that the worker still holds."""
     _SOLVERS.clear()
-
-
-def _opened(path: Path) -> Store:
-    try:
-        return Store(path)
-    except Exception as error:
-        raise BatchError(
-            f"a worker cannot open store {path}: {_reason(error)}. Name a folder that the client and all workers share"
-        ) from None
 
 
 def _reason(error: Exception) -> str:
@@ -305,7 +302,11 @@ def _solve(
     solver: Solver,
     blocks: Sequence[int],
 ) -> None:
-    unit = _root_of_area(mesh) if task.normalize else 1.0
+    unit = 1.0
+    if task.normalize:
+        if isinstance(mesh, PointCloud) or mesh.is_tetrahedral:
+            raise ValueError("only a surface has an area by which distances are normalized: leave `normalize` away")
+        unit = float(np.sqrt(mesh.measures.sum()))
     for block in blocks:
         start = time.perf_counter()
         rows = group.rows(block)
@@ -317,12 +318,6 @@ def _solve(
         group.write(block, distances.astype(task.dtype, copy=False))
         messages = sorted({message for message, _ in held})
         _send("block", task, block=block, seconds=time.perf_counter() - start, warnings=messages)
-
-
-def _root_of_area(mesh: Mesh | PointCloud) -> float:
-    if isinstance(mesh, PointCloud) or mesh.is_tetrahedral:
-        raise ValueError("only a surface has an area by which distances are normalized: leave `normalize` away")
-    return float(np.sqrt(mesh.measures.sum()))
 
 
 def _send(kind: str, task: Task, **facts: Any) -> None:

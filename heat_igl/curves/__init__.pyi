@@ -8,7 +8,6 @@ from heat_igl.curves.geodesics import GeodesicPathSolver as GeodesicPathSolver
 from heat_igl.curves.geodesics import geodesic_bezier as geodesic_bezier
 from heat_igl.curves.geodesics import geodesic_path as geodesic_path
 from heat_igl.curves.geodesics import straighten as straighten
-from heat_igl.curves.level_sets import enclosed_areas as enclosed_areas
 from heat_igl.curves.level_sets import isolines as isolines
 from heat_igl.curves.level_sets import offset_curves as offset_curves
 from heat_igl.curves.level_sets import sublevel_areas as sublevel_areas

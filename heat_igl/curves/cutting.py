@@ -207,7 +207,11 @@ class _Cut:
         self._faces = np.concatenate([curve.faces for curve in curves])
         self._label = np.repeat(np.arange(len(curves)), [len(curve) for curve in curves])
         count = len(self._faces)
-        ends = _on_grid(np.concatenate([curve.start for curve in curves] + [curve.end for curve in curves]))
+        # On the grid, and on an edge or vertex that is near; the largest coordinate takes the rest of rounding.
+        ends = np.concatenate([curve.start for curve in curves] + [curve.end for curve in curves])
+        ends = np.where(ends < _SAME, 0.0, ends)
+        ends = np.rint(ends / ends.sum(axis=1, keepdims=True) * _STEPS).astype(np.int64)
+        ends[np.arange(2 * count), ends.argmax(axis=1)] += _STEPS - ends.sum(axis=1)
         self._ends = ends.reshape(2, count, 3)
         # Of new vertices, which are numbered in this order: a face, and the barycentric coordinates in it.
         self._place: list[tuple[int, list[float]]] = []
@@ -343,13 +347,3 @@ class _Cut:
         for i, (face, weights) in enumerate(self._place, n):
             faces[i], barycentric[i] = face, weights
         return SurfacePoints(faces, barycentric)
-
-
-def _on_grid(barycentric: FloatArray) -> IntArray:
-    """Barycentric coordinates (p, 3) as integers that sum to `_STEPS`, put on an edge or vertex that is near."""
-    kept = np.where(barycentric < _SAME, 0.0, barycentric)
-    kept /= kept.sum(axis=1, keepdims=True)
-    steps = np.rint(kept * _STEPS).astype(np.int64)
-    # The largest takes the rest that rounding leaves.
-    steps[np.arange(len(steps)), steps.argmax(axis=1)] += _STEPS - steps.sum(axis=1)
-    return np.asarray(steps)

@@ -16,7 +16,6 @@ from heat_igl.mesh import (
     MeshLike,
     SurfaceCurve,
     as_triangles,
-    connectivity,
     crossings,
     joined_segments,
     level_segments,
@@ -148,43 +147,14 @@ def sublevel_areas(mesh: MeshLike, values: ArrayLike, levels: ArrayLike) -> Floa
     """
     mesh = as_triangles(mesh, "isolines need")
     checked, wanted = _checked(mesh, values, levels)
-    return np.array([_areas_below(mesh, checked, level).sum() for level in wanted])
-
-
-def enclosed_areas(mesh: MeshLike, values: ArrayLike, level: float) -> FloatArray:
-    """Area of the region below the level that each curve borders.
-
-    Parameters
-    ----------
-    mesh, values, level
-        As for `isolines`, with the same errors; one level.
-
-    Returns
-    -------
-    (c,) float64
-        For each curve of ``isolines(mesh, values, level)[0]``, the area of the connected part of ``{values < level}``
-        on the left of the curve. Curves that bound the same part, such as the two of an annulus, have the same value.
-
-    Examples
-    --------
-    >>> import heat_igl
-    >>> mesh = heat_igl.shapes.grid(10)
-    >>> heat_igl.curves.enclosed_areas(mesh, mesh.V[:, 0], 0.25).round(6).tolist()
-    [0.25]
-    """
-    mesh = as_triangles(mesh, "isolines need")
-    checked, wanted = _checked(mesh, values, level)
-    if len(wanted) != 1:
-        raise ValueError(f"level must be one number, not {len(wanted)}")
-    curves = joined_segments(level_segments(mesh, checked, wanted[0]), mesh)
-    below = checked < wanted[0]
-    inner = mesh.edges[below[mesh.edges].all(axis=1)]
-    part = connectivity.connected_components(inner, mesh.n_vertices)
-    # The edges of a face join all vertices below the level.
-    one_below = mesh.F[np.arange(mesh.n_faces), np.argmax(below[mesh.F], axis=1)]
-    area = np.bincount(part[one_below], weights=_areas_below(mesh, checked, wanted[0]), minlength=mesh.n_vertices)
-    first = np.array([curve.faces[0] for curve in curves], np.int64)
-    return np.asarray(area[part[one_below[first]]])
+    areas = []
+    for level in wanted:
+        area = np.where((checked[mesh.F] < level).all(axis=1), mesh.measures, 0.0)
+        found = crossings(mesh, checked, level)
+        corner = found.toward[:, 0] * found.toward[:, 1]
+        area[found.faces] = mesh.measures[found.faces] * np.where(found.is_below, corner, 1 - corner)
+        areas.append(area.sum())
+    return np.array(areas)
 
 
 def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -196,12 +166,3 @@ def _checked(mesh: Mesh, values: ArrayLike, levels: ArrayLike) -> tuple[FloatArr
     if wanted.ndim != 1 or not np.isfinite(wanted).all():
         raise ValueError(f"levels must be finite numbers in one dimension, not {shown(levels)}")
     return array, wanted
-
-
-def _areas_below(mesh: Mesh, values: FloatArray, level: float) -> FloatArray:
-    """Area (m,) of the part of each face with values below the level."""
-    area = np.where((values[mesh.F] < level).all(axis=1), mesh.measures, 0.0)
-    found = crossings(mesh, values, level)
-    corner = found.toward[:, 0] * found.toward[:, 1]
-    area[found.faces] = mesh.measures[found.faces] * np.where(found.is_below, corner, 1 - corner)
-    return area

@@ -26,7 +26,7 @@ from heat_igl.drawing.scene import DISTANCE_COLOURS, DISTANCE_LABEL, LINE_INK, S
 from heat_igl.errors import raise_at_first, require_choice
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.io import complete_file
-from heat_igl.mesh import Mesh, MeshLike, PointCloud, as_mesh, as_simplices
+from heat_igl.mesh import MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
 
@@ -155,7 +155,12 @@ def page(
         "method": method,
     }
     if not mesh.is_tetrahedral:
-        _add_sweep(arrays, meta, mesh)
+        # The input of page/sweep.js. Unflipped faces become zeros, which compress well.
+        triangulation = intrinsic_delaunay(intrinsic_triangulation(mesh))
+        same = triangulation.F.shape == mesh.F.shape
+        arrays["sweepFaces"] = (triangulation.F - mesh.F if same else triangulation.F).astype("<i4")
+        arrays["lengths"] = (triangulation.l / seen.unit).astype("<f4")
+        meta["sweepFacesAreDifferences"] = same
     _add_fields(arrays, meta, fields or {}, mesh.n_vertices)
     meta["begin"] = {"field": "distance", "beside": beside or "", "directions": directions, "points": is_cloud}
     choices = [name for name, _ in meta["fields"]]
@@ -164,16 +169,6 @@ def page(
     if beside is not None and beside not in choices:
         raise ValueError(f"beside must be one of {', '.join(map(repr, choices)) or 'the fields'}, not {beside!r}")
     return Page(_document(title, meta, arrays))
-
-
-def _add_sweep(arrays: dict[str, AnyArray], meta: dict[str, Any], mesh: Mesh) -> None:
-    """Add the input of page/sweep.js: corners and edge lengths of the intrinsic Delaunay triangulation."""
-    triangulation = intrinsic_delaunay(intrinsic_triangulation(mesh))
-    # Unflipped faces become zeros, which compress well.
-    same = triangulation.F.shape == mesh.F.shape
-    arrays["sweepFaces"] = (triangulation.F - mesh.F if same else triangulation.F).astype("<i4")
-    arrays["lengths"] = (triangulation.l / meta["unit"]).astype("<f4")
-    meta["sweepFacesAreDifferences"] = same
 
 
 def _add_fields(arrays: dict[str, AnyArray], meta: dict[str, Any], fields: Mapping[str, ArrayLike], n: int) -> None:

@@ -91,12 +91,6 @@ class SourceTerm:
         held = (self.mass > 0) & (at_vertex > 0)
         return self.largest_heat * float((self.mass[held] / at_vertex[held]).min(initial=1.0))
 
-    def heat_of(self, share: FloatArray) -> FloatArray:
-        """The initial heat (e,) of shares (e,) of the unit."""
-        # The unit is inside the exponential, since exp(-delay) alone would underflow.
-        with np.errstate(under="ignore"):
-            return np.asarray(share * np.exp(np.log(self.unit) - self.delay))
-
     def restricted(self, labels: IntArray, anchors: Seeds, kept: BoolArray) -> SourceTerm:
         """The term of the sources in `labels` alone, with other anchors and those of `near` that are `kept` (g,)."""
         alive = np.isin(self.label, labels)
@@ -108,8 +102,10 @@ def right_hand_side(n: int, terms: Sequence[SourceTerm], shares: Sequence[FloatA
     """Right-hand sides (n, k) of `HeatFlow.solve` for k terms, or for other `shares` of their units."""
     heat = np.zeros((n, len(terms)))
     shares = [term.share for term in terms] if shares is None else shares
-    for column, term, share in zip(heat.T, terms, shares, strict=True):
-        np.add.at(column, term.vertex, term.heat_of(share))
+    # The unit is inside the exponential, since exp(-delay) alone would underflow.
+    with np.errstate(under="ignore"):
+        for column, term, share in zip(heat.T, terms, shares, strict=True):
+            np.add.at(column, term.vertex, share * np.exp(np.log(term.unit) - term.delay))
     return heat
 
 
@@ -230,8 +226,10 @@ class SourceAssembler:
             return _NONE, _NONE
         faces = surface.faces
         if sources.on_vertices_alone:
-            is_covered = surface.uncovered is not None and not self._plain
-            if not (is_covered and faces.meets_shared_edge(sources.vertices[rim])):
+            if surface.uncovered is None or self._plain:
+                return _NONE, _NONE
+            corner, _ = faces.corners_at(sources.vertices[rim])
+            if (faces.twin.reshape(-1, 3)[corner // 3] > -2).all():
                 return _NONE, _NONE
         begin = sources.offsets.min()
         radius = self._radius * self._h_at(np.arange(faces.n))

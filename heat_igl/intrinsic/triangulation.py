@@ -231,11 +231,6 @@ class IntrinsicTriangulation:
         """The corners (k,) of faces at the given vertices, and for each the position of the vertex in `vertices`."""
         return self._corners.of(vertices)
 
-    def meets_shared_edge(self, vertices: IntArray) -> bool:
-        """Whether a face at one of the vertices has an edge of more than two faces."""
-        corner, _ = self.corners_at(vertices)
-        return bool((self.twin.reshape(-1, 3)[corner // 3] == -2).any())
-
     def locate(self, faces: IntArray, barycentric: FloatArray, on_back: bool = False) -> tuple[IntArray, FloatArray]:
         """Points of the mesh, given by faces (k,) of the mesh and barycentric coordinates (k, 3), in these triangles.
 

@@ -14,7 +14,7 @@ from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, inte
 from heat_igl.mesh import Mesh
 from heat_igl.mesh.connectivity import mask_of
 from heat_igl.runtime import warn_caller
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 
 # Records that are ignored. Any other word is an error: ignoring a damaged "v" would shift all indices after it.
 _PASSED_OVER = (
@@ -57,20 +57,15 @@ def read(path: Path, data: bytes) -> Contents:
         corners = number - 1
     cells = Cells(corners, degree)
     check(V, cells, lambda i: text.where(V_lines[i]), lambda i: text.where(F_lines[i]), base=1)
-    _warn_of_unused(path, len(V), corners)
-    warn_if_cut(path, data, 0, len(V))
-    return Contents(V, cells, {})
-
-
-def _warn_of_unused(path: Path, n: int, corners: IntArray) -> None:
-    """Warn of vertices without a face: OBJ has no counts, so nothing else tells that the last faces are lost."""
-    used = mask_of(corners, n)
-    if not used.all():
+    used = mask_of(corners, len(V))
+    if not used.all():  # OBJ has no counts, so nothing else tells that the last faces are lost
         warn_caller(
-            f"{path}: no face uses {int((~used).sum())} of the {n} vertices, such as vertex {int(np.argmin(used)) + 1} "
-            "(counted from 1): the file may be cut short; distances there are inf",
+            f"{path}: no face uses {int((~used).sum())} of the {len(V)} vertices, such as vertex "
+            f"{int(np.argmin(used)) + 1} (counted from 1): the file may be cut short; distances there are inf",
             AccuracyWarning,
         )
+    warn_if_cut(path, data, 0, len(V))
+    return Contents(V, cells, {})
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:

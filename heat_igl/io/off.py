@@ -13,7 +13,7 @@ import numpy as np
 from heat_igl.errors import MeshError
 from heat_igl.io.contents import Cells, Contents, Text, check, format_rows, integers, of_corner, ragged, warn_if_cut
 from heat_igl.mesh import Mesh
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import FloatArray
 
 # Texture coordinates (ST), colours (C) and normals (N) follow the position and are ignored. Some collections lack the
 # space between the keyword and the first count.
@@ -56,24 +56,17 @@ def read(path: Path, data: bytes) -> Contents:
             begin - 1, f"{n} vertices and {m} faces need {n + m} lines, but {follow} follow: the file is {why} wrong"
         )
     V = text.positions(np.arange(begin, begin + n))
-    begin += n
-    cells = _polygons(text, np.arange(begin, begin + m))
-    first = begin - n
-    check(V, cells, lambda i: text.where(first + i), lambda i: text.where(begin + i), base=0)
-    warn_if_cut(path, data, int(cells.corners[-1]) or n, n)
-    return Contents(V, cells, {})
-
-
-def _polygons(text: Text, lines: IntArray) -> Cells:
+    lines = np.arange(begin + n, begin + n + m)
     values, start = text.numbers(lines)
     degree = integers(values[start], lambda i: text.where(lines[i]), "number of corners")
     bad = (degree < 3) | (degree >= text.count[lines])
-    if bad.any():
-        i = int(np.argmax(bad))
-        raise text.error(
-            lines[i], f"a face of {degree[i]} corners needs at least three, and an index for each behind the number"
-        )
-    return Cells(integers(values[ragged(start + 1, degree)], of_corner(degree, lambda i: text.where(lines[i]))), degree)
+    found = f"{degree[np.argmax(bad)]} corners"
+    text.refuse(lines, bad, f"a face of {found} needs at least three, and an index for each behind the number")
+    corners = integers(values[ragged(start + 1, degree)], of_corner(degree, lambda i: text.where(lines[i])))
+    cells = Cells(corners, degree)
+    check(V, cells, lambda i: text.where(begin + i), lambda i: text.where(lines[i]), base=0)
+    warn_if_cut(path, data, int(cells.corners[-1]) or n, n)
+    return Contents(V, cells, {})
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:

@@ -32,16 +32,13 @@ def _require_extensions() -> None:
     built = here / "compiled.json"
     if built.exists():
         hashes = json.loads(built.read_text(encoding="utf8"))
-        changed = [name for name in hashes if _hash(here / name) != hashes[name]]
+        found = {name: source_hash(file.read_bytes()).hex() for name in hashes if (file := here / name).exists()}
+        changed = [name for name in hashes if found.get(name) != hashes[name]]
         if changed:
             raise ImportError(
                 f"{len(changed)} sources of kernels in {here} have changed since they were compiled ({changed[0]}): "
                 f"run `python setup.py -q build_ext --inplace` or `pip install -e .` in {here.parent.parent}"
             )
-
-
-def _hash(path: Path) -> str:
-    return source_hash(path.read_bytes()).hex() if path.exists() else ""
 
 
 _require_extensions()

@@ -196,15 +196,3 @@ def shortest_edge_graph(edges: IntArray, lengths: FloatArray, n: int) -> sp.csr_
     pairs = np.sort(edges, axis=1)[ascending]
     first, _, _ = unique_rows(pairs, n)
     return sp.csr_array((lengths[ascending][first], tuple(pairs[first].T)), shape=(n, n))
-
-
-def edge_distance(graph: sp.csr_array, sources: IntArray, *, count_edges: bool = False) -> FloatArray:
-    """Length (n,) of the shortest path along edges from each vertex to the nearest source (Dijkstra 1959).
-
-    Never below the geodesic distance; ``inf`` at vertices that no path joins with a source. The graph (n, n) has edge
-    lengths, in one direction or both; a stored 0 is an edge of length 0. With `count_edges`, each counts as 1.
-    """
-    from scipy.sparse import csgraph
-
-    found = csgraph.dijkstra(graph, directed=False, indices=sources, unweighted=count_edges, min_only=True)
-    return np.asarray(found, np.float64)

@@ -218,7 +218,8 @@ def without_noise(tree: PointTree) -> PointTree:
     for k, stride in _spreads(tree, near):
         index = tree.neighbours_of(np.arange(n), k, stride)
         for _ in range(_PASSES):
-            tree = PointTree(_onto_quadrics(tree.P, index), tree.order)
+            moved = by_rows(lambda rows, P=tree.P, index=index: onto_quadrics(P, index[rows]), n)[0]  # type: ignore[misc]
+            tree = PointTree(moved, tree.order)
     return tree
 
 
@@ -284,11 +285,6 @@ def _spreads(tree: PointTree, near: AnyArray) -> list[tuple[int, int]]:
 def _thickness(tree: PointTree, index: AnyArray) -> float:
     """The median ratio of the two smaller variances of neighbourhoods, rows of `index` (b, k + 1)."""
     return float(np.median(tangent_planes(tree.P, index)[1]))
-
-
-def _onto_quadrics(P: FloatArray, index: AnyArray) -> FloatArray:
-    """Points (b, 3), moved onto quadrics fitted to their neighbours, see `onto_quadrics`."""
-    return np.asarray(by_rows(lambda rows: onto_quadrics(P, index[rows]), len(index))[0])
 
 
 def by_rows(work: Callable[[slice], tuple[AnyArray, ...]], n: int) -> tuple[AnyArray, ...]:

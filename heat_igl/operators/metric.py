@@ -361,16 +361,20 @@ def _refracting(
     mesh: Mesh, apart: IntrinsicTriangulation, sides: FloatArray, least: float, in_metric: Any, laplacian: Laplacian
 ) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
-    glued = _glued_where_equal(apart, sides + mollify(sides, mesh.F))
+    # Cut apart at the edges that are seen at two lengths.
+    sides = sides + mollify(sides, mesh.F)
+    twin = apart.twin.copy()
+    inner = np.flatnonzero(twin >= 0)
+    one, other = sides.ravel()[inner], sides.ravel()[twin[inner]]
+    twin[inner[np.abs(one - other) > _ROUNDING * np.maximum(one, other)]] = -1
+    glued = replace(apart, l=sides, twin=twin)
     triangulation = glued if laplacian == "cotan" else intrinsic_delaunay(glued)
     domain = intrinsic_operators(triangulation)
     pairs = np.concatenate([triangulation.F[:, pair] for pair in ([1, 2], [2, 0], [0, 1])])
     domain = _with_shortest_edges(domain, mesh, pairs, triangulation.l.ravel(order="F"))
     # Where most triangles fit together, they are those after flips: even ones, however thin the given ones are in the
     # metric. Triangles without area know no metric in their plane, but have lengths.
-    is_inside = apart.twin >= 0
-    fits = 2 * np.count_nonzero(glued.twin[is_inside] >= 0) > np.count_nonzero(is_inside)
-    if fits or not (mesh.measures > 0).all():
+    if 2 * np.count_nonzero(twin[inner] >= 0) > len(inner) or not (mesh.measures > 0).all():
         # A flip may join a vertex with itself, or two that an edge joins already: no triangles in space.
         ends = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
         used = triangulation if len(ends) == len(mesh.edges) else glued
@@ -378,15 +382,6 @@ def _refracting(
     else:
         simplices = in_metric()
     return replace(domain, simplices=simplices)
-
-
-def _glued_where_equal(apart: IntrinsicTriangulation, sides: FloatArray) -> IntrinsicTriangulation:
-    """The triangles with lengths of their own, cut apart at the edges that they see at two lengths."""
-    twin = apart.twin.copy()
-    glued = np.flatnonzero(twin >= 0)
-    one, other = sides.ravel()[glued], sides.ravel()[twin[glued]]
-    twin[glued[np.abs(one - other) > _ROUNDING * np.maximum(one, other)]] = -1
-    return replace(apart, l=sides, twin=twin)
 
 
 def _of_groups(mesh: Mesh, g: FloatArray, least: float, root: Any, group: Any = None) -> Operators:

@@ -325,7 +325,11 @@ class _Builder:
         require_faces(places, self._F, None if self._mesh is None else self._mesh.V)
 
     def finish(self) -> SourceSet:
-        points = self._points_in_faces() if self._points else NO_POINTS
+        points, segments = self._points_in_faces() if self._points else NO_POINTS, NO_SEGMENTS
+        if self._curves:
+            rows = [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves]
+            faces, start, end, label = concatenated(rows)
+            segments = SourceSegments(faces, on_simplex(start), on_simplex(end), label, self._offset[label])
         vertices, label = concatenated(self._vertices)
         # A vertex that is named twice is the one with the smallest offset; of equal ones, the first.
         kept = nearest_first(vertices, self._offset[label], label)
@@ -335,7 +339,7 @@ class _Builder:
             vertex_label=label,
             vertex_offset=self._offset[label],
             points=points,
-            segments=self._all_segments() if self._curves else NO_SEGMENTS,
+            segments=segments,
             n_labels=len(self._offset),
         )
 
@@ -350,12 +354,6 @@ class _Builder:
         inside = ~in_vertex
         label = label[inside]
         return SourcePoints(faces[inside], barycentric[inside], label, self._offset[label])
-
-    def _all_segments(self) -> SourceSegments:
-        faces, start, end, label = concatenated(
-            [(c.faces, c.start, c.end, np.full(len(c), label)) for c, label in self._curves]
-        )
-        return SourceSegments(faces, on_simplex(start), on_simplex(end), label, self._offset[label])
 
 
 def on_simplex(barycentric: FloatArray) -> FloatArray:

@@ -73,21 +73,14 @@ def convex_solid(mesh: MeshLike, sources: Sources) -> FloatArray:
     return _nearest(mesh, sources, partial(straight, mesh.V))
 
 
-def sphere(mesh: MeshLike, sources: Sources, *, center: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
-    """Length of the great circle arc on the sphere around `center` whose radius is that of the vertices.
+def sphere(mesh: MeshLike, sources: Sources) -> FloatArray:
+    """Length of the great circle arc on the sphere around the origin whose radius is that of the vertices.
 
     Sources, result and errors are those of `plane`, with a ReferenceSolverError if the vertices lie on no such sphere.
-
-    Parameters
-    ----------
-    mesh : mesh
-        Vertices on a sphere.
-    center : (3,) array_like
-        Center of the sphere.
     """
     mesh = as_simplices(mesh)
-    P = mesh.V - np.asarray(center, dtype=np.float64)
-    radius = _common("distance from the center", np.linalg.norm(P[mesh.referenced], axis=1))
+    P = mesh.V
+    radius = _common("distance from the origin", np.linalg.norm(P[mesh.referenced], axis=1))
 
     def arcs(source: int) -> FloatArray:
         # The arc cosine alone loses half of the digits of small angles.
@@ -141,25 +134,9 @@ def cone(mesh: MeshLike, sources: Sources, *, apex: ArrayLike = (0.0, 0.0, 0.0))
 def flat_torus(coordinates: ArrayLike, sources: Sources, *, periods: ArrayLike = (1.0, 1.0)) -> FloatArray:
     """Length of the shortest straight line on a flat torus, the plane modulo two perpendicular periods.
 
-    Parameters
-    ----------
-    coordinates : (n, 2) array_like
-        Coordinates of each vertex in the plane: a flat torus fits into space only when folded.
-    sources : int, sequence of int, or (n,) mask of bool
-        Source vertices.
-    periods : (2,) array_like
-        Lengths after which the two coordinates repeat.
-
-    Returns
-    -------
-    (n,) float64
-
-    Raises
-    ------
-    ReferenceSolverError
-        If the coordinates or periods have the wrong shape.
-    SourceError
-        If the sources name no vertex.
+    `coordinates` (n, 2) are those of each vertex in the plane, since a flat torus fits into space only when folded, and
+    `periods` (2,) the lengths after which they repeat; a ReferenceSolverError if one has another shape. Sources, result
+    and other errors are those of `plane`.
     """
     points, lengths = np.asarray(coordinates, dtype=np.float64), np.asarray(periods, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2 or lengths.shape != (2,) or not (lengths > 0).all():

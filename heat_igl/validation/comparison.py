@@ -25,7 +25,7 @@ from heat_igl.errors import (
 )
 from heat_igl.geodesic import DistanceMethod, SolverChoice
 from heat_igl.mesh import Mesh, MeshLike, PointCloud, PolygonMesh, as_mesh, as_simplices
-from heat_igl.reference import MEMORY, TIMEOUT, edge_paths, straight_lines
+from heat_igl.reference import TIMEOUT, edge_paths, straight_lines
 from heat_igl.runtime import PeakMemory
 from heat_igl.sources import Sources, vertex_sources
 from heat_igl.typing import AnyArray, ArrayLike, FloatArray, IntArray
@@ -76,10 +76,10 @@ def _run(
     sets: list[IntArray],
     label: str,
     prepare: Prepare | None,
-    bounds: Mapping[str, float],
+    timeout: float,
     begun: Callable[[str, int], None],
 ) -> Run:
-    """Distances from each set of sources by a method from `_resolved`; `bounds` are timeout and memory.
+    """Distances from each set of sources by a method from `_resolved`.
 
     `begun` is called before each distance, with the name of the method and the index of the set.
     """
@@ -87,7 +87,7 @@ def _run(
         results = []
         for i, sources in enumerate(sets):
             begun(label, i)
-            results.append(reference.measured(_NATIVE[label], as_simplices(mesh), sources, **bounds))
+            results.append(reference.measured(_NATIVE[label], as_simplices(mesh), sources, timeout=timeout))
         memory = (result.peak_memory for result in results if result.peak_memory is not None)
         return np.stack([result.distance for result in results]), {
             "parameters": {"solver": _NATIVE[label]},
@@ -145,7 +145,6 @@ def validate(
     reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None = "exact",
     name: str = "mesh",
     timeout: float = TIMEOUT,
-    memory: float = MEMORY,
     progress: Progress | None = None,
 ) -> ValidationReport:
     """Compare methods with a reference on one mesh.
@@ -169,8 +168,8 @@ def validate(
         of `heat_igl.validation.closed_forms`; or None for only the checks that need no reference.
     name : str
         Name of the mesh in the report.
-    timeout, memory : float
-        Bounds for native solvers, see `heat_igl.reference.exact`.
+    timeout : float
+        Seconds after which a native solver is stopped.
     progress : callable, optional
         Called before each distance with the name of the method, the number of distances done, and their total; at the
         end with "done" and the total twice.
@@ -217,10 +216,9 @@ def validate(
         if progress is not None:
             progress(label, done + index, total)
 
-    bounds = {"timeout": timeout, "memory": memory}
     failure = None
     try:
-        label, truths, known = _truths(mesh, sets, reference, bounds, begun)
+        label, truths, known = _truths(mesh, sets, reference, timeout, begun)
     except ReferenceSolverError as error:
         # The rest of the report needs no reference.
         label, truths, known, failure = str(reference), None, None, str(error)
@@ -234,7 +232,7 @@ def validate(
             elif failure is not None and method == label:
                 raise ReferenceSolverError(failure)
             else:
-                found = _run(domain, sets, method, prepare, bounds, begun)
+                found = _run(domain, sets, method, prepare, timeout, begun)
         except (ReferenceSolverError, MissingExtraError, FactorizationError, MeshError) as error:
             rows.append(ValidationRow(method, failure=str(error)))
             continue
@@ -267,14 +265,14 @@ def _truths(
     mesh: Mesh,
     sets: list[IntArray],
     reference: str | ArrayLike | Callable[[Mesh, IntArray], FloatArray] | None,
-    bounds: Mapping[str, float],
+    timeout: float,
     begun: Callable[[str, int], None],
 ) -> tuple[str | None, FloatArray | None, Run | None]:
     """Name and distances of the reference, and the run if it is a method."""
     if reference is None:
         return None, None, None
     if isinstance(reference, str):
-        found = _run(mesh, sets, *_resolved(reference), bounds, begun)
+        found = _run(mesh, sets, *_resolved(reference), timeout, begun)
         return reference, found[0], found
     if callable(reference):
         begun("reference", 0)

@@ -23,7 +23,7 @@ from heat_igl.mesh import Mesh, MeshLike, as_simplices
 from heat_igl.mesh.connectivity import mask_of
 from heat_igl.reference import edge_paths, straight_lines
 from heat_igl.sources import Sources, vertex_sources
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray
+from heat_igl.typing import ArrayLike, FloatArray
 
 __all__ = [
     "BoundViolations",
@@ -101,7 +101,9 @@ def error_summary(
         )
     away = np.isfinite(x) & (x > 0)
     relative = relative_error(d, x)[away]
-    near = np.stack([_neighbours(mesh, sources) for sources in source_sets]) & away
+    # The one-rings of the sources; the sources themselves have no relative error.
+    is_source = np.stack([mask_of(vertex_sources(sources, d.shape[1]), d.shape[1]) for sources in source_sets])
+    near = np.stack([mask_of(mesh.edges[row[mesh.edges].any(axis=1)], d.shape[1]) for row in is_source]) & away
     norms = np.array([_norms(mesh, d[row], x[row]) for row in range(len(d))])
     return ErrorSummary(
         mean=_of(np.mean, relative),
@@ -132,13 +134,6 @@ def _same_shape(distance: ArrayLike, truth: ArrayLike) -> tuple[FloatArray, Floa
 
 def _of(statistic: Callable[[FloatArray], Any], values: FloatArray) -> float:
     return float(statistic(values)) if len(values) else float("nan")
-
-
-def _neighbours(mesh: Mesh, sources: Sources) -> BoolArray:
-    """The one-rings of the sources, themselves included: these have no relative error."""
-    n = mesh.n_vertices
-    is_source = mask_of(vertex_sources(sources, n), n)
-    return mask_of(mesh.edges[is_source[mesh.edges].any(axis=1)], n)
 
 
 def _norms(mesh: Mesh, distance: FloatArray, truth: FloatArray) -> tuple[float, float, float]:

@@ -109,7 +109,8 @@ class PathDirections:
         # Paths from the end of a segment at a vertex: their angle in the face is converted to one around the vertex.
         at_corner = np.flatnonzero((start >= n) & (barycentric.max(axis=1) > 1 - ON_SIDE))
         corner = corner[at_corner] // 3 * 3 + barycentric[at_corner].argmax(axis=1)
-        angles.departure[at_corner] = self.around_corners(corner, angles.departure[at_corner])
+        seen = angles.departure[at_corner] - self._direction(previous_half_edge(corner))
+        angles.departure[at_corner] = in_circle(self._at_corners(corner, seen - _WHOLE * np.rint(seen / _WHOLE)))
         barycentric[at_corner] = np.eye(3)[corner % 3]
         return angles, unchecked_points(faces, barycentric)
 
@@ -159,11 +160,6 @@ class PathDirections:
         angles, v = self.angles, self._triangulation.F.ravel()[corner]
         found = angles.outgoing[previous_half_edge(corner)] + angles.scale[v] * seen
         return np.where(angles.on_boundary[v], np.clip(found, 0.0, np.pi), found)
-
-    def around_corners(self, corner: IntArray, departure: FloatArray) -> FloatArray:
-        """Polar angles (k,) of directions at corners, given by angles (k,) from the side of corners 0 and 1."""
-        seen = departure - self._direction(previous_half_edge(corner))
-        return in_circle(self._at_corners(corner, seen - _WHOLE * np.rint(seen / _WHOLE)))
 
     def _direction(self, half_edge: IntArray) -> FloatArray:
         """The angle (k,) of half-edges in their triangles, from the side of corners 0 and 1."""

@@ -155,7 +155,7 @@ class Searched(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """Origins of the shortest paths to k vertices or points. The fields with defaults are set in directed searches.
+    """Origins of the shortest paths to k vertices. The fields with defaults are set in directed searches.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class Origin(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ExactSolution:
-    """Distances at vertices (n,) and at target points (t,), and the origins of the shortest paths.
+    """Distances at vertices (n,), with the origins of the shortest paths, and at target points (t,).
 
     Distances are ``inf`` if no source is within reach or the cutoff. The half-edge over which a path to a vertex enters
     its last face is opposite the vertex. `n_windows` is the number of windows that crossed an edge.
@@ -201,7 +201,6 @@ class ExactSolution:
     distance: FloatArray
     origin: Origin
     target_distance: FloatArray
-    target_origin: Origin
     n_windows: int
 
 
@@ -246,12 +245,13 @@ class ExactSurface:
         done = search(
             self.tables, sources, cutoff=cutoff, targets=targets, goals=goals, directed=directed, threads=threads
         )
-        which = done.nearest_copy(0 if targets is None else len(targets))
-        distance, origin = self._result(done.found, done, self.tables.number, cutoff)
+        distance, origin = self._result(done, cutoff)
         if done.leaving is not None:
             origin = self._with_leaving(origin, done, done.leaving)
-        to_targets = self._result(done.targets.found, done, which, cutoff)
-        return ExactSolution(distance, origin, *to_targets, done.n_windows)
+        which = done.nearest_copy(0 if targets is None else len(targets))
+        to_targets = self.tables.unscaled(done.targets.found.distance[which])
+        to_targets[to_targets > cutoff] = np.inf
+        return ExactSolution(distance, origin, to_targets, done.n_windows)
 
     def distance(
         self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1, than: FloatArray | None = None
@@ -281,18 +281,16 @@ class ExactSurface:
         turn[row] = done.starts.points.turn[root[row] - self.n]
         return origin._replace(direction=leaving.direction[number], turn=turn[number])
 
-    def _result(self, found: Found, done: Searched, which: AnyArray, cutoff: float) -> tuple[FloatArray, Origin]:
-        """Distance and origin of some of the kernel's results, in the caller's numbering and unit."""
-        tables, starts, label = self.tables, done.starts, done.found.label
+    def _result(self, done: Searched, cutoff: float) -> tuple[FloatArray, Origin]:
+        """Distance and origin of the kernel's results, in the caller's numbering and unit."""
+        tables, starts, found, which = self.tables, done.starts, done.found, self.tables.number
         distance = tables.unscaled(found.distance[which])
         within: BoolArray = (distance <= cutoff) & (found.root[which] >= 0)
         root = np.where(within, found.root[which], -1)
         # All copies of a point or segment have one number, and the ends of a segment have that of the segment.
         names = np.concatenate([tables.old_vertex, np.where(starts.place < 0, -1, self.n + starts.place)])
-        # A target has the label of its root.
-        first = found.label[which] if len(found.label) else label[root]
         origin = Origin(
-            starts.label[np.where(within, first, -1)],
+            starts.label[np.where(within, found.label[which], -1)],
             names[root],
             tables.old_half_edge(np.where(within, found.entered[which], -1)),
             tables.unscaled(found.crossing[which]),
