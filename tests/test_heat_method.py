@@ -280,6 +280,12 @@ def mean_error(domain: Operators, source: int, exact: np.ndarray, t: float, **op
     return float(np.abs(distance - exact).mean())
 
 
+def test_the_order_of_sources_does_not_matter():
+    solver = HeatMethodSolver(shapes.grid(20))
+    for sources in ([225, 247], [0, 2, 42, 44]):  # vertices between them are equally near to two
+        assert np.array_equal(solver.distance(sources), solver.distance(sources[::-1]))
+
+
 @pytest.mark.parametrize(("magnitude", "fastest"), [("unit", 1.0), ("auto", 1.6)])
 @pytest.mark.parametrize(
     ("shape", "sizes"),

@@ -30,6 +30,8 @@ _SPACING = 0.25
 # that comes with it: 5 times after 1.1 mean edge lengths at the default t = h^2 / 2, and 2 or so since heat also falls
 # as it spreads. Up to there the distance from either source is the same to within the error of the method.
 _OVERTAKEN = 5.0
+# Distances that differ by a smaller share are equal.
+_ROUNDING = 1e-12
 
 
 class Seeds(NamedTuple):
@@ -42,6 +44,15 @@ class Seeds(NamedTuple):
     def nearest(self) -> Seeds:
         """The smallest of several values at each vertex."""
         return self.at(nearest_first(*self))
+
+    def of_one_source(self) -> Seeds:
+        """The smallest value at each vertex to which no two sources are equally near; of a source without such, all."""
+        chosen, nearest = self.at(np.lexsort((self.value, self.label, self.vertex))), self.nearest()
+        least = nearest.value[np.searchsorted(nearest.vertex, chosen.vertex)]
+        is_new = (np.diff(chosen.vertex, prepend=-1) != 0) | (np.diff(chosen.label, prepend=-1) != 0)
+        chosen = chosen.at(is_new & (chosen.value <= least * (1 + _ROUNDING)))
+        is_tied = np.bincount(chosen.vertex)[chosen.vertex] > 1
+        return chosen.at(~is_tied | ~np.isin(chosen.label, chosen.label[~is_tied]))
 
     @classmethod
     def joined(cls, *parts: Seeds) -> Seeds:
@@ -149,7 +160,8 @@ class SourceAssembler:
         rim = self._rim(sources)
         ring = self._ring(sources, rim)
         found, far = self._known_by_windows(sources, rim)
-        near = Seeds.joined(ring, found).nearest()
+        known = Seeds.joined(ring, found)
+        near, anchors = known.nearest(), known.of_one_source()
         seen = np.zeros(len(near.vertex), bool)
         if len(found.vertex):
             seen = np.isin(near.vertex, found.vertex) & ~np.isin(near.vertex, sources.vertices)
@@ -164,7 +176,7 @@ class SourceAssembler:
             # Heat is measured in units of h, so that the gradient has none.
             largest_heat=SOURCE_HEAT * min(self._h_at(vertex).min(initial=1e10), 1e10),
             # Inside a region of sources there is no heat flow, and phi says nothing.
-            anchors=near if rim.all() else near.at(~np.isin(near.vertex, sources.vertices[~rim])),
+            anchors=anchors if rim.all() else anchors.at(~np.isin(anchors.vertex, sources.vertices[~rim])),
             near=near,
             seen=seen,
             far=far,
