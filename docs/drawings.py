@@ -24,7 +24,6 @@ import numpy as np
 
 import heat_igl
 from heat_igl import shapes
-from heat_igl.cli.demo import sample_mesh
 from heat_igl.drawing.plots import plot
 
 DOCS = Path(__file__).resolve().parent / "images"
@@ -312,7 +311,7 @@ def _saddle(panel: Any) -> None:
 
 def bunny() -> Any:
     """Distance from one vertex of the bunny, which heads the README."""
-    path = sample_mesh()
+    path = shapes.bunny_path()
     mesh = heat_igl.read_mesh(path) if path else shapes.icosphere(5)
     return plot(mesh, heat_igl.HeatMethodSolver(mesh).distance(1234), sources=1234).figure
 

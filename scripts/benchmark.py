@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 
 from heat_igl import Mesh, read_mesh, shapes
-from heat_igl.cli.demo import sample_mesh
 from heat_igl.reference import exact
 from heat_igl.runtime import PeakMemory
 from heat_igl.typing import FloatArray
@@ -221,7 +220,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     elif options.range:
         publish(options, {"accuracy": Table(collected(at_range(options)), RANGE)})
     else:
-        bunny = sample_mesh()
+        bunny = shapes.bunny_path()
         rows = collected(timings(options, options.meshes or ([bunny] if bunny else [])))
         own = [row for row in rows if row["method"].startswith("heat")]
         tables = {

@@ -30,7 +30,7 @@ import igl
 import numpy as np
 
 import heat_igl
-from heat_igl import Mesh, read_mesh, shapes, write_mesh
+from heat_igl import Mesh, read_mesh, write_mesh
 from heat_igl.geodesic import SolverChoice
 from heat_igl.typing import FloatArray
 from heat_igl.validation import metrics
@@ -192,18 +192,9 @@ def collected(rows: Iterable[Row]) -> list[Row]:
 # Meshes.
 
 
-def sample(name: str) -> Mesh:
-    """A sample mesh of the pymeshlab wheel, by its name without ``.obj``; a sphere where there is none."""
-    spec = importlib.util.find_spec("pymeshlab")
-    if spec is None or spec.origin is None:
-        return shapes.icosphere(4)
-    return read_mesh(Path(spec.origin).parent / "tests" / "sample_meshes" / f"{name}.obj")
-
-
-def named(paths: Iterable[Path], default: str = "") -> dict[str, Mesh]:
-    """Meshes of files, by the names of the files; a sample of the pymeshlab wheel where there are none."""
-    found = {path.stem: read_mesh(path) for path in paths}
-    return found or ({default: sample(default)} if default else {})
+def named(paths: Iterable[Path]) -> dict[str, Mesh]:
+    """Meshes of files, by the names of the files."""
+    return {path.stem: read_mesh(path) for path in paths}
 
 
 def moved_inside(mesh: Mesh, rng: np.random.Generator, most: float, fixed: FloatArray | bool = False) -> Mesh:

@@ -44,21 +44,18 @@ class Square:
 
     def __init__(self, i: int, per_row: int | None = None) -> None:
         mesh = shapes.grid(i)
-        V, F = (mesh.V, mesh.F) if per_row is None else printed_triangulation(i, per_row)
+        V, F = mesh.V, mesh.F
+        if per_row is not None:
+            # F = {(k, k + 1, k + n), (k, k + n, k + n - 1)}, as far as these are vertices, with n = `per_row`.
+            k = np.arange(per_row**2)
+            F = np.concatenate([np.c_[k, k + 1, k + per_row], np.c_[k, k + per_row, k + per_row - 1]])
+            V, F = np.c_[k % per_row, k // per_row, np.zeros(len(k))] / i, F[F.max(axis=1) < len(k)]
         self.i, self.V, self.F = i, V, F
         self.truth = np.linalg.norm(V, axis=1)
         self.L = igl.cotmatrix(V, F)
         self.M = igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_BARYCENTRIC)
         self.G = igl.grad(V, F)
         self.W = sp.diags(np.tile(igl.doublearea(V, F) / 2, 3)).tocsc()
-
-
-def printed_triangulation(i: int, per_row: int) -> tuple[np.ndarray, np.ndarray]:
-    """``F = {(k, k + 1, k + n), (k, k + n, k + n - 1)}``, as far as these are vertices, with n = `per_row`."""
-    k = np.arange(per_row**2)
-    F = np.concatenate([np.c_[k, k + 1, k + per_row], np.c_[k, k + per_row, k + per_row - 1]])
-    V = np.c_[k % per_row, k // per_row, np.zeros(len(k))] / i
-    return V, F[F.max(axis=1) < len(k)]
 
 
 def distance(

@@ -138,36 +138,26 @@ def broken(mesh: Mesh, curve: SurfaceCurve, share: float, gaps: int, rng: np.ran
     return [SurfaceCurve(curve.faces[run], curve.start[run], curve.end[run]) for run in runs if kept[run[0]]]
 
 
-def smooth_function(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
-    """A sum of a few waves, at most two wavelengths across the mesh."""
-    waves = rng.normal(size=(3, 4)) * rng.uniform(1, 5, 4) / np.ptp(mesh.V, axis=0).max()
-    return np.asarray(np.sin(mesh.V @ waves + rng.uniform(0, 2 * np.pi, 4)) @ rng.normal(size=4))
-
-
-def pieces_and_error(mesh: Mesh, share: float, gaps: int, rng: np.random.Generator) -> tuple[Curves, Any]:
-    """What is left of a level, and a function to the error in percent of the square root of the area inside."""
-    values = smooth_function(mesh, rng)
-    level = float(np.quantile(values, rng.uniform(0.3, 0.7)))
-    whole = isolines(mesh, values, [level])[0]
-    pieces = [piece for curve in whole for piece in broken(mesh, curve, share, gaps, rng)]
-    truth = np.where(values < level, -1, 1) * geodesic_distance(mesh, whole)
-    size = float(np.sqrt(sublevel_areas(mesh, values, level)[0]))
-    return pieces, lambda found: float(100 * np.abs(found - truth).mean() / size)
-
-
 def broken_rows(options: argparse.Namespace) -> Iterator[Row]:
     meshes, rng = named(options.meshes), np.random.default_rng(options.seed)
     solvers = {name: {way: SignedHeatSolver(m, **kept) for way, kept in WAYS.items()} for name, m in meshes.items()}
     peers = {name: Peer(mesh) for name, mesh in meshes.items()}
     for case in range(options.cases):
         name, share = list(meshes)[case % len(meshes)], GAPS[case // len(meshes) % len(GAPS)]
-        pieces, error = pieces_and_error(meshes[name], share, int(rng.integers(1, 7)), rng)
-        row: Row = {"mesh": name, "removed": share}
-        row |= {way: error(solver.distance(pieces)) for way, solver in solvers[name].items()}
+        mesh, gaps = meshes[name], int(rng.integers(1, 7))
+        # A sum of a few waves, at most two wavelengths across the mesh.
+        waves = rng.normal(size=(3, 4)) * rng.uniform(1, 5, 4) / np.ptp(mesh.V, axis=0).max()
+        values = np.sin(mesh.V @ waves + rng.uniform(0, 2 * np.pi, 4)) @ rng.normal(size=4)
+        at = float(np.quantile(values, rng.uniform(0.3, 0.7)))
+        whole = isolines(mesh, values, [at])[0]
+        pieces = [piece for curve in whole for piece in broken(mesh, curve, share, gaps, rng)]
+        found = {way: solver.distance(pieces) for way, solver in solvers[name].items()}
         nodes = peers[name].nodes(pieces)
-        for level in ("ZeroSet", "None"):
-            row[f"potpourri3d {level}"] = error(peers[name].distance(nodes, level))
-        yield row
+        found |= {f"potpourri3d {level}": peers[name].distance(nodes, level) for level in ("ZeroSet", "None")}
+        truth = np.where(values < at, -1, 1) * geodesic_distance(mesh, whole)
+        size = np.sqrt(sublevel_areas(mesh, values, at)[0])
+        errors = {way: float(100 * np.abs(d - truth).mean() / size) for way, d in found.items()}
+        yield {"mesh": name, "removed": share} | errors
 
 
 def summary(rows: Sequence[Row]) -> Iterator[Row]:

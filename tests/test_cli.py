@@ -16,7 +16,7 @@ from surfaces import twice
 
 import heat_igl
 from heat_igl import cli, drawing, io, shapes
-from heat_igl.cli import demo, distances, views
+from heat_igl.cli import distances, views
 from heat_igl.cli.program import EXAMPLES, application
 from heat_igl.io import read_attributes, read_mesh, read_polylines, write_curves, write_mesh
 
@@ -142,7 +142,7 @@ def test_demo_does_the_whole_job(tmp_path):
     done = command("demo", "--out", "made/results", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    name = "bunny" if demo.sample_mesh() else "sphere"
+    name = "bunny" if shapes.bunny_path() else "sphere"
     assert files(tmp_path / "made/results") == {f"{name}.ply", f"{name}.png"}
     mesh = io.read_mesh(tmp_path / "made/results" / f"{name}.ply")
     distance = io.read_attributes(tmp_path / "made/results" / f"{name}.ply")["distance"]

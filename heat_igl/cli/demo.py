@@ -8,12 +8,7 @@ import numpy as np
 
 from heat_igl.errors import MissingExtraError
 from heat_igl.io import read_mesh, write_mesh
-from heat_igl.mesh import Mesh
-from heat_igl.typing import FloatArray
 from heat_igl.validation import ValidationRow, shapes, validate
-from heat_igl.validation.shapes import bunny_path as sample_mesh
-
-__all__ = ["demonstrate", "sample_mesh"]
 
 _SOURCE = 1234  # on the bunny's haunch: most of the surface is visible from there
 
@@ -23,7 +18,9 @@ def demonstrate(out: Path) -> list[tuple[str, str]]:
 
     Without pymeshlab, which ships the bunny, the mesh is a sphere. Returns rows for printing: timings, errors, paths.
     """
-    path = sample_mesh()
+    from heat_igl.drawing import plot
+
+    path = shapes.bunny_path()
     name = "bunny" if path else "sphere"
     ply, png = out / f"{name}.ply", out / f"{name}.png"
     mesh = read_mesh(path) if path else shapes.icosphere(5)
@@ -35,7 +32,12 @@ def demonstrate(out: Path) -> list[tuple[str, str]]:
     rows.append(("farthest", f"{phi.max():.4f} from vertex {_SOURCE}"))
     rows += [(row.method, _described(row)) for row in report.rows]
     write_mesh(ply, mesh, distance=phi)
-    return [*rows, ("wrote", f"{ply} (distance as vertex attribute)"), _drawn(png, mesh, phi)]
+    rows.append(("wrote", f"{ply} (distance as vertex attribute)"))
+    try:
+        plot(mesh, phi, sources=_SOURCE).save(png)
+    except MissingExtraError as error:
+        return [*rows, ("picture", f"left out: {error}")]
+    return [*rows, ("wrote", f"{png} (isolines)")]
 
 
 def _described(row: ValidationRow) -> str:
@@ -47,13 +49,3 @@ def _described(row: ValidationRow) -> str:
         return f"{text}, exact"
     error, largest = 100 * np.array([row.errors.mean, row.errors.l_infinity])
     return f"{text}, error {error:.3f} % in the mean, at most {largest:.2f} % of the largest distance"
-
-
-def _drawn(path: Path, mesh: Mesh, phi: FloatArray) -> tuple[str, str]:
-    from heat_igl.drawing import plot
-
-    try:
-        plot(mesh, phi, sources=_SOURCE).save(path)
-    except MissingExtraError as error:
-        return "picture", f"left out: {error}"
-    return "wrote", f"{path} (isolines)"
