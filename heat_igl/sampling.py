@@ -355,11 +355,6 @@ def dual_triangulation(mesh: MeshLike, cells: VoronoiCells) -> Mesh:
     F = np.sort(met, axis=1)[first]
     F[balance < 0] = F[balance < 0][:, [0, 2, 1]]
     F = F[covered % 2 == 1]
-    _check_dual(F, k)
-    return Mesh(mesh.V[cells.sites], F)
-
-
-def _check_dual(F: IntArray, k: int) -> None:
     remedy = f"the cells of {k} sites do not meet like the triangles of a surface; sample more densely"
     if not len(F):
         raise MeshError(f"no three cells meet in a point: {remedy}")
@@ -376,3 +371,4 @@ def _check_dual(F: IntArray, k: int) -> None:
     pinched = connectivity.nonmanifold_vertices(F, found, k)
     if len(pinched):
         raise MeshError(f"the triangles at cell {pinched[0]} are not one fan ({len(pinched)} cells' are not): {remedy}")
+    return Mesh(mesh.V[cells.sites], F)

@@ -85,7 +85,11 @@ def distance(
         backend=backend,
     )
     with Console(stderr=True).status("measuring"):
-        _warm_up(loaded, chosen)
+        # On a small mesh first, so that times are of the work alone, and not of libraries that are loaded.
+        is_tetrahedral = isinstance(loaded, Mesh) and loaded.is_tetrahedral
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            _measured(Mesh(*_CORNER) if is_tetrahedral else Mesh(*_PYRAMID), 0, chosen, None)
         phi, about = _measured(loaded, sources, chosen, cutoff, mask)
     written = write_results(loaded, phi, output, picture, lambda: drawing.plot(loaded, phi, sources=vertices))
     print_rows([*_summary(mesh, loaded, phi, cutoff), *about, *gaps, *written], json_file)
@@ -117,14 +121,6 @@ def _measured(
         rows.append(("flipped edges", str(found.n_flips), found.n_flips))
     per_distance = {"once": once, "per_distance": seconds}
     return phi, [*rows, ("seconds", f"{once:.3f} once, {seconds:.3f} per distance", per_distance)]
-
-
-def _warm_up(mesh: Mesh | PointCloud, choice: SolverChoice) -> None:
-    """Measure on a small mesh, so that times are of the work alone, without loading libraries for the first time."""
-    is_tetrahedral = isinstance(mesh, Mesh) and mesh.is_tetrahedral
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        _measured(Mesh(*_CORNER) if is_tetrahedral else Mesh(*_PYRAMID), 0, choice, None)
 
 
 def isolines(

@@ -179,7 +179,8 @@ def work(task: Task) -> Outcome:
             "share"
         ) from None
     try:
-        outcome = _resume(task, store) if task.blocks else _begin(task, store)
+        mesh = _loaded(task.item)
+        outcome = (_resume if task.blocks else _begin)(task, store, mesh, _fingerprint(mesh))
     except BatchError:  # the store is lost
         raise
     except Exception as error:  # of this mesh alone
@@ -201,11 +202,9 @@ def _reason(error: Exception) -> str:
     return message if isinstance(error, ValueError | RuntimeError | MemoryError) and message else repr(error)
 
 
-def _begin(task: Task, store: Store) -> Outcome:
-    """Read, validate and factor a mesh, make the group or continue an earlier one, and solve the first blocks."""
+def _begin(task: Task, store: Store, mesh: Mesh | PointCloud, fingerprint: str) -> Outcome:
+    """Factor a mesh, make the group or continue an earlier one, and solve the first blocks."""
     name = task.item.name
-    mesh = _loaded(task.item)
-    fingerprint = _fingerprint(mesh)
     try:
         known = store.attributes(name)
     except ValueError:  # damaged, and made anew
@@ -221,17 +220,18 @@ def _begin(task: Task, store: Store) -> Outcome:
             facts |= {**identity, "report": plain(asdict(mesh.report()))}
             found = store.begin(name, sets, mesh.n_vertices, task.dtype, facts), sets
         group, source_sets = found
-        spans = _spans(group)
+        # The missing blocks, cut into the shares of single tasks.
+        missing, rows = group.missing(), group.rows(0).stop
+        per_task = max(1, int(max(_ROWS_PER_TASK, _VALUES_PER_TASK / group.n_columns) // rows))
+        spans = [tuple(missing[start : start + per_task]) for start in range(0, len(missing), per_task)]
         _send("begun", task, blocks=sum(map(len, spans)))
         if spans:
             _solve(task, mesh, group, source_sets, solver, spans[0])
         return Outcome(tuple(spans[1:]))
 
 
-def _resume(task: Task, store: Store) -> Outcome:
+def _resume(task: Task, store: Store, mesh: Mesh | PointCloud, fingerprint: str) -> Outcome:
     """Solve the blocks of a task, in a group that `_begin` has made."""
-    mesh = _loaded(task.item)
-    fingerprint = _fingerprint(mesh)
     if store.attributes(task.item.name)["fingerprint"] != fingerprint:
         raise ValueError("the file changed during the batch: run the same again")
     group = store.group(task.item.name)
@@ -283,15 +283,6 @@ def _source_sets(plan: SourcePlan, mesh: Mesh | PointCloud, solver: Solver) -> l
         return [vertex_sources(list(vertices), n) if vertices[-1] >= n else np.array(vertices) for vertices in plan]
     chosen = np.arange(n) if plan is None else farthest_points(solver, min(plan, n))
     return list(chosen.reshape(-1, 1))
-
-
-def _spans(group: MeshGroup) -> list[tuple[int, ...]]:
-    """The missing blocks, cut into the shares of single tasks."""
-    missing = group.missing()
-    rows = group.rows(0).stop
-    n = group.n_columns
-    per_task = max(1, int(max(_ROWS_PER_TASK, _VALUES_PER_TASK / n) // rows))
-    return [tuple(missing[start : start + per_task]) for start in range(0, len(missing), per_task)]
 
 
 def _solve(

@@ -206,6 +206,8 @@ def _leaving(mesh: Mesh, faces: IntArray, begin: FloatArray, end: FloatArray) ->
 def signed_distance(mesh: MeshLike, curve: NestedCurves) -> FloatArray:
     """Signed distance from curves on a mesh, in one call; to ask more than once, keep a `SignedHeatSolver`.
 
+    Errors are those of `SignedHeatSolver`.
+
     Parameters
     ----------
     mesh : mesh
@@ -217,11 +219,6 @@ def signed_distance(mesh: MeshLike, curve: NestedCurves) -> FloatArray:
     -------
     (n,) float64
         In the mesh's unit: negative on the left of the curves, which ``curve.reversed()`` turns round.
-
-    Raises
-    ------
-    MeshError, SourceError
-        As for `SignedHeatSolver`.
 
     Examples
     --------

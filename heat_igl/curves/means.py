@@ -102,7 +102,12 @@ def karcher_mean(mesh: MeshLike, points: Waypoints, weights: ArrayLike | None = 
     mesh = as_mesh(mesh)
     triangles = as_simplices(mesh)
     faces, barycentric = checked_places("points", triangles, points)
-    weight = _checked_weights(weights, len(faces))
+    weight = np.ones(len(faces)) if weights is None else real_numbers("weights", weights)
+    if weight.shape != (len(faces),):
+        raise ValueError(f"weights must be {len(faces)} numbers, one for each point, but the shape is {weight.shape}")
+    raise_at_first(~(np.isfinite(weight) & (weight >= 0)), "weights", weight, "must be finite and not negative")
+    if not weight.any():
+        raise ValueError("weights are all 0: one point at least needs a positive weight")
     if not is_number(p) or not 1 <= p <= _LARGEST_POWER:
         raise ValueError(
             f"p must be a number from 1 to {_LARGEST_POWER}, not {shown(p)}: 2 for the mean, 1 for the median"
@@ -279,15 +284,3 @@ def _joined(first: SurfaceCurve, second: SurfaceCurve) -> SurfaceCurve:
     """The curve along one and then along another, which starts where the first ends."""
     start, end = np.concatenate([first.start, second.start]), np.concatenate([first.end, second.end])
     return unchecked_curve(np.concatenate([first.faces, second.faces]), start, end, is_closed=False)
-
-
-def _checked_weights(weights: ArrayLike | None, k: int) -> FloatArray:
-    if weights is None:
-        return np.ones(k)
-    array = real_numbers("weights", weights)
-    if array.shape != (k,):
-        raise ValueError(f"weights must be {k} numbers, one for each point, but the shape is {array.shape}")
-    raise_at_first(~(np.isfinite(array) & (array >= 0)), "weights", array, "must be finite and not negative")
-    if not array.any():
-        raise ValueError("weights are all 0: one point at least needs a positive weight")
-    return array

@@ -106,17 +106,13 @@ def exp_map(mesh: MeshLike, source: Sources, vectors: ArrayLike) -> SurfacePoint
         A vertex or point for all vectors, or one for each.
     vectors : (k, 2) or (k, 3) array_like
         In the frame of the source, or in space, as the directions of `trace_geodesic`; the length of a vector in the
-        tangent plane is that of the geodesic. The vector 0 leads to the source itself.
+        tangent plane is that of the geodesic. The vector 0 leads to the source itself. Errors are those of
+        `trace_geodesic`.
 
     Returns
     -------
     SurfacePoints
         k points. A geodesic that meets the boundary ends there.
-
-    Raises
-    ------
-    MeshError, SourceError, ValueError
-        As for `trace_geodesic`.
 
     Notes
     -----

@@ -124,8 +124,8 @@ def page(
 
     Raises
     ------
-    ValueError, SourceError, MissingExtraError
-        As for `heat_igl.drawing.plot`; a ValueError also for fields of another shape, or if there is no field `beside`.
+    ValueError
+        If fields have another shape, or there is no field `beside`. Other errors are those of `heat_igl.drawing.plot`.
     """
     is_cloud = isinstance(given := as_mesh(mesh), PointCloud)
     mesh = as_simplices(given)

@@ -125,6 +125,8 @@ def plot_field(
 ) -> Picture:
     """Draw a scalar field on a mesh, such as heat or an error, by colours and optional isolines.
 
+    Other parameters, the result and errors are those of `plot`.
+
     Parameters
     ----------
     values : (n,) array_like
@@ -139,22 +141,13 @@ def plot_field(
     colormap : str, optional
         Name of a matplotlib colour map. The default is "RdBu_r", which is white in the middle, for limits on both
         sides of 0, and the perceptually uniform "magma_r" otherwise.
-    mesh, sources, curves, view, up
-        As for `plot`.
-
-    Returns
-    -------
-    Picture
-        Displayed by notebooks; `Picture.save` writes it to a file.
-
-    Raises
-    ------
-    ValueError, SourceError, MissingExtraError
-        As for `plot`.
     """
     mesh = as_mesh(mesh)
     if limits is None:
-        limits = _limits(values)
+        finite = np.asarray(values, dtype=np.float64)
+        finite = finite[np.isfinite(finite)]
+        if len(finite) and finite.min() < 0 < finite.max():
+            limits = -float(np.abs(finite).max()), float(np.abs(finite).max())
     has_signs = limits is not None and limits[0] < 0 < limits[1]
     table = colours(colormap or ("RdBu_r" if has_signs else "magma_r"), is_trimmed=not has_signs)
     seen = scene(
@@ -176,6 +169,8 @@ def plot_labels(
 ) -> Picture:
     """Draw labels of vertices, such as those of Voronoi cells, with different colours for neighbouring labels.
 
+    Other parameters, the result and other errors are those of `plot`.
+
     Parameters
     ----------
     labels : (n,) array_like of int
@@ -183,20 +178,11 @@ def plot_labels(
     distance : (n,) array_like, optional
         For Voronoi cells, the distance of each vertex from the site of its cell: borders are then drawn where the
         distances from both sites are equal. Otherwise a point has the label of the nearest corner of its triangle.
-    mesh, sources, curves, view, up
-        As for `plot`.
-
-    Returns
-    -------
-    Picture
-        As that of `plot`.
 
     Raises
     ------
     ValueError
-        If `labels` are not integers of shape (n,), or an option is invalid.
-    SourceError, MissingExtraError
-        As for `plot`.
+        If `labels` are not integers of shape (n,).
 
     Notes
     -----
@@ -256,16 +242,6 @@ def _borders(seen: Scene, labels: IntArray, distance: FloatArray) -> FloatArray:
     borders = np.repeat(distance[F][:, None, :], 3, axis=1)
     borders[other] = (np.bincount(place, found[other]) / count)[place]
     return borders
-
-
-def _limits(values: ArrayLike) -> tuple[float, float] | None:
-    """Symmetric limits for values of both signs, otherwise None: `scene` then chooses limits and reports errors."""
-    finite = np.asarray(values, dtype=np.float64)
-    finite = finite[np.isfinite(finite)]
-    if not len(finite) or not finite.min() < 0 < finite.max():
-        return None
-    reach = float(np.abs(finite).max())
-    return -reach, reach
 
 
 def write_line_drawing(

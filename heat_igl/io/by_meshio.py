@@ -229,20 +229,16 @@ def read(path: Path, data: bytes) -> Contents:
         )
     cells = select(path, blocks)
     if suffix == ".stl":
-        V, cells = _without_collapsed(path, V, cells)
+        # Triangles collapse when equal positions are merged.
+        F = cells.corners.reshape(-1, 3)
+        F = F[(np.roll(F, 1, axis=1) != F).all(axis=1)]
+        if not len(F):
+            raise MeshError(f"{path}: all {len(cells.degree)} triangles have two corners in one point, so none is left")
+        used, corners = np.unique(F, return_inverse=True)
+        V, cells = V[used], Cells(corners.ravel(), np.full(len(F), 3))
     kind = "tetrahedron" if cells.tetrahedra else "face"
     check(V, cells, numbered(path, "vertex", form.base), numbered(path, kind, form.base), form.base)
     return Contents(V, cells, attributes if suffix == ".vtu" else {})
-
-
-def _without_collapsed(path: Path, V: FloatArray, cells: Cells) -> tuple[FloatArray, Cells]:
-    """Triangles whose corners are three points, and their vertices; others collapse when equal positions are merged."""
-    F = cells.corners.reshape(-1, 3)
-    F = F[(np.roll(F, 1, axis=1) != F).all(axis=1)]
-    if not len(F):
-        raise MeshError(f"{path}: all {len(cells.degree)} triangles have two corners in one point, so none is left")
-    used, corners = np.unique(F, return_inverse=True)
-    return V[used], Cells(corners.ravel(), np.full(len(F), 3))
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:

@@ -140,7 +140,12 @@ class Text:
                 continue
             if len(values) == count.sum():
                 return values.astype(np.float64, copy=False), start
-        raise self._not_a_number(filled, skip, up_to_slash)
+        for line in filled.tolist():
+            for token in self.tokens(line)[skip:]:
+                number = token.split(b"/")[0] if up_to_slash else token
+                if not _NUMBER.fullmatch(number):
+                    raise self.error(line, f"'{token[:40].decode('utf-8', 'backslashreplace')}' is not a number")
+        raise self.error(int(filled[0]), "this line, or one below, holds something that is not a number")
 
     def positions(self, lines: IntArray, skip: int = 0) -> FloatArray:
         """The first three numbers of each line (r, 3), after `skip` tokens."""
@@ -148,14 +153,6 @@ class Text:
         self.refuse(lines, short, f"a vertex needs three coordinates ({int(short.sum())} lines have fewer)")
         values, start = self.numbers(lines, skip)
         return np.asarray(values[start[:, None] + np.arange(3)])
-
-    def _not_a_number(self, lines: IntArray, skip: int, up_to_slash: bool) -> MeshError:
-        for line in lines.tolist():
-            for token in self.tokens(line)[skip:]:
-                number = token.split(b"/")[0] if up_to_slash else token
-                if not _NUMBER.fullmatch(number):
-                    return self.error(line, f"'{token[:40].decode('utf-8', 'backslashreplace')}' is not a number")
-        return self.error(int(lines[0]), "this line, or one below, holds something that is not a number")
 
 
 def _blank(match: re.Match[bytes]) -> bytes:

@@ -75,7 +75,11 @@ def write_curves(
     3
     """
     if curves is None:
-        curves, mesh = mesh, _own_mesh(mesh)
+        curves = mesh
+        named = flat_curves(list(curves.values()) if isinstance(curves, Mapping) else curves)
+        if not named or named[0].mesh is None:
+            raise ValueError("there is no mesh, which these curves do not know: write_curves(path, mesh, curves)")
+        mesh = named[0].mesh
     mesh = as_simplices(mesh)
     if not isinstance(path, (str, os.PathLike)):
         raise ValueError(f"path must be a string or a path, not {shown(path)}")
@@ -100,15 +104,6 @@ def write_curves(
         lines = {name: [(P @ matrix.T, closed) for P, closed in group] for name, group in lines.items()}
     with replacing(target) as temporary:
         write(temporary, lines)
-
-
-def _own_mesh(curves: Curves) -> Mesh:
-    """The mesh that the first of some curves lies on."""
-    named = flat_curves(list(curves.values()) if isinstance(curves, Mapping) else curves)
-    mesh = named[0].mesh if named else None
-    if mesh is None:
-        raise ValueError("there is no mesh, which these curves do not know: write_curves(path, mesh, curves)")
-    return mesh
 
 
 def _plane(mesh: Mesh, path: Path) -> FloatArray:

@@ -248,7 +248,11 @@ def read(path: Path, data: bytes) -> Contents:
     check(V, cells, numbered(path, "vertex", 0), face_at)
     if not header.order:
         warn_if_cut(path, data, int(cells.corners[-1]) or len(V), len(V))
-    return Contents(V, cells, _gathered(others, header.vectors))
+    for vector, k in header.vectors.items():
+        parts = [f"{vector}_{i}" for i in range(min(k, len(others) + 1))]
+        if parts and vector not in others and all(part in others for part in parts):
+            others[vector] = np.stack([others.pop(part) for part in parts], axis=1)
+    return Contents(V, cells, others)
 
 
 def read_vertices(path: Path, data: bytes) -> tuple[FloatArray, dict[str, AnyArray]]:
@@ -266,15 +270,6 @@ def _vertices(path: Path, tables: Tables) -> tuple[FloatArray, dict[str, AnyArra
         prop.name: columns[prop.name].values.astype(prop.dtype) for prop in scalars if prop.name not in ("x", "y", "z")
     }
     return V, others
-
-
-def _gathered(columns: dict[str, AnyArray], vectors: dict[str, int]) -> dict[str, AnyArray]:
-    """Combine the properties name_0, name_1, ... to an array (n, k)."""
-    for name, k in vectors.items():
-        parts = [f"{name}_{i}" for i in range(min(k, len(columns) + 1))]
-        if parts and name not in columns and all(part in columns for part in parts):
-            columns[name] = np.stack([columns.pop(part) for part in parts], axis=1)
-    return columns
 
 
 def write(path: Path, mesh: Mesh, attributes: dict[str, FloatArray]) -> None:

@@ -185,9 +185,16 @@ class PolygonFans:
     def of(cls, polygons: PolygonMesh) -> PolygonFans:
         """The fans of all polygons."""
         degree, points = polygons.degree, virtual_vertices(polygons)
-        has_fan = (degree > 3) & _sees_every_side(polygons, points)
+        owner, begin = np.repeat(np.arange(len(degree)), degree), np.cumsum(degree) - degree
+        one, other = (polygons.V[ends] - points[owner] for ends in (polygons.corners, polygons.following))
+        # Whether all triangles of a fan are turned like the polygon.
+        normals, side = np.cross(one, other), other - one
+        total = np.add.reduceat(normals, begin)
+        length = np.linalg.norm(total, axis=1)
+        area = np.einsum("kx,kx->k", normals, (total / np.where(length > 0, length, 1)[:, None])[owner])
+        sees_all = np.logical_and.reduceat(area > _FLAT * np.einsum("kx,kx->k", side, side), begin)
+        has_fan = (degree > 3) & sees_all
         row = polygons.n_vertices + np.cumsum(has_fan) - 1
-        owner = np.repeat(np.arange(len(degree)), degree)
         owner_of_triangle, _ = enumerate_runs(degree - 2)
         in_fan, apart = has_fan[owner], ~has_fan[owner_of_triangle]
         fans = np.stack([polygons.corners, polygons.following, row[owner]], axis=1)[in_fan]
@@ -263,20 +270,6 @@ def virtual_vertices(mesh: PolygonMesh) -> FloatArray:
     squares = np.einsum("kx,kx->k", e, e)[:, None, None] * np.eye(3) - e[:, :, None] * e[:, None]
     inverse = np.linalg.pinv(np.add.reduceat(squares, begin), hermitian=True)
     return np.asarray(centre + np.einsum("mxy,my->mx", inverse, np.add.reduceat(np.cross(e, a), begin)))
-
-
-def _sees_every_side(mesh: PolygonMesh, points: FloatArray) -> BoolArray:
-    """Whether all triangles of a polygon's fan are turned like the polygon (m,)."""
-    begin = np.cumsum(mesh.degree) - mesh.degree
-    there = np.repeat(points, mesh.degree, axis=0)
-    one, other = mesh.V[mesh.corners] - there, mesh.V[mesh.following] - there
-    normals = np.cross(one, other)
-    total = np.add.reduceat(normals, begin)
-    length = np.linalg.norm(total, axis=1)
-    axis = total / np.where(length > 0, length, 1)[:, None]
-    area = np.einsum("kx,kx->k", normals, np.repeat(axis, mesh.degree, axis=0))
-    side = other - one
-    return np.asarray(np.logical_and.reduceat(area > _FLAT * np.einsum("kx,kx->k", side, side), begin))
 
 
 def _pieces(

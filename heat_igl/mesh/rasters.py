@@ -173,7 +173,14 @@ def image_domain(mask: ArrayLike, spacing: float | Sequence[float] = 1.0) -> Ima
     >>> domain.image(distance).shape
     (2, 3)
     """
-    inside = _mask(mask)
+    inside = as_array("mask", mask, MeshError)
+    if inside.ndim not in (2, 3) or inside.dtype.kind != "b":
+        raise MeshError(
+            "mask must be a boolean image (rows, columns) or (slices, rows, columns), not "
+            f"{inside.dtype} of shape {inside.shape}: compare with a threshold first"
+        )
+    if not inside.any():
+        raise MeshError("mask holds no pixel: a domain needs at least one")
     steps, dimension = checked_spacing(spacing, inside.ndim), inside.ndim
     cells = np.argwhere(inside)
     n = len(cells)
@@ -213,18 +220,6 @@ def _sides(dimension: int) -> IntArray:
         square = square if level == odd else np.roll(square, -1)
         cut += [square[[0, 1, 2]], square[[0, 2, 3]]]
     return np.reshape(cut, (2, -1, 3))
-
-
-def _mask(mask: ArrayLike) -> BoolArray:
-    array = as_array("mask", mask, MeshError)
-    if array.ndim not in (2, 3) or array.dtype.kind != "b":
-        raise MeshError(
-            "mask must be a boolean image (rows, columns) or (slices, rows, columns), not "
-            f"{array.dtype} of shape {array.shape}: compare with a threshold first"
-        )
-    if not array.any():
-        raise MeshError("mask holds no pixel: a domain needs at least one")
-    return array
 
 
 def checked_spacing(spacing: float | Sequence[float], dimension: int) -> list[float]:

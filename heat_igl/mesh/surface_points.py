@@ -82,7 +82,7 @@ class SurfacePoints:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SurfaceCurve:
-    """A polyline on a triangle mesh, each straight segment inside one face.
+    """A polyline on a triangle mesh, each straight segment inside one face; errors are those of `SurfacePoints`.
 
     Parameters
     ----------
@@ -95,11 +95,6 @@ class SurfaceCurve:
         Whether the last segment ends at the start of the first.
     mesh : mesh, optional
         The mesh that the curve lies on, for `length` and `points`. Curves made by functions of this package have it.
-
-    Raises
-    ------
-    SourceError
-        As for `SurfacePoints`.
 
     Examples
     --------

@@ -41,18 +41,14 @@ def triangulated(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[In
     return F, np.array(crossed, np.int64)
 
 
-def _vector_areas(V: FloatArray, corners: IntArray, degree: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Twice the vector area (m, 3) of each polygon, and the square (m,) of the extent."""
-    begin = np.cumsum(degree) - degree
-    following = next_in_run(corners, degree)
-    origin = np.repeat(V[corners[begin]], degree, axis=0)
-    one, other = V[corners] - origin, V[following] - origin
-    return (np.add.reduceat(np.cross(one, other), begin), np.maximum.reduceat(np.einsum("kx,kx->k", one, one), begin))
-
-
 def _without_fan(V: FloatArray, F: IntArray, corners: IntArray, degree: IntArray) -> BoolArray:
     """Mask (m,) of the polygons whose fan, triangles `F`, folds over itself."""
-    normal, squared = _vector_areas(V, corners, degree)
+    begin = np.cumsum(degree) - degree
+    origin = np.repeat(V[corners[begin]], degree, axis=0)
+    one, other = V[corners] - origin, V[next_in_run(corners, degree)] - origin
+    # Twice the vector area, and the square of the extent.
+    normal = np.add.reduceat(np.cross(one, other), begin)
+    squared = np.maximum.reduceat(np.einsum("kx,kx->k", one, one), begin)
     area = np.linalg.norm(normal, axis=1)
     owner, _ = enumerate_runs(degree - 2)
     one, other = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
@@ -94,23 +90,17 @@ def _area(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
 
 
-def _crosses_itself(p: FloatArray) -> bool:
-    """Whether two sides of a polygon (d, 2) cross each other in their inside."""
-    a, b = p, np.roll(p, -1, axis=0)
-    room = _ROUNDING * float(np.ptp(p, axis=0).max()) ** 2
-    side = np.stack([_area(a[:, None], b[:, None], q[None]) for q in (a, b)])
-    apart = (side[0] > room) & (side[1] < -room) | (side[0] < -room) & (side[1] > room)
-    return bool((apart & apart.T).any())
-
-
 def _ears(p: FloatArray) -> IntArray | None:
     """Triangles (d - 2, 3) of a simple polygon (d, 2), counter-clockwise; None if it is not simple.
 
     Of the ears at hand, the one with the largest ratio of area to squared lengths is clipped first.
     """
-    if _crosses_itself(p):
-        return None
     room = _ROUNDING * float(np.ptp(p, axis=0).max()) ** 2
+    ends = p, np.roll(p, -1, axis=0)
+    one, other = (_area(ends[0][:, None], ends[1][:, None], q[None]) for q in ends)
+    apart = (one > room) & (other < -room) | (one < -room) & (other > room)
+    if (apart & apart.T).any():  # sides that cross each other in their inside
+        return None
     left = list(range(len(p)))
     triangles = []
     # Which corners are ears, and of which that is asked: clipping one changes it at its two neighbours alone.

@@ -31,7 +31,10 @@ def fit_for_heat(
     n_components, of_face = int(component.max(initial=-1)) + 1, component[triangulation.F[:, 0]]
     is_uneven = np.ones(n_components, bool)
     if laplacian == "auto":
-        is_uneven = uneven_components(triangulation, component)
+        # Thin triangles, or ones that are large for the component, cover it, or it has few vertices.
+        thin, large = _thin_and_large(triangulation, component)
+        few = _counted(triangulation, component, n_components) < plan.FEW_FOR_HEAT
+        is_uneven = (thin > plan.THIN_SHARE) | (large > plan.LARGE_SHARE) | few
         is_uneven &= is_uneven[of_face].mean() > plan.UNEVEN_SHARE
     elif laplacian != "intrinsic-delaunay-refined":
         return triangulation
@@ -67,13 +70,6 @@ def _counted(triangulation: IntrinsicTriangulation, component: IntArray, k: int)
     n_coarse = np.count_nonzero((used > 0) & (used < plan.ENOUGH_FOR_HEAT))
     too_many = n_coarse * plan.ENOUGH_FOR_HEAT > plan.GROWTH * triangulation.n + plan.MORE
     return np.where(too_many | (used == 0), used.sum(), used)
-
-
-def uneven_components(triangulation: IntrinsicTriangulation, component: IntArray) -> BoolArray:
-    """Components (k,) that thin triangles, or ones that are large for the component, cover, or of few vertices."""
-    thin, large = _thin_and_large(triangulation, component)
-    few = _counted(triangulation, component, len(thin)) < plan.FEW_FOR_HEAT
-    return np.asarray((thin > plan.THIN_SHARE) | (large > plan.LARGE_SHARE) | few)
 
 
 def share_on_large_triangles(triangulation: IntrinsicTriangulation, component: IntArray) -> float:

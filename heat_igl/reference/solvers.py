@@ -104,7 +104,7 @@ class Measured:
 def measured(
     solver: str, mesh: MeshLike, sources: Sources, *, timeout: float = TIMEOUT, memory: float = MEMORY, **options: Any
 ) -> Measured:
-    """Distance by a named solver, with the cost in time and memory.
+    """Distance by a named solver, with the cost in time and memory; mesh, sources and errors are those of `exact`.
 
     Parameters
     ----------
@@ -112,8 +112,6 @@ def measured(
         "windows" for the windows of this package, one of `EXACT_SOLVERS`, one of MeshLab's, "meshlab",
         "meshlab_border" or "meshlab_heat", or the heat method of libigl, "igl_heat", or of geometry-central,
         "potpourri3d_heat". The last two shift by the mean over the sources, so that of several none need read 0.
-    mesh, sources
-        As for `exact`.
     timeout, memory
         Bounds for native solvers; windows need neither.
     **options
@@ -124,11 +122,6 @@ def measured(
     -------
     Measured
         Seconds are sums over the components that hold a source.
-
-    Raises
-    ------
-    SourceError, ReferenceSolverError, MissingExtraError
-        As for `exact`.
     """
     mesh = as_simplices(mesh)
     chosen = _SOLVERS.get(solver)

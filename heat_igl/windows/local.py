@@ -262,7 +262,15 @@ def pair_distances(mesh: MeshLike, pairs: ArrayLike, *, region: ArrayLike | None
     [4.0, 5.0]
     """
     triangles, part = triangles_inside(mesh, region, _WHAT)
-    first, second = triangles.originals[_checked_pairs(pairs, triangles.n_vertices)].T
+    array, n = as_array("pairs", pairs, SourceError), triangles.n_vertices
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise SourceError(f"pairs must be an array of shape (p, 2), but it has shape {array.shape}")
+    if array.dtype.kind not in "iu":
+        raise SourceError(f"pairs must hold indices of vertices, not {array.dtype}: convert with astype(int)")
+    remedy = f"the mesh has {n} vertices, so indices run from 0 to {n - 1}"
+    outside = ((array < 0) | (array >= n)).any(axis=1)
+    raise_at_first(outside, "pairs", array, "must be two vertices", remedy, SourceError)
+    first, second = triangles.originals[array].T
     if part is not None:
         part.require_vertices(first, "pairs")
     distance = np.full(len(first), np.inf)
@@ -318,18 +326,6 @@ def _chosen(sources: Sources | None, mesh: Mesh, part: MeshPart | None) -> IntAr
     if part is not None:
         part.require_vertices(named)
     return named
-
-
-def _checked_pairs(pairs: ArrayLike, n: int) -> IntArray:
-    array = as_array("pairs", pairs, SourceError)
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise SourceError(f"pairs must be an array of shape (p, 2), but it has shape {array.shape}")
-    if array.dtype.kind not in "iu":
-        raise SourceError(f"pairs must hold indices of vertices, not {array.dtype}: convert with astype(int)")
-    remedy = f"the mesh has {n} vertices, so indices run from 0 to {n - 1}"
-    outside = ((array < 0) | (array >= n)).any(axis=1)
-    raise_at_first(outside, "pairs", array, "must be two vertices", remedy, SourceError)
-    return np.asarray(array, np.int64)
 
 
 class Near(NamedTuple):
