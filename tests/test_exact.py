@@ -7,7 +7,6 @@ from scipy.spatial import Delaunay
 from surfaces import (
     COORDINATES,
     bumpy,
-    cube,
     graph_distance,
     nearest_vertex,
     on,
@@ -99,13 +98,6 @@ def test_rolled_out_pyramid(stretch):
             assert found.n_windows < 12 * len(mesh.edges)
 
 
-def test_corners_of_a_cube_are_as_far_as_over_unfolded_faces():
-    mesh = cube()
-    straight = np.linalg.norm(mesh.V, axis=1)
-    truth = np.where(np.isclose(straight, np.sqrt(3)), np.sqrt(5), straight)
-    np.testing.assert_allclose(exact_distance(mesh.V, mesh.F, 0), truth, rtol=1e-14)
-
-
 @pytest.mark.parametrize("surface", SURFACES)
 def test_paths_bend_at_the_boundary(surface):
     mesh = two_arms(8)
@@ -125,21 +117,6 @@ def test_paths_bend_at_the_boundary(surface):
     np.testing.assert_array_equal(found.origin.root[strictly], corner)
 
 
-@pytest.mark.parametrize("name", ["voxel blob", "wandering cells", "crossed sheets", "pinched"])
-def test_nonmanifold_meshes_against_steiner_points(name):
-    mesh = zoo(name)
-    sources = np.random.default_rng(0).choice(np.unique(mesh.F), 2)
-    upper = graph_distance(mesh, sources, 6)
-    for source, bound in zip(sources, upper, strict=True):
-        d = exact_distance(mesh.V, mesh.F, int(source))
-        np.testing.assert_array_equal(np.isfinite(d), np.isfinite(bound))
-        there = np.isfinite(d) & (d > 0)
-        excess = bound[there] / d[there] - 1
-        # Mollification lengthens edges of degenerate faces.
-        assert excess.min() > -1e-7
-        assert excess.mean() < 1e-2
-
-
 def of_tetrahedra(n: int, share: float, seed: int | np.random.Generator) -> Mesh:
     """The boundary of some of the tetrahedra of a Delaunay triangulation: up to a dozen faces at an edge."""
     rng = np.random.default_rng(seed)
@@ -148,16 +125,21 @@ def of_tetrahedra(n: int, share: float, seed: int | np.random.Generator) -> Mesh
     return skin(P, T[rng.random(len(T)) < share])
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_boundaries_of_tetrahedra_against_steiner_points(seed):
-    mesh = of_tetrahedra(40, 0.6, seed)
-    sources = [0, mesh.n_vertices // 2]
-    for source, bound in zip(sources, graph_distance(mesh, sources, 8), strict=True):
-        d = exact_distance(mesh.V, mesh.F, source)
+# Mollification lengthens edges of degenerate faces in the zoo.
+@pytest.mark.parametrize(
+    ("made", "least"),
+    [*((name, -1e-7) for name in ("voxel blob", "wandering cells", "crossed sheets", "pinched"))]
+    + [(of_tetrahedra(40, 0.6, seed), -1e-12) for seed in range(3)],
+)
+def test_nonmanifold_meshes_against_steiner_points(made, least):
+    mesh = zoo(made) if isinstance(made, str) else made
+    sources = np.random.default_rng(0).choice(np.unique(mesh.F), 2)
+    for source, bound in zip(sources, graph_distance(mesh, sources, 9), strict=True):
+        d = exact_distance(mesh.V, mesh.F, int(source))
         there = np.isfinite(d) & (d > 0)
         np.testing.assert_array_equal(np.isfinite(d), np.isfinite(bound))
         excess = bound[there] / d[there] - 1
-        assert -1e-12 < excess.min() <= excess.mean() < 5e-3
+        assert least < excess.min() <= excess.mean() < 5e-3
 
 
 @pytest.mark.parametrize(

@@ -438,11 +438,3 @@ def test_sides_come_from_the_cut_on_meshes_with_edges_of_more_than_two_faces():
     is_left = np.zeros(pieces.mesh.n_vertices, bool)
     is_left[pieces.mesh.F[np.isin(pieces.pieces, left)]] = True
     np.testing.assert_array_equal(is_left[: mesh.n_vertices], height < 0.3)
-
-
-def test_an_open_path_along_edges_has_two_sides():
-    mesh = shapes.grid(8)
-    distance = SignedHeatSolver(mesh).distance(edge_curve(mesh, np.arange(36, 45)))
-    # Along y = 0.5 or x = 0.5, whichever way the grid counts: half of the square is on each side.
-    assert (distance < 0).sum() == (distance > 0).sum() == 36
-    assert np.abs(distance).max() == pytest.approx(0.5)
