@@ -71,6 +71,15 @@ def test_paths_against_central_differences(name):
         )
 
 
+def test_offsets_against_central_differences():
+    mesh, rng = MESHES["torus"](), np.random.default_rng(2)
+    solver, places, offsets = GeodesicSolver(mesh), [40, SurfacePoints([7], [[0.2, 0.3, 0.5]]), 400], [0.1, 0.05, 0.3]
+    _, pull_back, g = pulled(solver, OffsetSources(places, offsets), rng)
+    for step, rate in zip(1e-6 * np.eye(3), pull_back.by_offsets(g), strict=True):
+        ahead, behind = (solver.distance(OffsetSources(places, offsets + sign * step)) for sign in (1, -1))
+        assert rate == pytest.approx(g @ (ahead - behind) / 2e-6, rel=1e-6)
+
+
 @pytest.mark.parametrize("name", ["sphere", "grid", "moebius"])
 def test_rigid_motions_change_nothing_and_scaling_gives_the_distance(name):
     mesh, rng = MESHES[name](), np.random.default_rng(4)

@@ -123,6 +123,13 @@ class DistanceDerivative:
         _, by_place = self._by_sides(*gradient_rows(g, self.distance, 1))
         return np.asarray(np.einsum("pc,pcx->px", by_place, slopes))
 
+    def by_offsets(self, g: ArrayLike) -> FloatArray:
+        """The gradient (s,) by the offset of each source, as they were listed; `g` (n,) as for a call."""
+        (row,), sources, (tables, found, starts, _) = gradient_rows(g, self.distance, 1), self._sources, self._paths
+        reached = np.isfinite(self.distance)
+        source = starts.label[found.label[tables.number[reached]]]
+        return np.asarray(np.bincount(sources.labels[source], row[reached], sources.n_labels), np.float64)
+
     def by_metric(self, g: ArrayLike) -> FloatArray:
         """The gradient by the metric, (m, 3, 3) or (m, 2, 2) as it was given to `metric_operators`; `g` (n,).
 
