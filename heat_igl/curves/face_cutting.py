@@ -1,10 +1,9 @@
 """Constrained Delaunay triangulation of one triangle, in exact integer arithmetic.
 
-Whether segments cross is decided without rounding. A point is stored as three integers, its barycentric coordinates
-times a common positive factor. The sign of the determinant of three points is the orientation of their triangle, the
-cross product of two points is the line through them, and the cross product of two lines is their intersection; nothing
-is divided. Points are inserted one by one, edge flips enforce the segments (Sloan 1993), and further flips make the
-remaining edges Delaunay. Only these last flips use floating-point angles.
+Points are homogeneous barycentric coordinates: three integers. The sign of the determinant of three points is the
+orientation of their triangle, the cross product of two points is the line through them, and the cross product of two
+lines is their intersection, all without rounding or division. Points are inserted one by one, edge flips enforce the
+segments (Sloan 1993), and further flips make the other edges Delaunay. Only these last flips use floating-point angles.
 """
 
 from __future__ import annotations
@@ -20,19 +19,19 @@ import numpy as np
 from heat_igl.typing import FloatArray
 
 Point = tuple[int, int, int]
-# An edge is flipped if its two opposite angles sum to more than pi plus this: of four points on a circle, the sum is pi
-# up to rounding. All values from 0 to 1e-4 give the same triangles in 5122 faces cut along shortest paths.
+# Tolerance of the Delaunay test: at an edge between cocircular points, opposite angles sum to pi up to rounding.
+# All values from 0 to 1e-4 give the same triangles in 5122 faces cut along shortest paths.
 _ROUNDING = 1e-9
 
 
 def cut_triangle(
     points: list[Point], segments: list[tuple[int, int]], corners: FloatArray
 ) -> tuple[list[Point], list[tuple[int, int, int]], list[list[int]]]:
-    """Triangulate a triangle so that the given points are vertices and the given segments consist of edges.
+    """Triangulate a triangle with prescribed vertices and prescribed segments, each a chain of edges.
 
-    The `points` are distinct and begin with the three corners, which lie at `corners` (3, 2) in the plane. `segments`
-    are pairs of point indices; segments may cross, overlap, and run along the sides. Returns the points followed by the
-    crossings of segments, the triangles with the orientation of the corners, and the points on each segment in order.
+    `points` are distinct, the three corners first; `corners` (3, 2) are the positions of the corners in the plane.
+    `segments` are pairs of point indices and may cross, overlap, and run along the sides. Returns the points followed
+    by the intersections of segments, the triangles, oriented like the corners, and the chain of points of each segment.
     """
     points = [_reduced(point) for point in points]
     number = {point: i for i, point in enumerate(points)}
@@ -57,13 +56,13 @@ def _cross(p: Point, q: Point) -> Point:
 
 
 def _side(line: Point, p: Point) -> int:
-    """1 if the point is on the left of a directed line, which is the cross product of two points; -1 right, 0 on it."""
+    """Side of a directed line on which the point lies: 1 left, -1 right, 0 on the line."""
     value = line[0] * p[0] + line[1] * p[1] + line[2] * p[2]
     return (value > 0) - (value < 0)
 
 
 def _reduced(p: Point) -> Point:
-    """The same point, its three integers nonnegative and without a common divisor."""
+    """Normal form of a point: nonnegative integers whose greatest common divisor is 1."""
     divisor = gcd(*p)
     if sum(p) < 0:
         divisor = -divisor
@@ -71,7 +70,7 @@ def _reduced(p: Point) -> Point:
 
 
 def _crossing(a: Point, b: Point, c: Point, d: Point) -> Point | None:
-    """The intersection of the segments a b and c d, or None if they do not cross at inner points of both."""
+    """Intersection of the segments a b and c d, or None unless it is an interior point of both."""
     ab = _cross(a, b)
     if _side(ab, c) * _side(ab, d) >= 0:
         return None
@@ -80,10 +79,10 @@ def _crossing(a: Point, b: Point, c: Point, d: Point) -> Point | None:
 
 
 def _along(points: list[Point], a: int, b: int) -> list[int]:
-    """All points on the segment from a to b, in this order."""
+    """All points on the segment from a to b, sorted along it."""
     p, q = points[a], points[b]
     line = _cross(p, q)
-    # Sorted by a barycentric coordinate that differs between a and b.
+    # Sort by a barycentric coordinate that differs between a and b.
     k = next(k for k in range(3) if p[k] * sum(q) != q[k] * sum(p))
     place = {i: Fraction(point[k], sum(point)) for i, point in enumerate(points) if _side(line, point) == 0}
     chain = sorted(place, key=place.__getitem__, reverse=place[a] > place[b])
@@ -91,7 +90,7 @@ def _along(points: list[Point], a: int, b: int) -> list[int]:
 
 
 class _Triangulation:
-    """A triangulation, stored as a map from a directed edge (a, b) to the point c of the triangle a b c on its left."""
+    """A triangulation: `_apex` maps a directed edge (a, b) to the third vertex c of the triangle a b c on its left."""
 
     def __init__(self, points: list[Point]) -> None:
         self._points = points
@@ -99,11 +98,11 @@ class _Triangulation:
         self._add(0, 1, 2)
 
     def triangles(self) -> list[tuple[int, int, int]]:
-        """Each triangle once, from its smallest point."""
+        """Sorted list of triangles, each beginning with its lowest index."""
         return sorted((a, b, c) for (a, b), c in self._apex.items() if a < b and a < c)
 
     def insert(self, i: int) -> None:
-        """Split the triangle that contains point i, or the two triangles at the edge that contains it."""
+        """Split the triangle that contains point i, or both triangles at the edge that contains it."""
         for a, b, c in self.triangles():
             edges = ((a, b), (b, c), (c, a))
             sides = [self._left(*edge, i) for edge in edges]
@@ -124,7 +123,7 @@ class _Triangulation:
             return
 
     def enforce(self, a: int, b: int) -> None:
-        """Make an edge of a and b, between which no other point lies: flip the edges that cross the segment."""
+        """Insert the edge a b by flipping the edges that cross it; no other point may lie on the edge."""
         if (a, b) in self._apex or (b, a) in self._apex:
             return
         crossed = deque(self._crossed(a, b))
@@ -132,15 +131,15 @@ class _Triangulation:
             x, y = crossed.popleft()
             p, q = self._apex[x, y], self._apex[y, x]
             if not self._flip(x, y):
-                crossed.append((x, y))  # its two triangles are not convex yet: again after the others
+                crossed.append((x, y))  # its quadrilateral is not convex yet: retry after the others
             elif self._left(a, b, p) * self._left(a, b, q) < 0:
                 crossed.append((p, q))
 
     def make_delaunay(self, fixed: set[tuple[int, int]], corners: FloatArray) -> None:
-        """Flip edges, except `fixed` ones, as long as the two angles opposite an edge sum to more than pi.
+        """Flip edges, except `fixed` ones, until the two angles opposite each edge sum to at most pi.
 
-        This removes thin triangles along collinear points. In exact arithmetic no flipped edge returns; it may not
-        return either where rounding or collinear corners would allow it, so that the loop ends.
+        This removes thin triangles along collinear points. In exact arithmetic a flipped edge is never flipped back.
+        `gone` forbids it where rounding or collinear corners would allow it, so that the loop ends.
         """
         weights = np.array([[weight / sum(point) for weight in point] for point in self._points])
         at = (weights @ corners @ [1, 1j]).tolist()
@@ -157,7 +156,7 @@ class _Triangulation:
                 waiting.extend(((p, x), (x, q), (q, y), (y, p)))
 
     def _flip(self, x: int, y: int) -> bool:
-        """Replace the edge x y by the other diagonal of its two triangles; False if these are not strictly convex."""
+        """Replace the edge x y by the other diagonal of its quadrilateral; False if that is not strictly convex."""
         p, q = self._apex[x, y], self._apex[y, x]
         if self._left(p, q, y) <= 0 or self._left(q, p, x) <= 0:
             return False
@@ -168,7 +167,7 @@ class _Triangulation:
         return True
 
     def _crossed(self, a: int, b: int) -> list[tuple[int, int]]:
-        """The edges that the segment from a to b crosses, in order, each from its right to its left end."""
+        """Edges that cross the segment from a to b, in order, each directed from right to left of it."""
         for (p, x), y in list(self._apex.items()):
             if p == a and self._left(a, b, x) < 0 < self._left(a, b, y):
                 found = [(x, y)]

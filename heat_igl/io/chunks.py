@@ -1,8 +1,8 @@
-"""Checks of zarr arrays on disk: what is read is what was written, or an error names the file.
+"""Integrity checks of zarr arrays on disk: corrupted data raise an error that names the file.
 
-zarr reads a missing chunk as the fill value, and chunks that changed places without an error. So the writer of an array
-keeps the checksums that the codec ``crc32c`` appends to the chunks, and readers compare. The codec itself protects the
-contents of a chunk.
+Zarr fills a missing chunk with the fill value, and does not notice swapped chunks. The writer therefore records the
+checksum that the codec ``crc32c`` appends to each chunk, and readers compare it. The codec itself detects changes of
+the contents of a chunk.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _CHECKSUM_BYTES = 4
 
 
 def zarr_module() -> Any:
-    """The library zarr with its codecs; a MissingExtraError if it is not installed."""
+    """The module zarr with its codecs; raises a MissingExtraError if it is not installed."""
     with MissingExtraError.guard("a store of distances", "zarr", "cluster"):
         import zarr
         import zarr.codecs
@@ -33,12 +33,12 @@ def zarr_module() -> Any:
 
 
 def checksum(value: Any) -> str:
-    """The checksum of a value that JSON can carry."""
+    """CRC-32 of a JSON-serializable value, in hexadecimal."""
     return f"{zlib.crc32(json.dumps(value, sort_keys=True).encode()):08x}"
 
 
 def file_checksum(file: Path) -> str:
-    """The checksum of a small file; empty if it cannot be read."""
+    """CRC-32 of a small file, in hexadecimal; an empty string if the file cannot be read."""
     try:
         return f"{zlib.crc32(file.read_bytes()):08x}"
     except OSError:
@@ -46,7 +46,7 @@ def file_checksum(file: Path) -> str:
 
 
 def chunk_files(folder: Path, array: Any, rows: slice = slice(None)) -> Iterator[tuple[int, Path]]:
-    """The chunks of an array in `folder` that hold the given rows: each with its number in row-major order and file."""
+    """Row-major number and file of each chunk that overlaps the given rows of an array in `folder`."""
     counts = [-(-n // width) for n, width in zip(array.shape, array.chunks, strict=True)]
     start, stop, _ = rows.indices(array.shape[0])
     height = array.chunks[0]
@@ -56,7 +56,7 @@ def chunk_files(folder: Path, array: Any, rows: slice = slice(None)) -> Iterator
 
 
 def chunk_checksum(file: Path) -> str:
-    """The checksum at the end of a chunk; empty if the file is missing or too short."""
+    """CRC-32C at the end of a chunk, in hexadecimal; an empty string if the file is missing or too short."""
     try:
         with file.open("rb") as chunk:
             chunk.seek(-_CHECKSUM_BYTES, os.SEEK_END)
@@ -66,12 +66,12 @@ def chunk_checksum(file: Path) -> str:
 
 
 def chunk_checksums(folder: Path, array: Any) -> list[str]:
-    """The checksums of all chunks of an array in `folder`."""
+    """CRC-32C of all chunks of an array in `folder`, in row-major order."""
     return [chunk_checksum(file) for _, file in chunk_files(folder, array)]
 
 
 def damaged_chunk(folder: Path, array: Any, checksums: Sequence[str], rows: slice = slice(None)) -> str:
-    """What is wrong with the first chunk that is missing or ends with another checksum; empty if there is none."""
+    """Error message for the first chunk that is missing or has a wrong checksum; an empty string if there is none."""
     for i, file in chunk_files(folder, array, rows):
         if not checksums[i] or chunk_checksum(file) != checksums[i]:
             return f"chunk {file} is {'damaged' if file.exists() else 'missing'}"
@@ -79,10 +79,7 @@ def damaged_chunk(folder: Path, array: Any, checksums: Sequence[str], rows: slic
 
 
 def read_rows(folder: Path, array: Any, checksums: Sequence[str], rows: slice) -> AnyArray:
-    """Rows of an array in `folder`.
-
-    A ValueError names a chunk that is missing or damaged, or is that of another place.
-    """
+    """Read rows of an array in `folder`; a ValueError names a chunk that is missing, damaged or misplaced."""
     problem = damaged_chunk(folder, array, checksums, rows)
     if problem:
         raise ValueError(problem)

@@ -1,15 +1,13 @@
-"""Triangles by their corners and edge lengths: joined along edges, numbered, flipped and refined.
+"""Intrinsic triangulations, given by faces and edge lengths: connectivity, edge flips and Delaunay refinement.
 
-Half-edge ``3 f + c`` is the side of face f opposite its corner c; `triangles.pxd` steps from one to the next, and
-`straight.pxd` carries a straight line through a face. A mesh goes through these modules, as far as its use needs:
+Half-edge ``3 f + c`` is the side of face f opposite corner c. `triangles.pxd` steps between half-edges, `straight.pxd`
+traces a straight line across a face. In the order in which a mesh passes through them:
 
-1. `incidence` finds distinct rows, and by them the edges of a mesh, and its components.
-2. `gluing` joins the half-edges that share an edge and takes their lengths, without the edges of a mesh, and brings
-   neighbours near each other in memory by their numbers.
-3. `flipping` makes the triangulation Delaunay, and records the flips if their history is needed.
-4. `refinement` splits faces of a Delaunay triangulation and flips edges until no angle is small; `carrying` finds the
-   faces that points are in after these moves.
-5. `polar_angles` sums the angles around vertices for tangent frames, and carries them over flips.
+1. `incidence`: unique rows of an integer array (edges from faces) and connected components.
+2. `gluing`: twins and lengths of half-edges, without an edge list; renumbering so that neighbours are close in memory.
+3. `flipping`: edge flips to the intrinsic Delaunay triangulation, recorded on request.
+4. `refinement`: Delaunay refinement up to a minimum angle. `carrying`: point location after splits and flips.
+5. `polar_angles`: angle sums at vertices and polar angles of half-edges for tangent frames, updated by flips.
 
-`checking` is about distances: what edges and straight lines say of them without a search.
+`segments`: lists of segments in faces. `checking`: bounds on distances by edge paths and straight lines.
 """
