@@ -47,7 +47,10 @@ class Seeds(NamedTuple):
 
     def of_one_source(self) -> Seeds:
         """The smallest value at each vertex to which no two sources are equally near; of a source without such, all."""
-        chosen, nearest = self.at(np.lexsort((self.value, self.label, self.vertex))), self.nearest()
+        nearest = self.nearest()
+        if (self.label == self.label[:1]).all():
+            return nearest
+        chosen = self.at(np.lexsort((self.value, self.label, self.vertex)))
         least = nearest.value[np.searchsorted(nearest.vertex, chosen.vertex)]
         is_new = (np.diff(chosen.vertex, prepend=-1) != 0) | (np.diff(chosen.label, prepend=-1) != 0)
         chosen = chosen.at(is_new & (chosen.value <= least * (1 + _ROUNDING)))
