@@ -9,6 +9,9 @@ import numpy as np
 from heat_igl.errors import MissingExtraError
 from heat_igl.io import read_mesh, write_mesh
 from heat_igl.validation import ValidationRow, shapes, validate
+from heat_igl.validation.shapes import bunny_path as sample_mesh
+
+__all__ = ["demonstrate", "sample_mesh"]  # the notebooks begin with the file
 
 _SOURCE = 1234  # on the bunny's haunch: most of the surface is visible from there
 
@@ -20,7 +23,7 @@ def demonstrate(out: Path) -> list[tuple[str, str]]:
     """
     from heat_igl.drawing import plot
 
-    path = shapes.bunny_path()
+    path = sample_mesh()
     name = "bunny" if path else "sphere"
     ply, png = out / f"{name}.ply", out / f"{name}.png"
     mesh = read_mesh(path) if path else shapes.icosphere(5)
