@@ -175,6 +175,15 @@ def test_vertices_that_no_source_reaches_get_zero():
         assert found[reached].any()
 
 
+def test_a_component_has_vectors_as_alone():
+    small, large = shapes.torus(12, 20), shapes.icosphere(3)
+    V = np.concatenate([small.V, 100 * large.V + 200])
+    both = VectorHeatSolver(Mesh(V, np.concatenate([small.F, large.F + small.n_vertices])))
+    alone, n = VectorHeatSolver(small), small.n_vertices
+    assert np.abs(both.transport([3, 50], np.eye(2))[:n] - alone.transport([3, 50], np.eye(2))).max() < 1e-9
+    assert np.abs(both.log_map(3)[:n] - alone.log_map(3)).max() < 1e-9
+
+
 @pytest.mark.slow
 def test_a_large_sphere_is_finite_and_right():
     mesh = shapes.icosphere(8)

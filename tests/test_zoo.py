@@ -84,10 +84,11 @@ def test_components_do_not_change_each_other(name):
     one, other = zoo(name), shapes.icosphere(3)
     n, far = one.n_vertices, other.V + 3 * np.ptp(one.V, axis=0).max()
     both = HeatMethodSolver(Mesh(np.concatenate([one.V, far]), np.concatenate([one.F, other.F + n])))
-    for mesh, start in ((one, 0), (other, n)):
-        alone = HeatMethodSolver(mesh).distance(0)
-        together = both.distance(start)[start : start + len(alone)]
-        assert np.abs(together - alone).max() < 0.003 * alone.max()
+    for mesh, start, first in ((one, 0, 0), (other, n, one.n_faces)):
+        solver, weights = HeatMethodSolver(mesh), [[0.2, 0.3, 0.5]]
+        for source, moved in ((0, start), (SurfacePoints([5], weights), SurfacePoints([first + 5], weights))):
+            alone, together = solver.distance(source), both.distance(moved)[start : start + mesh.n_vertices]
+            assert np.abs(together - alone).max() < 0.003 * alone.max()
 
 
 def test_where_heat_has_no_digits_a_face_is_named():

@@ -136,13 +136,15 @@ class SourceAssembler:
         self._domain, self._t = domain, t
         self._plain = plain
         self._mass = domain.M.diagonal() / mass_unit
-        # Of each component, if each has a time step.
-        self._h = domain.mean_edge_lengths if np.ndim(t) else np.full(domain.n_components, domain.mean_edge_length)
+        self._h = domain.mean_edge_lengths
         surface = domain.surface
-        # In edges of the mesh: if vertices were added, the operators have shorter ones.
-        self._radius = NEAR_RADIUS
+        self._radius = NEAR_RADIUS * self._h
         if surface is not None and surface.faces.n < domain.n:
-            self._radius *= max(1.0, surface.faces.mean_edge_length / domain.mean_edge_length)
+            # In edges of the mesh where vertices were added, since the operators have shorter ones.
+            half_edge, refined = surface.faces.edges, np.unique(domain.components[surface.faces.n :])
+            component, length = domain.components[surface.faces.tail(half_edge)], surface.faces.l.ravel()[half_edge]
+            total, count = (np.bincount(component, of, domain.n_components)[refined] for of in (length, None))
+            self._radius[refined] = NEAR_RADIUS * np.maximum(self._h[refined], total / count)
 
     @cached_property
     def edges(self) -> Any:
@@ -247,7 +249,7 @@ class SourceAssembler:
             if (faces.twin.reshape(-1, 3)[corner // 3] > -2).all():
                 return _NONE, _NONE
         begin = sources.offsets.min()
-        radius = self._radius * self._h_at(np.arange(faces.n))
+        radius = self._radius[self._domain.components[: faces.n]]
         # The corners of the sources' own faces are known, too, however far they are.
         places = sources.points.joined(sources.segments.ends())
         own, _ = faces.locate(places.faces, places.barycentric)

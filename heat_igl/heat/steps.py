@@ -549,7 +549,9 @@ class VectorHeatFlow:
         fitted: bool = False,
         mass: FloatArray | None = None,
     ) -> None:
-        self.t, self.mean_mass, self._n = t, operators.mean_mass, operators.n
+        self.t, self._n = t, operators.n
+        has_several = isinstance(t, np.ndarray)
+        self.mean_mass = operators.expand_to_vertices(operators.mean_masses) if has_several else operators.mean_mass
         L = fitted_laplacian(operators, t) if fitted else operators.L
         lumped = operators.M.diagonal() if mass is None else mass
         step = operators.expand_to_vertices(t) if isinstance(t, np.ndarray) else t

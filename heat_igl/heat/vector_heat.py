@@ -284,7 +284,7 @@ class HeatTransport:
         self, solver: HeatMethodSolver, rotations: sp.csc_matrix, mass: FloatArray, outward: OutwardField
     ) -> None:
         parts = solver._parts
-        t = parts.diagnostics.t * (_VECTOR_STEP if parts.options.default_time_step else 1.0)
+        t = parts.heat_flow.t * (_VECTOR_STEP if parts.options.default_time_step else 1.0)
         self._solver, self._outward, self._heat_flow = solver, outward, parts.heat_flow
         with naming_thinnest(solver.operators.source_surface):
             self._vector_flow = VectorHeatFlow(solver.operators, rotations, t, parts.options.backend, mass=mass)
