@@ -438,3 +438,15 @@ def test_sides_come_from_the_cut_on_meshes_with_edges_of_more_than_two_faces():
     is_left = np.zeros(pieces.mesh.n_vertices, bool)
     is_left[pieces.mesh.F[np.isin(pieces.pieces, left)]] = True
     np.testing.assert_array_equal(is_left[: mesh.n_vertices], height < 0.3)
+
+
+def test_regions_with_a_common_border_are_both_inside():
+    mesh, rng = shapes.torus(16, 30), np.random.default_rng(0)
+    solver, middles = SignedHeatSolver(mesh), mesh.V[mesh.F].mean(axis=1)
+    for _ in range(12):
+        centres = middles[rng.integers(0, mesh.n_faces, 3)]
+        region = np.linalg.norm(middles[:, None] - centres, axis=2).argmin(axis=1)
+        phi = solver.distance([region == 0, region == 1])
+        inside, outside = np.unique(mesh.F[region < 2]), np.unique(mesh.F[region == 2])
+        assert (phi[np.setdiff1d(inside, outside)] <= 0).all()
+        assert (phi[np.setdiff1d(outside, inside)] > 0).all()

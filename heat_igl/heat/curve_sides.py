@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from heat_igl.errors import SourceError
 from heat_igl.intrinsic import IntrinsicTriangulation, lay_out
 from heat_igl.mesh import Mesh, SurfaceCurve, connectivity, level_segments
 from heat_igl.mesh.connectivity import next_in_run
@@ -27,6 +29,30 @@ _AGREED = 0.5
 def same_place(mesh: Mesh) -> float:
     """The distance within which ends of curves meet, and vertices are on a curve."""
     return _SAME_PLACE * float(mesh.edge_lengths.mean())
+
+
+def uncancelled(mesh: Mesh, sources: OrientedSet) -> OrientedSet:
+    """The sources without segments along which as many run in the opposite direction: these have no left and right.
+
+    A `SourceError` if nothing is left.
+    """
+    start, end, place = sources.start.copy(), sources.end.copy(), sources.faces.copy()
+    at, opposite = np.nonzero((start == 0) & (end == 0))
+    # On an edge, which belongs to two faces: the weights of its first vertex.
+    edge = mesh.facets.of_face[place[at], opposite]
+    is_first = mesh.F[place[at]] == mesh.edges[edge, :1]
+    for ends in (start, end):
+        ends[at] = np.where(is_first, ends[at], 0.0).sum(axis=1, keepdims=True)
+    place[at] = mesh.n_faces + edge
+    change = end - start
+    sign = np.sign(change[np.arange(len(place)), (change != 0).argmax(axis=1)])
+    forward = sign[:, None] > 0
+    rows = np.column_stack([place, np.where(forward, start, end), np.where(forward, end, start)])
+    which = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
+    kept = np.bincount(which, sign)[which] != 0
+    if not kept.any() and not len(sources.point_faces):
+        raise SourceError("the normals of the curves cancel: two curves run along each other in opposite directions")
+    return replace(sources, **{name: getattr(sources, name)[kept] for name in ("faces", "start", "end", "label")})
 
 
 def has_gaps(mesh: Mesh, sources: OrientedSet) -> bool:

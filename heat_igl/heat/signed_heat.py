@@ -21,6 +21,7 @@ from heat_igl.heat.curve_sides import (
     left_of_closed,
     same_place,
     total_length,
+    uncancelled,
     vertices_on,
 )
 from heat_igl.heat.parts import SolverOptions, SolverParts, prepare
@@ -204,6 +205,7 @@ class SignedHeatSolver:
 
     def _from_heat(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) by integration, and which vertices (n,) are on the left."""
+        chosen = uncancelled(self._mesh, chosen)
         phi = self._integration.distance(chosen, level)
         if level == "zero":
             phi[vertices_on(self._mesh, chosen)] = 0.0
@@ -215,6 +217,7 @@ class SignedHeatSolver:
     def _measured(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) from the curves, with their gaps closed, and which vertices (n,) are on the left."""
         sources, size = chosen.unoriented(), None
+        chosen = uncancelled(self._mesh, chosen)
         left, is_known = np.zeros((2, self.n_vertices), bool)
         if not has_gaps(self._mesh, chosen):
             size, (left, is_known) = both(
