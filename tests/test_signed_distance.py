@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import flat_perturbed
+from conftest import flat_perturbed, zoo
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay
 from surfaces import nearest_vertex
@@ -450,3 +450,14 @@ def test_regions_with_a_common_border_are_both_inside():
         inside, outside = np.unique(mesh.F[region < 2]), np.unique(mesh.F[region == 2])
         assert (phi[np.setdiff1d(inside, outside)] <= 0).all()
         assert (phi[np.setdiff1d(outside, inside)] > 0).all()
+
+
+def test_gaps_on_one_component_do_not_change_another():
+    spiral, sphere = zoo("spiral"), shapes.icosphere(3)
+    distance = geodesic_distance(spiral, 0)
+    (across,) = isolines(spiral, distance, [0.5 * distance.max()])[0]  # from boundary to boundary
+    loop = isolines(sphere, sphere.V[:, 2], 0.1)[0][0]
+    part = SurfaceCurve(loop.faces[:40] + spiral.n_faces, loop.start[:40], loop.end[:40])
+    both = Mesh(np.vstack([spiral.V, sphere.V + 50]), np.vstack([spiral.F, sphere.F + spiral.n_vertices]))
+    phi = SignedHeatSolver(both).distance([SurfaceCurve(across.faces, across.start, across.end), part])
+    assert np.abs(phi[: spiral.n_vertices] - SignedHeatSolver(spiral).distance(across)).max() < 1e-12

@@ -55,23 +55,27 @@ def uncancelled(mesh: Mesh, sources: OrientedSet) -> OrientedSet:
     return replace(sources, **{name: getattr(sources, name)[kept] for name in ("faces", "start", "end", "label")})
 
 
-def has_gaps(mesh: Mesh, sources: OrientedSet) -> bool:
-    """Whether a curve ends, inside the mesh, at no place at which one begins; points always have gaps."""
-    if len(sources.point_faces):
-        return True
-    ends, begins = _loose(mesh, sources)
-    loose_ends = ends[~_on_boundary(mesh, sources.faces[ends], sources.end[ends])]
-    loose_begins = begins[~_on_boundary(mesh, sources.faces[begins], sources.start[begins])]
-    if len(loose_ends) != len(loose_begins):
-        return True
-    if not len(loose_ends):
-        return False
-    from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
+def has_gaps(mesh: Mesh, sources: OrientedSet) -> BoolArray:
+    """Vertices (n,) but those on components on which every curve that ends inside the mesh does so where one begins.
 
-    begin, end = _ends(mesh, sources)
-    to_begin = cKDTree(begin[loose_begins]).query(end[loose_ends])[0]
-    to_end = cKDTree(end[loose_ends]).query(begin[loose_begins])[0]
-    return bool(max(to_begin.max(), to_end.max()) > same_place(mesh))
+    Points always have gaps.
+    """
+    component = mesh.components[mesh.F[:, 0]]
+    gaps = np.ones(int(mesh.components.max()) + 1, bool)
+    gaps[component[sources.faces]] = False
+    gaps[component[sources.point_faces]] = True
+    ends, begins = _loose(mesh, sources)
+    ends = ends[~_on_boundary(mesh, sources.faces[ends], sources.end[ends])]
+    begins = begins[~_on_boundary(mesh, sources.faces[begins], sources.start[begins])]
+    if len(ends) and len(begins):
+        from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
+
+        begin, end = _ends(mesh, sources)
+        is_apart = cKDTree(begin[begins]).query(end[ends])[0] > same_place(mesh)
+        of_begins = cKDTree(end[ends]).query(begin[begins])[0] > same_place(mesh)
+        gaps[component[sources.faces[np.append(ends[is_apart], begins[of_begins])]]] = True
+    surplus = (np.bincount(component[sources.faces[each]], minlength=len(gaps)) for each in (ends, begins))
+    return np.asarray((gaps | (np.subtract(*surplus) != 0))[mesh.components])
 
 
 def _loose(mesh: Mesh, sources: OrientedSet) -> tuple[IntArray, IntArray]:

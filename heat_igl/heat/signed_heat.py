@@ -185,9 +185,10 @@ class SignedHeatSolver:
 
         Notes
         -----
-        If no curve has a gap, the regions between curves have one sign each, that of the side on which the curves lie.
-        A region on both sides, as around a handle, is closed like gaps. The levels "constant" and "none" keep the sign
-        of the integrated value. The diffused normals of all curves are added: where they differ, longer ones decide.
+        On components where no curve has a gap, the regions between curves have one sign each, that of the side on which
+        the curves lie. A region on both sides, as around a handle, is closed like gaps. The levels "constant" and
+        "none" keep the sign of the integrated value. The diffused normals of all curves are added: where they differ,
+        longer ones decide.
         """
         if level is not None:
             require_choice("level", level, get_args(Level))
@@ -209,9 +210,10 @@ class SignedHeatSolver:
         phi = self._integration.distance(chosen, level)
         if level == "zero":
             phi[vertices_on(self._mesh, chosen)] = 0.0
-        if level == "zero" and not has_gaps(self._mesh, chosen):
+        gaps = has_gaps(self._mesh, chosen)
+        if level == "zero" and not gaps.all():
             left, is_known = left_of_closed(self._mesh, self._faces, chosen)
-            return np.abs(phi), np.where(is_known, left, phi < 0)
+            return np.abs(phi), np.where(is_known & ~gaps, left, phi < 0)
         return np.abs(phi), phi < 0
 
     def _measured(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
@@ -219,16 +221,19 @@ class SignedHeatSolver:
         sources, size = chosen.unoriented(), None
         chosen = uncancelled(self._mesh, chosen)
         left, is_known = np.zeros((2, self.n_vertices), bool)
-        if not has_gaps(self._mesh, chosen):
+        gaps = has_gaps(self._mesh, chosen)
+        if not gaps.all():
             size, (left, is_known) = both(
                 lambda: self._from(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
             )
+            is_known &= ~gaps
             if (is_known | (size <= same_place(self._mesh)) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
         phi = self._integration.distance(chosen, level)
         of_nearest, is_beside, on_curve = left_beside(self._mesh, self._faces, chosen)
         left = np.where(is_known, left, np.where(is_beside, of_nearest, phi < 0))
         closing = closing_of_gaps(self._mesh, chosen, phi, left, on_curve)
+        is_beside &= ~is_known
         self._warn_if_unsure(chosen, closing, np.flatnonzero(is_beside & (left != (phi < 0))), int(is_beside.sum()))
         if size is None:
             return self._from(sources if closing is None else [sources, closing]), left
