@@ -344,24 +344,33 @@ class HopfLax:
                 u: cython.int = of[i + (i >= own)]
                 to = cython.address(self.update.V[u, 0])
                 most = max(most, fabs(x * (to[0] - at[0]) + y * (to[1] - at[1]) + z * (to[2] - at[2])))
-            for i in range(size - 1 if most > self.settled else 0):
+            matters: cython.bint = most > self.settled
+            # Through a facet with a corner that was not visited, nothing gains yet.
+            is_open: cython.bint = False
+            for i in range(size if matters and is_new else 0):
+                is_open |= self.known[of[i]] == INFINITY
+            for i in range(size - 1 if most > 0.0 else 0):
                 c: cython.int = i + (i >= own)
                 u = of[c]
                 if self.facet[u] < 0:
                     continue
+                depends: cython.bint = simplex_of(self.facet[u], size) == s
+                if not matters:
+                    # No reason for a visit, but the next one finds another value there.
+                    self.changed[s * size + c] |= depends
                 # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
-                if (
+                elif (
                     most <= self.pending[u]
                     or self.d[v] < self.d[u]
-                    or simplex_of(self.facet[u], size) == s
-                    or (is_new and self.update.gains(s, c, own))
+                    or depends
+                    or (is_new and not is_open and self.update.through(s, c, self.d[u], own) < self.d[u])
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
                     if self.left > 0:
                         self.wait(u)
         for k in range(self.begin[v], self.begin[v + 1]):
             u = self.ends[k, 2]
-            matters: cython.bint = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
+            matters = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
             matters |= self.beyond[u] >= 0 and self.support(u, 0) == v
             if self.facet[u] >= 0 and change > self.settled and matters:
                 self.pending[u] = max(change, self.pending[u])
@@ -386,28 +395,36 @@ class HopfLax:
             value: cython.double = self.known[self.ends[k, 2]] + self.lengths[k]
             if value < best:
                 best, best_at, beyond = value, self.ends[k, 0], self.ends[k, 1]
-        if self.facet[v] >= 0:
+        # The facet of the last visit has the same value, if its corners have.
+        is_same: cython.bint = self.facet[v] >= 0 and self.beyond[v] < 0 and not self.changed[self.facet[v]]
+        for i in range(self.update.p if is_same else 0):
+            is_same &= self.known[self.support(v, i)] < INFINITY
+        if is_same:
+            asks_all = False
+            if self.d[v] + EQUAL * fabs(self.d[v]) < best:
+                best, best_at, beyond = self.d[v], -1, -1
+        elif self.facet[v] >= 0:
             rise = self.above(v, -self.step[v])
             asks_all = self.beyond[v] < 0 or best > self.d[v] * (1 + EQUAL)
         # Without corners that were not visited, for which it would be done again, if it gets nearer by the others.
         for is_open in range(2):
             self.update.d = cython.address(self.d[0]) if is_open else cython.address(self.known[0])
             # The facet of the last visit first: it rules out most of the others.
-            for k in range(self.first[v] - 1, self.first[v + 1]):
+            for k in range(self.first[v] - 1 + is_same, self.first[v + 1]):
                 at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
                 if at < 0 or (k >= self.first[v] and (at == self.facet[v] or not (asks_all or self.changed[at]))):
                     continue
-                # After a path along a facet, v is not opposite it.
-                if self.corners[at // size, at % size] != v:
-                    continue
                 s: cython.int = simplex_of(at, size)
                 c: cython.int = at - size * s
+                # After a path along a facet, v is not opposite it.
+                if self.corners[s, c] != v:
+                    continue
                 has_open: cython.bint = not is_open
                 for i in range(size if is_open else 0):
                     has_open |= i != c and self.known[self.corners[s, i]] == INFINITY
                 if not has_open:
                     continue
-                value = self.update.through(s, c, best)
+                value = self.update.through(s, c, best, -1)
                 self.changed[at] = False
                 if k < self.first[v] and value < INFINITY and self.beyond[v] < 0:
                     asks_all = value > self.d[v] * (1 + EQUAL)
@@ -424,6 +441,7 @@ class HopfLax:
         if self.risen[v] > RISEN * (best - self.low):
             self.risen[v] = 0.0
             self.weight[v] *= 0.5
+            self.changed[best_at] = True
         s, c = best_at // size, best_at % size
         self.update.face(s, c)
         self.update.d = cython.address(self.known[0])
@@ -499,4 +517,4 @@ class HopfLax:
             w = self.stack[n_open]
             if self.state[w] == 1:
                 self.weight[w] *= 0.5
-                self.pending[w] = INFINITY
+                self.pending[w], self.changed[self.facet[w]] = INFINITY, True

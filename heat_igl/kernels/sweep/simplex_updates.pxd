@@ -35,11 +35,10 @@ cdef class SimplexUpdate(Facet):
 
     cdef double crossing(self, int at, int end, int start) noexcept nogil
     cdef double face(self, int s, int c) noexcept nogil
-    cdef double linear(self, int s, int c, double room) noexcept nogil
+    cdef double linear(self, int s, int c, double limit) noexcept nogil
     cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil
-    cdef double across(self, int s, int c, double room) noexcept nogil
-    cdef bint gains(self, int s, int c, int far) noexcept nogil
-    cdef double through(self, int s, int c, double best) noexcept nogil
+    cdef bint across(self, int s, int c, double* least) noexcept nogil
+    cdef double through(self, int s, int c, double best, int far) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
     cdef double curved(self, int s, int c, double limit, double least) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil

@@ -131,16 +131,13 @@ class SimplexUpdate(Facet):
             nearest = min(nearest, self.level[k])
         return nearest
 
-    def linear(self, s: cython.int, c: cython.int, room: cython.double) -> cython.double:
-        """The least value at corner c of simplex s with T linear, after `face`; sets `share`.
-
-        It may be inf if it is above the nearest corner by `room` or more.
-        """
+    def linear(self, s: cython.int, c: cython.int, limit: cython.double) -> cython.double:
+        """The least value at corner c of simplex s with T linear, inf if it is not below `limit`; sets `share`."""
         self.share[0] = self.share[1] = self.share[2] = 0.0
+        least: cython.double = limit
         if self.p == 2:
-            return self.over_edge(s, c, 0, 1, INFINITY)
-        least: cython.double = self.across(s, c, room)
-        if least == INFINITY:
+            least = self.over_edge(s, c, 0, 1, least)
+        elif not self.across(s, c, cython.address(least)):
             # Values are convex: the least one is on an edge beyond which that over the whole plane lies.
             is_within: cython.bint[3]
             for k in range(3):
@@ -150,7 +147,7 @@ class SimplexUpdate(Facet):
                 j: cython.int = 1 if k == 2 else 2
                 if not is_within[k]:
                     least = self.over_edge(s, c, i, j, least)
-        return least
+        return least if least < limit else INFINITY
 
     def over_edge(
         self, s: cython.int, c: cython.int, i: cython.int, j: cython.int, least: cython.double
@@ -166,7 +163,12 @@ class SimplexUpdate(Facet):
         far: cython.double = 0.0
         if rest > 0.0:
             along = 0.5 * (base + to - sq[pair(c, self.side[j])])
-            far = sqrt(max(to * base - along * along, 0.0) / rest)
+            height: cython.double = max(to * base - along * along, 0.0)
+            # Over the whole line the least value is above that at corner i by (rise along + sqrt(height rest)) / base.
+            room: cython.double = (least - self.level[i]) * base - rise * along
+            if not room > 0.0 or height * rest >= room * room:
+                return least
+            far = sqrt(height / rest)
             along -= far * rise
         if not along > 0.0:
             along, value = 0.0, self.level[i] + sqrt(to)
@@ -182,11 +184,11 @@ class SimplexUpdate(Facet):
         self.share[i], self.share[j] = 1.0 - along, along
         return value
 
-    def across(self, s: cython.int, c: cython.int, room: cython.double) -> cython.double:
-        """The least value if it lies inside the triangle of `side`, else inf; sets `share`.
+    def across(self, s: cython.int, c: cython.int, least: cython.p_double) -> cython.bint:
+        """Whether no value over an edge of the triangle of `side` is below `least`; sets `share`.
 
-        Else shares are those where the value over the whole plane is least, 0 if there is no such place, and 1 if no
-        value is above the nearest corner by less than `room`.
+        That is so if the value over the whole plane is not, or lies inside the triangle and is `least` then. Else
+        shares are those where it lies, 0 if there is no such place.
         """
         sq = cython.address(self.mean[s, 0])
         to: cython.double = sq[pair(c, self.side[0])]
@@ -197,7 +199,7 @@ class SimplexUpdate(Facet):
         b: cython.double = self.level[1] - self.level[0]
         e: cython.double = self.level[2] - self.level[0]
         if not det > 0.0:
-            return INFINITY
+            return False
         det = 1.0 / det
         wb: cython.double = 0.5 * (bb + to - sq[pair(c, self.side[1])])
         we: cython.double = 0.5 * (ee + to - sq[pair(c, self.side[2])])
@@ -205,51 +207,62 @@ class SimplexUpdate(Facet):
         fb: cython.double = (ee * wb - be * we) * det
         fe: cython.double = (bb * we - be * wb) * det
         height: cython.double = max(to - fb * wb - fe * we, 0.0)
+        room: cython.double = least[0] - min(self.level[0], min(self.level[1], self.level[2]))
         if height >= room * room:
-            self.share[0] = self.share[1] = self.share[2] = 1.0
-            return INFINITY
+            return True
         gb: cython.double = (ee * b - be * e) * det
         ge: cython.double = (bb * e - be * b) * det
         rest: cython.double = 1.0 - gb * b - ge * e
         if not rest > 0.0:
-            return INFINITY
+            return False
         far: cython.double = sqrt(height / rest)
         fb -= far * gb
         fe -= far * ge
+        value: cython.double = self.level[0] + b * fb + e * fe + far
+        if value >= least[0]:
+            return True
         self.share[0], self.share[1], self.share[2] = 1.0 - fb - fe, fb, fe
         if not (fb > 0.0 and fe > 0.0 and fb + fe < 1.0):
-            return INFINITY
-        return self.level[0] + b * fb + e * fe + far
+            return False
+        least[0] = value
+        return True
 
-    def gains(self, s: cython.int, c: cython.int, far: cython.int) -> cython.bint:
-        """Whether corner c of s gains by `far`, which is farther: with T linear, only if angles at c are obtuse."""
-        sq = cython.address(self.mean[s, 0])
-        d: cython.double = self.d[self.corners[s, c]]
-        may: cython.bint = (self.d[self.corners[s, far]] - d) * (d - self.start) < 0.5 * self.widest[s]
-        for i in range(0 if may else self.p + 1):
-            may |= i != c and i != far and sq[pair(c, far)] + sq[pair(c, i)] < sq[pair(i, far)]
-        return may and self.through(s, c, d) < d
-
-    def through(self, s: cython.int, c: cython.int, best: cython.double) -> cython.double:
+    def through(self, s: cython.int, c: cython.int, best: cython.double, far: cython.int) -> cython.double:
         """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
 
-        Its lower bound is what T linear and the nearest corner say, with some margin.
+        Its lower bound is what T linear and the nearest corner say, with some margin. It is also inf if corner `far`,
+        which is farther than c, at `best`, can lower none. That is -1 if there is no such corner.
         """
         nearest: cython.double = self.face(s, c)
+        farther: cython.double = self.level[0] + self.level[1] + self.level[2]  # the third of a triangle is 0
+        # A corner was not reached yet.
+        if farther == INFINITY:
+            return INFINITY
         above: cython.double = nearest - best
         # Between corners at one distance from a point, the square is less by at most a third of a squared edge.
         most: cython.double = 0.5 * self.widest[s]
-        near: cython.double = max(nearest - self.start, sqrt(most))
-        farther: cython.double = self.level[0] + self.level[1] + self.level[2]  # the third of a triangle is 0
-        # Where T sags by no more than `above`, or a corner was not reached yet.
-        if above >= near or above * (2.0 * near - above) >= most or farther == INFINITY:
+        near: cython.double = nearest - self.start
+        if near * near <= most:
+            near = max(near, sqrt(most))
+        # Where T sags by no more than `above`.
+        if above >= near or above * (2.0 * near - above) >= most:
             return INFINITY
+        if far >= 0 and (self.d[self.corners[s, far]] - best) * (best - self.start) >= most:
+            # With T linear, it lowers values only if angles at c are obtuse, beyond rounding.
+            sq = cython.address(self.mean[s, 0])
+            to: cython.double = sq[pair(c, far)] * (1.0 + EQUAL)
+            is_obtuse: cython.bint = False
+            for i in range(self.p):
+                at: cython.int = self.side[i]
+                is_obtuse |= at != far and to + sq[pair(c, at)] < sq[pair(at, far)]
+            if not is_obtuse:
+                return INFINITY
         room: cython.double = (near - sqrt(max(near * near - most, 0.0)) - above) / self.slack[s]
         for i in range(self.q if self.q > 1 else 0):
             FETCH(cython.address(self.velocity[self.rows[s, i], 0]))
             FETCH(cython.address(self.inverses[self.rows[s, i], 0]))
-        rise: cython.double = self.linear(s, c, room) - nearest
-        return self.curved(s, c, best, nearest + self.slack[s] * rise) if rise < room else INFINITY
+        least: cython.double = self.linear(s, c, nearest + room)
+        return self.curved(s, c, best, nearest + self.slack[s] * (least - nearest)) if least < INFINITY else INFINITY
 
     def lay(self, s: cython.int, c: cython.int) -> cython.void:
         """What `Facet` knows of s and its metric, after `face`."""
