@@ -452,12 +452,17 @@ def test_regions_with_a_common_border_are_both_inside():
         assert (phi[np.setdiff1d(outside, inside)] > 0).all()
 
 
-def test_gaps_on_one_component_do_not_change_another():
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+def test_gaps_do_not_change_other_regions():
     spiral, sphere = zoo("spiral"), shapes.icosphere(3)
     distance = geodesic_distance(spiral, 0)
-    (across,) = isolines(spiral, distance, [0.5 * distance.max()])[0]  # from boundary to boundary
+    near, far = (isolines(spiral, distance, [share * distance.max()])[0][0] for share in (0.5, 0.6))
     loop = isolines(sphere, sphere.V[:, 2], 0.1)[0][0]
     part = SurfaceCurve(loop.faces[:40] + spiral.n_faces, loop.start[:40], loop.end[:40])
     both = Mesh(np.vstack([spiral.V, sphere.V + 50]), np.vstack([spiral.F, sphere.F + spiral.n_vertices]))
-    phi = SignedHeatSolver(both).distance([SurfaceCurve(across.faces, across.start, across.end), part])
-    assert np.abs(phi[: spiral.n_vertices] - SignedHeatSolver(spiral).distance(across)).max() < 1e-12
+    phi = SignedHeatSolver(both).distance([SurfaceCurve(near.faces, near.start, near.end), part])
+    solver = SignedHeatSolver(spiral)
+    assert np.abs(phi[: spiral.n_vertices] - solver.distance(near)).max() < 1e-12
+    broken = SurfaceCurve(far.faces[:-3], far.start[:-3], far.end[:-3])
+    inside = distance < 0.499 * distance.max()
+    assert (solver.distance([near, broken])[inside] < 0).all()

@@ -48,34 +48,29 @@ def uncancelled(mesh: Mesh, sources: OrientedSet) -> OrientedSet:
     sign = np.sign(change[np.arange(len(place)), (change != 0).argmax(axis=1)])
     forward = sign[:, None] > 0
     rows = np.column_stack([place, np.where(forward, start, end), np.where(forward, end, start)])
-    which = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
-    kept = np.bincount(which, sign)[which] != 0
+    order = np.lexsort(rows.T)
+    group = np.cumsum((np.diff(rows[order], axis=0, prepend=rows[order[:1]]) != 0).any(axis=1))
+    kept = np.zeros(len(place), bool)
+    kept[order] = np.bincount(group, sign[order])[group] != 0
     if not kept.any() and not len(sources.point_faces):
         raise SourceError("the normals of the curves cancel: two curves run along each other in opposite directions")
     return replace(sources, **{name: getattr(sources, name)[kept] for name in ("faces", "start", "end", "label")})
 
 
-def has_gaps(mesh: Mesh, sources: OrientedSet) -> BoolArray:
-    """Vertices (n,) but those on components on which every curve that ends inside the mesh does so where one begins.
-
-    Points always have gaps.
-    """
-    component = mesh.components[mesh.F[:, 0]]
-    gaps = np.ones(int(mesh.components.max()) + 1, bool)
-    gaps[component[sources.faces]] = False
-    gaps[component[sources.point_faces]] = True
+def faces_at_gaps(mesh: Mesh, sources: OrientedSet) -> IntArray:
+    """The faces (k,) in which a curve ends, inside the mesh, where none begins, or the reverse; and those of points."""
     ends, begins = _loose(mesh, sources)
     ends = ends[~_on_boundary(mesh, sources.faces[ends], sources.end[ends])]
     begins = begins[~_on_boundary(mesh, sources.faces[begins], sources.start[begins])]
+    places = np.concatenate([_ends(mesh, sources)[1][ends], _ends(mesh, sources)[0][begins]])
+    faces, sign = sources.faces[np.append(ends, begins)], np.repeat([1, -1], [len(ends), len(begins)])
     if len(ends) and len(begins):
         from scipy.spatial import cKDTree  # takes as long to import as the rest of the package
 
-        begin, end = _ends(mesh, sources)
-        is_apart = cKDTree(begin[begins]).query(end[ends])[0] > same_place(mesh)
-        of_begins = cKDTree(end[ends]).query(begin[begins])[0] > same_place(mesh)
-        gaps[component[sources.faces[np.append(ends[is_apart], begins[of_begins])]]] = True
-    surplus = (np.bincount(component[sources.faces[each]], minlength=len(gaps)) for each in (ends, begins))
-    return np.asarray((gaps | (np.subtract(*surplus) != 0))[mesh.components])
+        near = cKDTree(places).query_pairs(same_place(mesh), output_type="ndarray")
+        place = connectivity.connected_components(near, len(places))
+        faces = faces[np.bincount(place, sign)[place] != 0]
+    return np.append(faces, sources.point_faces)
 
 
 def _loose(mesh: Mesh, sources: OrientedSet) -> tuple[IntArray, IntArray]:
@@ -153,9 +148,9 @@ def vertices_on(mesh: Mesh, sources: OrientedSet) -> BoolArray:
 
 
 def left_of_closed(
-    mesh: Mesh, triangulation: IntrinsicTriangulation, sources: OrientedSet
+    mesh: Mesh, triangulation: IntrinsicTriangulation, sources: OrientedSet, gaps: IntArray
 ) -> tuple[BoolArray, BoolArray]:
-    """Which vertices (n,) are on the left of curves without gaps, and of which vertices (n,) that is known.
+    """Which vertices (n,) are on the left of the curves around them, and of which vertices (n,) that is known.
 
     The surface without the curves falls into regions. Vertices are in one if an edge joins them that no curve meets; so
     are a face that no curve crosses and its vertices off the curves, and two such faces if no curve runs along the edge
@@ -213,6 +208,7 @@ def left_of_closed(
     node = np.append(np.where(k < 3, vertex, n + beyond), n + (place[len(face) :] - 6 * m) // 3)
     total, most = (np.bincount(region[node], w, int(region.max()) + 1) for w in (net, np.abs(net)))
     decided = np.abs(total) > _AGREED * most
+    decided[region[np.append(mesh.F[gaps], n + gaps)]] = False
     return total[region[:n]] > 0, decided[region[:n]] & free
 
 

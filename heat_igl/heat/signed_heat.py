@@ -16,7 +16,7 @@ from heat_igl.errors import AccuracyWarning, MeshError, SourceError, names_guess
 from heat_igl.heat.checking import naming_thinnest
 from heat_igl.heat.curve_sides import (
     closing_of_gaps,
-    has_gaps,
+    faces_at_gaps,
     left_beside,
     left_of_closed,
     same_place,
@@ -185,8 +185,8 @@ class SignedHeatSolver:
 
         Notes
         -----
-        On components where no curve has a gap, the regions between curves have one sign each, that of the side on which
-        the curves lie. A region on both sides, as around a handle, is closed like gaps. The levels "constant" and
+        Regions between curves have one sign each, that of the side on which the curves lie, but for those with a gap. A
+        region on both sides, as around a handle, is closed like gaps. The levels "constant" and
         "none" keep the sign of the integrated value. The diffused normals of all curves are added: where they differ,
         longer ones decide.
         """
@@ -210,23 +210,22 @@ class SignedHeatSolver:
         phi = self._integration.distance(chosen, level)
         if level == "zero":
             phi[vertices_on(self._mesh, chosen)] = 0.0
-        gaps = has_gaps(self._mesh, chosen)
-        if level == "zero" and not gaps.all():
-            left, is_known = left_of_closed(self._mesh, self._faces, chosen)
-            return np.abs(phi), np.where(is_known & ~gaps, left, phi < 0)
-        return np.abs(phi), phi < 0
+        if level != "zero":
+            return np.abs(phi), phi < 0
+        left, is_known = left_of_closed(self._mesh, self._faces, chosen, faces_at_gaps(self._mesh, chosen))
+        return np.abs(phi), np.where(is_known, left, phi < 0)
 
     def _measured(self, chosen: OrientedSet, level: Level) -> tuple[FloatArray, BoolArray]:
         """Distance (n,) from the curves, with their gaps closed, and which vertices (n,) are on the left."""
         sources, size = chosen.unoriented(), None
         chosen = uncancelled(self._mesh, chosen)
-        left, is_known = np.zeros((2, self.n_vertices), bool)
-        gaps = has_gaps(self._mesh, chosen)
-        if not gaps.all():
+        gaps = faces_at_gaps(self._mesh, chosen)
+        if len(gaps):
+            left, is_known = left_of_closed(self._mesh, self._faces, chosen, gaps)
+        else:
             size, (left, is_known) = both(
-                lambda: self._from(sources), lambda: left_of_closed(self._mesh, self._faces, chosen)
+                lambda: self._from(sources), lambda: left_of_closed(self._mesh, self._faces, chosen, gaps)
             )
-            is_known &= ~gaps
             if (is_known | (size <= same_place(self._mesh)) | np.isinf(size)).all():
                 return size, left & np.isfinite(size)
         phi = self._integration.distance(chosen, level)
