@@ -307,7 +307,7 @@ def draw(folder: Path, times: Rows, errors: Rows, sizes: Sequence[int]) -> None:
     from matplotlib.figure import Figure
 
     def figure(name: str, rows: Rows, lines: dict[str, str], scale: str, y: str) -> None:
-        drawn = Figure(figsize=(4.5, 3), layout="constrained")
+        drawn = Figure(figsize=(4.5, 3.6), layout="constrained")
         panel = drawn.subplots()
         for (key, text), style in zip(lines.items(), ("-", "--", ":", "-."), strict=False):
             panel.plot([row["i"] for row in rows], [row[key] for row in rows], style, label=text)
@@ -316,7 +316,7 @@ def draw(folder: Path, times: Rows, errors: Rows, sizes: Sequence[int]) -> None:
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter("")
         panel.grid(color="0.88", linewidth=0.4)
-        panel.legend(frameon=False)
+        drawn.legend(loc="outside upper left", frameon=False)
         drawn.savefig(folder / f"paper_{name}.png", dpi=200)
 
     seconds = {k: f"{k}, about $i^{{{power(*zip(*((r['i'], r[k]) for r in times), strict=True)):.2f}}}$"
