@@ -45,9 +45,8 @@ class Seeds(NamedTuple):
         """The smallest of several values at each vertex."""
         return self.at(nearest_first(*self))
 
-    def of_one_source(self) -> Seeds:
-        """The smallest value at each vertex to which no two sources are equally near; of a source without such, all."""
-        nearest = self.nearest()
+    def of_one_source(self, nearest: Seeds) -> Seeds:
+        """The `nearest` at vertices to which no two sources are equally near; of a source without such, all."""
         if (self.label == self.label[:1]).all():
             return nearest
         chosen = self.at(np.lexsort((self.value, self.label, self.vertex)))
@@ -166,7 +165,8 @@ class SourceAssembler:
         ring = self._ring(sources, rim)
         found, far = self._known_by_windows(sources, rim)
         known = Seeds.joined(ring, found)
-        near, anchors = known.nearest(), known.of_one_source()
+        near = known.nearest()
+        anchors = known.of_one_source(near)
         seen = np.zeros(len(near.vertex), bool)
         if len(found.vertex):
             seen = np.isin(near.vertex, found.vertex) & ~np.isin(near.vertex, sources.vertices)
