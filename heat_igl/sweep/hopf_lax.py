@@ -84,7 +84,7 @@ class HopfLaxEngine(SimplexEngine):
         kernel: Any = SimplexUpdate
         metric = of.velocity, of.rows, *of.measured[:-1], of.place
         mark = self._marks()
-        crossings: tuple[AnyArray, ...] = np.zeros(of.n + 1, np.int32), np.empty((0, 3), np.int32), np.empty(0)
+        crossings: tuple[AnyArray, ...] = np.zeros(of.n + 1, np.int32), np.empty((0, 3), np.int32), np.empty(0), mark
         if (mark != 0).any():
             crossings = self._crossings(mark, kernel(corners, *metric))
         return corners, *self._incident, crossings, *metric
@@ -131,7 +131,7 @@ class HopfLaxEngine(SimplexEngine):
         paths = np.concatenate([np.stack([at, start, end], axis=1), np.stack([start, end, start], axis=1)])
         begins, order = group_by_label(corners.ravel()[paths[:, 2]], n)
         paths[:, 2] = corners.ravel()[paths[:, 1]]
-        return begins.astype(np.int32), paths[order].astype(np.int32), np.tile(lengths, 2)[order]
+        return begins.astype(np.int32), paths[order].astype(np.int32), np.tile(lengths, 2)[order], mark
 
     @property
     def _scheme(self) -> Any:

@@ -49,8 +49,8 @@ class _Inputs(NamedTuple):
     start : (k,) float64
         The offset of the source.
 
-    If paths cross facets, the corner beyond it and its metric follow in `distance`, `slope`, `X` and `tensors`, and
-    then in `X` the corner opposite the facet. The vertex may be a corner of the facet.
+    If paths come from a facet K beyond, its corners follow in `distance`, `slope` and `X`, the metric there in
+    `tensors`, and then in `X` the corners opposite K and the facet. The vertex may be a corner of the facet.
     """
 
     distance: AnyArray
@@ -65,38 +65,43 @@ class _FacetUpdate:
 
     Parameters
     ----------
-    is_sloped : (k, p) bool
+    is_sloped : (k, p) or (k, 2 p) bool
         Whether the slope at a corner is known.
-    weight : (k, p, p) float64
-        How far the second-order term between two corners is used.
-    share : (k, p) float64
-        Barycentric coordinates of the minimizer on the facet; coordinates that are 0 stay 0.
+    weight : (k,) float64
+        How far second-order terms are used.
+    share : (k, p) or (k, 2 p) float64
+        Barycentric coordinates of the minimizer on the facet, and on K; coordinates that are 0 stay 0.
     crosses : (k,) bool
-        Whether the path is the shortest one through the facet from the corner beyond it.
+        Whether the path comes from K. Elsewhere K is the facet, and its coordinates are 0.
     """
 
     def __init__(self, is_sloped: BoolArray, weight: FloatArray, share: FloatArray, crosses: BoolArray) -> None:
-        self._crosses = crosses
-        self._is_sloped, self._weight = is_sloped, weight * (is_sloped[:, :, None] & is_sloped[:, None])
+        self._crosses, self._is_sloped, self._weight = crosses, is_sloped, weight
+        self._any, self._p = bool(crosses.any()), share.shape[1] // (1 + crosses.any())
         self.share = share.copy()
         self._of: _Inputs | None = None
         self._of_W: AnyArray | None = None
 
     def place(self, at: _Inputs) -> None:
         """Move each point to the minimizer on its facet by Newton's method; coordinates that reach 0 stay 0."""
-        p = self.share.shape[1]
-        M = np.zeros((len(self.share), p + 1, p + 1))
+        (k, n), p = self.share.shape, self._p
+        groups = n // p
+        M = np.zeros((k, n + groups, n + groups))
+        one = np.arange(n) // p == np.arange(groups)[:, None]
         for _ in range(_MOST_STEPS):
             stays = self.share < _ROUNDING
             self.share[stays] = 0.0
-            self.share /= self.share.sum(axis=1, keepdims=True)
-            self._is_corner = (~stays).sum(axis=1) == 1
-            for i in range(p):
-                M[:, :p, i] = np.imag(self._value(at, self.share + 1j * _STEP * np.eye(p)[i])[2]) / _STEP
-            # The coordinates sum to 1.
-            M[:, p, :p] = M[:, :p, p] = 1
-            M[:, :p] = np.where(stays[:, :, None], np.eye(p, p + 1), M[:, :p])
-            self.moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -_inverse(M)[:, :p, :p])
+            sums = self.share @ one.T
+            self.share /= np.where(sums > 0, sums, 1) @ one
+            self._is_corner = np.where(self._crosses, *((~stays[:, i : i + p]).sum(axis=1) for i in (n - p, 0))) == 1
+            for i in range(n):
+                M[:, :n, i] = np.imag(self._value(at, self.share + 1j * _STEP * np.eye(n)[i])[2]) / _STEP
+            # The coordinates sum to 1, if there are any.
+            M[:, n:, :n] = one & (sums > 0)[:, :, None]
+            M[:, :n, n:] = np.swapaxes(M[:, n:, :n], 1, 2)
+            M[:, n:, n:] = np.eye(groups) * (sums == 0)[:, :, None]
+            M[:, :n] = np.where(stays[:, :, None], np.eye(n, n + groups), M[:, :n])
+            self.moves = np.where(stays[:, None] | stays[:, :, None], 0.0, -_inverse(M)[:, :n, :n])
             step = np.einsum("kij,kj->ki", self.moves, self._value(at, self.share)[2])
             # The step ends at the boundary of the facet.
             room = np.min(np.where(step < 0, -self.share / np.minimum(step, -1e-300), 1.0), axis=1)
@@ -109,42 +114,60 @@ class _FacetUpdate:
 
     def values(self, at: _Inputs) -> AnyArray:
         """The distance and slope (k, 4) of the vertices; complex inputs also move the minimizers."""
-        share, p = self.share, self.share.shape[1]
+        share, p = self.share, self._p
         change = np.imag(self._value(at, share)[2])
         if change.any():
             share = share + 1j * np.einsum("kij,kj->ki", self.moves, change)
         T, length, _, lean = self._value(at, share)
         e = at.X[:, 1 : p + 1] - at.X[:, :1]
-        if self._crosses.any():
-            straight = np.einsum("kxy,ki,kiy->kx", at.tensors[:, 0], -share / length[:, None], e)
+        if self._any:
+            straight = np.einsum("kxy,ki,kiy->kx", at.tensors[:, 0], -share[:, :p] / length[:, None], e)
             # Along the facet, the corner opposite it stands for the vertex.
             stands = self._crosses[:, None, None] & ~np.real(e).any(axis=2, keepdims=True)
             e = np.where(stands, at.X[:, -1:] - at.X[:, :1], e)
             lean = np.where(self._crosses[:, None], np.einsum("kpx,kx->kp", e, straight), lean)
         slope = np.einsum("kpx,kpq,kq->kx", e, _inverse(e @ np.swapaxes(e, 1, 2)), lean)
-        # In a simplex of one metric, distance from the corner beyond the facet.
-        start = np.where(self._crosses, at.distance[:, -1], at.start)
-        return np.concatenate([(start + T + length)[:, None], slope], axis=1)
+        return np.concatenate([(at.start + T + length)[:, None], slope], axis=1)
 
     def _value(self, at: _Inputs, x: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray, AnyArray]:
         """Interpolated distance T and path length at the point x (k, p) of the facet, with two derivatives (k, p).
 
         These are the gradient of T + length by x, and the derivative of the length when the vertex moves towards each
-        corner. The formulas are those of `Facet.value` and `Facet.length`.
+        corner. The formulas are those of `Facet.value` and `Facet.length`. For x (k, 2 p), T is that on K and the way
+        from there where paths come from K.
         """
         if self._of is not at:
             self._of, self._fixed = at, self._anywhere(at)
         D, product, sag, W, e = self._fixed
-        hang = 0.5 * np.einsum("kij,kj->ki", sag, x)
-        mean = (x * D).sum(axis=1)
+        t, p, crosses = x, self._p, self._crosses[:, None]
+        if self._any:
+            x, t = x[:, :p], np.where(crosses, x[:, p:], x[:, :p])
+        hang = 0.5 * np.einsum("kij,kj->ki", sag, t)
+        mean = (t * D).sum(axis=1)
         # At a corner T is the distance there. At a source it is 0, where the square root has no derivative.
-        T = np.where(self._is_corner, mean, np.sqrt(np.where(self._is_corner, 1.0, mean**2 - (x * hang).sum(axis=1))))
+        T = np.where(self._is_corner, mean, np.sqrt(np.where(self._is_corner, 1.0, mean**2 - (t * hang).sum(axis=1))))
         to_T = np.where(self._is_corner[:, None], D, (mean[:, None] * D - hang) / np.where(T == 0, 1, T)[:, None])
         by = np.einsum("kij,kj->ki", product[:, 0], x)
         even_length = np.sqrt((x * by).sum(axis=1))
         even_g = by / even_length[:, None]
-        if product.shape[1] == 1:
-            return T, even_length, to_T + even_g, -even_g
+        length, g, lean = even_length, even_g, -even_g
+        if product.shape[1] > 1:
+            # Beside K, the simplex has one metric, and may have a corner of the facet for the vertex.
+            bent = self._bent(W, e, x)
+            length = np.where(self._crosses, even_length, bent[0])
+            g, lean = (np.where(crosses, *both) for both in ((even_g, bent[1]), (-even_g, bent[2])))
+        if not self._any:
+            return T, length, to_T + g, lean
+        X = at.X[:, 1:-1] - at.X[:, -2:-1]
+        back = np.einsum("kj,kjx->kx", t, X[:, p:-1]) - np.einsum("kj,kjx->kx", x, X[:, :p])
+        by = np.einsum("kxy,ky->kx", at.tensors[:, -1], back)
+        leg = np.sqrt(np.where(self._crosses, (back * by).sum(axis=1), 1.0))
+        by = np.einsum("kx,kjx->kj", by / leg[:, None], X[:, :-1])
+        g = np.concatenate([g + np.where(crosses, -by[:, :p], to_T), np.where(crosses, to_T + by[:, p:], 0)], axis=1)
+        return T + np.where(self._crosses, leg, 0.0), length, g, lean
+
+    def _bent(self, W: AnyArray, e: AnyArray, x: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray]:
+        """The length in a velocity that is linear, its gradient by x, and the derivative when the vertex moves."""
         mean = np.trace(W, axis1=2, axis2=3) / e.shape[2]
         one, two = mean[:, 0], (x * mean[:, 1:]).sum(axis=1)
         middle = _inverse((W[:, 0] + np.einsum("kj,kjab->kab", x, W[:, 1:])) / 2)
@@ -166,9 +189,7 @@ class _FacetUpdate:
         along = np.einsum("ka,kja->kj", u, e)
         g = factor[:, None] * (along - by[:, 1:]) + (longer / two)[:, None] * mean[:, 1:]
         lean = factor[:, None] * (by[:, :1] - along - by[:, 1:]) - longer[:, None] * (mean[:, 1:] / one[:, None] - 1)
-        # Where paths cross facets, the simplex has one metric, and may have a corner of the facet for the vertex.
-        g, lean = (np.where(self._crosses[:, None], *both) for both in ((even_g, g), (-even_g, lean)))
-        return T, np.where(self._crosses, even_length, length), to_T + g, lean
+        return length, g, lean
 
     def _most_growth(self, e: AnyArray, centre: AnyArray, speed: AnyArray) -> AnyArray:
         """The largest gradient (k,) of the mean velocity that is used, as in `lengths_in_velocity`."""
@@ -178,19 +199,17 @@ class _FacetUpdate:
 
     def _anywhere(self, at: _Inputs) -> tuple[AnyArray, ...]:
         """What the value takes that is the same at all places on the facet."""
-        p, X, tensors = self.share.shape[1], at.X, at.tensors
-        D, e = at.distance[:, :p] - at.start[:, None], X[:, 1 : p + 1] - X[:, :1]
-        if self._crosses.any():
-            tensors = tensors[:, :-1]
+        p, X, tensors = self._p, at.X, at.tensors[:, :-1] if self._any else at.tensors
+        D, e = at.distance - at.start[:, None], X[:, 1 : p + 1] - X[:, :1]
         product = np.einsum("kix,kqxy,kjy->kqij", e, tensors, e, optimize=True)
-        sag, in_metric = self._sag(at, D, e, product), (e, e) if product.shape[1] == 1 else self._velocity(tensors, e)
-        if self._crosses.any():
-            # The distance from the corner beyond the facet, as in `SimplexUpdate.crossing`.
-            between = X[:, 1:-1, None] - X[:, None, 1:-1]
-            square = np.einsum("kijx,kxy,kijy->kij", between, at.tensors[:, -1], between)
-            length = np.sqrt(square[:, :p, p])
-            square = square[:, :p, :p] - (length[:, :, None] - length[:, None]) ** 2
-            D, sag = np.where(self._crosses[:, None], length, D), np.where(self._crosses[:, None, None], square, sag)
+        sag = self._sag(at.slope[:, :p], self._is_sloped[:, :p], D[:, :p], e, product)
+        if self._any:
+            back = X[:, p + 1 : -2] - X[:, -2:-1]
+            square = np.einsum("kix,kqxy,kjy->kqij", back, at.tensors[:, -1:], back, optimize=True)
+            beyond = self._sag(at.slope[:, p:], self._is_sloped[:, p:], D[:, p:], back, square)
+            D = np.where(self._crosses[:, None], D[:, p:], D[:, :p])
+            sag = np.where(self._crosses[:, None, None], beyond, sag)
+        in_metric = (e, e) if product.shape[1] == 1 else self._velocity(tensors, e)
         return D, product, sag, *in_metric
 
     def _velocity(self, tensors: AnyArray, e: AnyArray) -> tuple[AnyArray, AnyArray]:
@@ -206,13 +225,13 @@ class _FacetUpdate:
         W = _inverse_root(axes[:, None] @ tensors @ np.swapaxes(axes, 1, 2)[:, None])
         return W, e @ np.swapaxes(axes, 1, 2)
 
-    def _sag(self, at: _Inputs, D: AnyArray, e: AnyArray, product: AnyArray) -> AnyArray:
+    def _sag(self, slope: AnyArray, is_sloped: BoolArray, D: AnyArray, e: AnyArray, product: AnyArray) -> AnyArray:
         """Second difference of the squared distance between two corners (k, p, p), as `SimplexUpdate.sag_between`."""
         k, p = D.shape
         metric = product if product.shape[1] == 1 else product[:, 1:]
-        w = np.einsum("kix,kjx->kij", at.slope[:, :p], e)
+        w = np.einsum("kix,kjx->kij", slope, e)
         square = np.einsum("kij,kijl,kil->ki", w, _inverse(np.broadcast_to(metric, (k, p, p, p))), w)
-        is_known = self._is_sloped & (np.real(square) > 0)
+        is_known = is_sloped & (np.real(square) > 0)
         trust = _larger(1 - np.log(np.where(is_known, square, 1.0)) ** 2, 0.0) * is_known
         result = np.zeros((k, p, p), D.dtype if np.iscomplexobj(D) else np.result_type(D, w, product))
         for i in range(p):
@@ -240,7 +259,8 @@ class _FacetUpdate:
                 from_i, from_j = (2 * D[:, m] * np.sqrt(squares[:, m % squares.shape[1]]) for m in (i, j))
                 sag = _smaller(sag, _smaller(rise + from_i, from_j - rise) - level)
                 sag = _larger(sag, _larger(rise - from_i, -from_j - rise) - level)
-                result[:, i, j] = result[:, j, i] = np.where(doubted, 0, self._weight[:, i, j] * sag)
+                is_used = is_sloped[:, i] & is_sloped[:, j] & ~doubted
+                result[:, i, j] = result[:, j, i] = np.where(is_used, self._weight * sag, 0)
         return result
 
 
@@ -399,21 +419,24 @@ class FixedPointDerivative(SimplexDerivative):
         corner = np.concatenate([corner, others[corner[:, 0]]], axis=1)
         # The vertex, and the corners of its facet.
         self._vertices = np.concatenate([vertex[at, None], simplices.corners[simplex, corner[:, 1:]]], axis=1)
-        q, crosses = 1 if simplices.velocity is None else size, beyond[at] >= 0
+        q, crosses, known = 1 if simplices.velocity is None else size, beyond[at] >= 0, self._vertices
         self._simplex, self._corner = simplex.repeat(q, axis=1), corner[:, :q]
         if crosses.any():
-            # The corner beyond the facet, or the vertex itself, and that opposite the facet.
+            # Those of K and the corner opposite, or the same once more, and that opposite the facet.
             opposite = simplices.corners[simplex, corner[:, :1]]
             simplex, corner = np.divmod(np.where(crosses, beyond[at], facet[at])[:, None], size)
+            corner = np.concatenate([others[corner[:, 0]], corner], axis=1)
             self._simplex = np.concatenate([self._simplex, simplex], axis=1)
-            self._corner = np.concatenate([self._corner, corner], axis=1)
+            self._corner = np.concatenate([self._corner, corner[:, :1]], axis=1)
             self._vertices = np.concatenate([self._vertices, simplices.corners[simplex, corner], opposite], axis=1)
-        by_key, known = np.argsort(key), self._vertices[:, : size + crosses.any()].copy()
-        # Corners of facets that paths cross need no distance.
-        known[crosses, 1:size] = known[crosses, :1]
+            # Distance counts at the corners of K that have a share.
+            known = self._vertices[:, :-2].copy()
+            known[crosses, 1:size] = known[crosses, :1]
+            known[:, size:] = np.where(place[at, size - 1 :] > 0, known[:, size:], known[:, :1])
+        by_key = np.argsort(key)
         self._nodes = by_key[np.searchsorted(key, source[at, None] * n + known, sorter=by_key)]
-        is_known = is_sloped[self._nodes[:, 1:size]].astype(bool)
-        self._update = _FacetUpdate(is_known, weight[at, None, None], place[at], crosses)
+        is_known, share = is_sloped[self._nodes[:, 1:]].astype(bool), place[at, : known.shape[1] - 1]
+        self._update = _FacetUpdate(is_known, weight[at], share, crosses)
         self._rank = np.empty(len(key), np.int64)
         self._rank[np.argsort(distance, kind="stable")] = np.arange(len(key))
         self._state = np.concatenate([distance[:, None], slope], axis=1)

@@ -9,9 +9,15 @@ cdef extern from *:
     #define RISEN 0.1
     // By how many mean edges others may be nearer to a vertex from which a source is followed on: 0 to .25 measured.
     #define CLOSE 0.1
+    // By which share of a distance paths must exceed it to show that it is too short. On eight images of 40 x 40 pixels the
+    // mean error was .46, .42 and .52 % at .002, .01 and .04, and .58 without.
+    #define TOO_SHORT 0.01
     """
-    double SETTLED, RISEN, CLOSE
+    double SETTLED, RISEN, CLOSE, TOO_SHORT
 
+
+cdef enum:
+    NOT_FOUND = -2
 
 cdef class HopfLax:
     cdef SimplexUpdate update
@@ -33,8 +39,11 @@ cdef class HopfLax:
     cdef const int[::1] begin
     cdef const int[:, ::1] ends
     cdef const double[::1] lengths
-    # The corner whose facet gave each vertex its distance, the corner beyond if it comes from there alone, else -1, the
-    # place on the facet, and what it adds to T linear.
+    # The mark of each simplex, 0 where the metric varies in it, and how many facets are joint.
+    cdef const float[::1] mark
+    cdef int n_joint
+    # The corner whose facet gave each vertex its distance, that opposite a facet beyond if it comes from there, else -1,
+    # the places on both, and what it adds to T linear.
     cdef int[::1] facet, beyond
     cdef double[:, ::1] place
     cdef double[::1] step
@@ -54,6 +63,8 @@ cdef class HopfLax:
     cdef double share(self, int v, int i) noexcept nogil
     cdef double above(self, int v, double value) noexcept nogil
     cdef double contradiction(self, int v) noexcept nogil
+    cdef bint is_too_short(self, int v) noexcept nogil
+    cdef int corner_over(self, int at) noexcept nogil
     cdef void forget(self, int v) noexcept nogil
     cdef void march(self) noexcept nogil
     cdef void lead_on(self, int v) noexcept nogil

@@ -11,7 +11,9 @@ differences along the edges of the facet follow from the slopes of distance at t
 agree with the distances and with the metric of the simplex.
 
 Where metrics differ, a path may cross the middle of a facet whose corners another wave reaches first. So the shortest
-path through such a facet, from the corner beyond it, is a further update.
+path through such a facet, from the corner beyond it, is a further update. And T may be too small between two corners
+that different waves reach: any path to x comes through one of the two simplices beside the facet. Triangles where
+T(x) is less than all T(y) + |y - x| from the facets beyond take the least of T(y) + |y - x| + |x - v| from then on.
 
 The first distances are those along edges. Vertices are visited from near to far, some several times, and then in
 rounds, each vertex after those that its distance comes from. T is not smooth where the fronts of two sources meet, so
@@ -23,7 +25,7 @@ import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep.facets import pair, simplex_of
-from cython.cimports.heat_igl.kernels.sweep.hopf_lax import CLOSE, RISEN, SETTLED
+from cython.cimports.heat_igl.kernels.sweep.hopf_lax import CLOSE, NOT_FOUND, RISEN, SETTLED, TOO_SHORT
 from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, SimplexUpdate, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
@@ -41,24 +43,28 @@ class HopfLax:
         Vertices of each simplex.
     first, incident : (n + 1,) int32, (m (p + 1),) int32
         Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
-    crossings : (n + 1,) int32, (k, 3) int32, (k,) float64
+    crossings : (n + 1,) int32, (k, 3) int32, (k,) float64, (m,) float32
         Paths that may cross a facet between two metrics, or run along it, ``crossings[0][v]`` to
         ``crossings[0][v + 1]`` to vertex v: the corner, as above, opposite the facet on its side, that where the path
-        starts, and the vertex of the latter; and lengths.
+        starts, and the vertex of the latter; lengths; and the mark of each simplex.
     in_metric
         What else `SimplexUpdate` takes of the simplices.
     """
 
     def __init__(self, corners, first, incident, crossings, *in_metric):
         self.corners, self.first, self.incident, n = corners, first, incident, len(first) - 1
-        self.begin, self.ends, self.lengths = crossings
+        self.begin, self.ends, self.lengths, self.mark = crossings
         update = self.update = SimplexUpdate(corners, *in_metric)
         self.waiting, self.reached, self.n_reached = PriorityQueue(n), np.zeros(n, np.int32), 0
         self.facet, self.pending, self.known = np.full(n, -1, np.int32), np.zeros(n), np.full(n, INFINITY)
         self.beyond = np.full(n, -1, np.int32)
         self.leads, self.label, self.d = np.zeros(n, np.uint8), np.full(n, -1, np.int32), np.full(n, INFINITY)
         self.changed = np.zeros(incident.shape[0], np.uint8)
-        self.place, self.step, self.weight = np.zeros((n, update.p)), np.zeros(n), np.ones(n)
+        self.place, self.step, self.weight = np.zeros((n, 2 * update.p)), np.zeros(n), np.ones(n)
+        # On an edge of a tetrahedron, paths end in all that are around it.
+        n_facets = corners.size if update.p == 2 and (np.asarray(self.mark) != 0).any() else 0
+        update.over, update.joint = np.full(n_facets, NOT_FOUND, np.int32), np.zeros(n_facets, np.uint8)
+        self.n_joint = 0
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
         self.doubt, self.own = np.zeros(n), np.zeros(n)
         self.asked, self.n_asked = np.full(n, -1, np.int64), 0
@@ -108,6 +114,9 @@ class HopfLax:
         with cython.nogil:
             for at in range(self.n_reached):
                 self.forget(self.reached[at])
+        if self.n_joint > 0:
+            self.update.joint[:] = 0
+            self.n_joint = 0
         self.n_reached, self.reached[0], self.d[source], self.known[source] = 1, source, start, start
         # Where others come before it begins, a source is the nearest to no vertex.
         if start <= limit[source]:
@@ -126,6 +135,11 @@ class HopfLax:
                 # Vertices that have become nearer, and so have not led on until now.
                 for at in range(self.roots.shape[0]):
                     self.lead_on(self.roots[at])
+                # Those that have been too short since others became farther.
+                for at in range(self.n_reached if self.waiting.count == 0 else 0):
+                    if self.is_too_short(self.reached[at]):
+                        self.pending[self.reached[at]] = INFINITY
+                        self.wait(self.reached[at])
         raise_caught()
         return found, d[found]
 
@@ -134,10 +148,10 @@ class HopfLax:
 
         Returns
         -------
-        facet, beyond, place : (k,) int32, (k,) int32, (k, p) float64
-            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1; the
-            corner of the simplex on the other side, if the distance comes from there alone, or -1; and the shares of
-            the other corners, in their order, at the best place on that facet.
+        facet, beyond, place : (k,) int32, (k,) int32, (k, 2 p) float64
+            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1; that
+            opposite a facet of the simplex beyond, if the distance comes from there, or -1; and the shares of the other
+            corners, in their order, at the best places on both, 0 on the second if there is none.
         slope, is_sloped : (k, 3) float64, (k,) uint8
             The derivative of distance by the position of each vertex, and whether it is known.
         weight : (k,) float64
@@ -169,17 +183,15 @@ class HopfLax:
         return np.asarray(self.doubt)[v]
 
     def support(self, v: cython.int, i: cython.int) -> cython.int:
-        """One of the vertices that v has its distance from: the corner i of its facet, or the one beyond the facet."""
+        """One of the vertices that v has its distance from: the corner i of its facet, or of one beyond this facet."""
         size: cython.int = self.corners.shape[1]
-        if self.beyond[v] >= 0:
-            s: cython.int = simplex_of(self.beyond[v], size)
-            return self.corners[s, self.beyond[v] - size * s]
-        s = simplex_of(self.facet[v], size)
-        return self.corners[s, i if i < self.facet[v] - size * s else i + 1]
+        at: cython.int = self.beyond[v] if self.beyond[v] >= 0 else self.facet[v]
+        s: cython.int = simplex_of(at, size)
+        return self.corners[s, i if i < at - size * s else i + 1]
 
     def share(self, v: cython.int, i: cython.int) -> cython.double:
         """The share of `support` i in the distance of v."""
-        return self.place[v, i] if self.beyond[v] < 0 else i == 0
+        return self.place[v, i if self.beyond[v] < 0 else i + self.update.p]
 
     def above(self, v: cython.int, value: cython.double) -> cython.double:
         """By how much `value` is above the mean distance of what v has its distance from, by their shares."""
@@ -194,13 +206,14 @@ class HopfLax:
         Both agree if it is quadratic. Else it is off in between by their difference times both shares, and by what the
         weight takes of its second difference; at most by that of the square of the edge.
         """
-        s: cython.int = self.facet[v] // self.corners.shape[1]
+        at: cython.int = self.beyond[v] if self.beyond[v] >= 0 else self.facet[v]
+        s: cython.int = at // self.corners.shape[1]
         own: cython.double = 0.0
-        if self.facet[v] < 0:
+        if at < 0:
             return 0.0
         T: cython.double = self.above(v, self.low)
-        self.update.face(s, self.facet[v] % self.corners.shape[1])
-        for i in range(self.update.p if self.beyond[v] < 0 else 0):
+        self.update.face(s, at % self.corners.shape[1])
+        for i in range(self.update.p):
             a: cython.int = self.support(v, i)
             one: cython.double = self.d[a] - self.low
             for j in range(i):
@@ -216,8 +229,51 @@ class HopfLax:
                 gap: cython.double = fabs(two * two - one * one - at_a - at_b) if at_a != 0.0 or at_b != 0.0 else 0.0
                 gap += (1.0 - self.weight[v]) * fabs(at_b - at_a - (two - one) * (two - one))
                 between: cython.double = self.update.mean[s, pair(self.update.side[i], self.update.side[j])]
-                own += self.place[v, i] * self.place[v, j] * min(gap, between)
+                own += self.share(v, i) * self.share(v, j) * min(gap, between)
         return -0.5 * own / T if T < 0.0 and own >= 0.0 else 0.0
+
+    def is_too_short(self, v: cython.int) -> cython.bint:
+        """Whether T is too small at the place on a facet that v has its distance from; then the facet becomes joint."""
+        at: cython.int = self.facet[v]
+        if self.update.over.shape[0] == 0 or at < 0 or self.update.joint[at]:
+            return False
+        most: cython.double = self.d[v] + TOO_SHORT * (self.d[v] - self.low)
+        self.update.d = cython.address(self.known[0])
+        self.update.face(at // 3, at % 3)
+        for i in range(2):
+            if self.update.level[i] + sqrt(self.update.mean[at // 3, pair(at % 3, self.update.side[i])]) <= most:
+                return False
+        over: cython.int = self.corner_over(at)
+        if self.beyond[v] >= 0 or over < 0 or self.known[self.corners[over // 3, over % 3]] == INFINITY:
+            return False
+        a: cython.int = self.update.at[0]
+        self.update.share[0], self.update.share[1], self.update.share[2] = 0.5, 0.5, 0.0
+        for i in range(3 if over != at else 0):
+            t: cython.double = self.place[v, self.corners[over // 3, 3 - over % 3 - i] != a] if i != over % 3 else 0.0
+            if i != over % 3 and self.update.over_both(at // 3, at % 3, i, t, most) < INFINITY:
+                return False
+        self.update.joint[at] = self.changed[at] = True
+        self.n_joint += 1
+        return True
+
+    def corner_over(self, at: cython.int) -> cython.int:
+        """The corner beyond the side opposite the corner `at` of a triangle, after `face`, or `at` if there is none.
+
+        It is -1 where one of both has more than one metric, or there are several.
+        """
+        if self.update.over[at] != NOT_FOUND:
+            return self.update.over[at]
+        over: cython.int = at
+        v: cython.int = self.update.at[0]
+        for k in range(self.first[v], self.first[v + 1]):
+            s: cython.int = self.incident[k] // 3
+            for i in range(3 if s != at // 3 else 0):
+                if self.corners[s, i] == self.update.at[1]:
+                    over = 3 * s + 3 - i - self.incident[k] % 3 if self.mark[s] != 0.0 and over == at else -1
+        self.update.over[at] = over if self.mark[at // 3] != 0.0 else -1
+        if self.update.over[at] >= 0:
+            self.update.over[over] = at
+        return self.update.over[at]
 
     def forget(self, v: cython.int) -> cython.void:
         """Make v a vertex that no source has reached."""
@@ -226,7 +282,7 @@ class HopfLax:
         self.update.is_sloped[v], self.update.trusted_in[v], self.beyond[v] = 0, -1, -1
         for k in range(3):
             self.update.slope[v, k] = 0.0
-        for k in range(self.update.p):
+        for k in range(self.place.shape[1]):
             self.place[v, k] = 0.0
 
     def march(self) -> cython.void:
@@ -320,6 +376,8 @@ class HopfLax:
         for k in range(3):
             self.turn[k] = self.update.slope[v, k]
         self.visit(v)
+        while self.is_too_short(v):
+            self.visit(v)
         span: cython.double = max(fabs(old - self.low), fabs(self.d[v] - self.low))
         change = max(change, fabs(self.d[v] - old) / span)
         for k in range(3):
@@ -349,6 +407,13 @@ class HopfLax:
             is_open: cython.bint = False
             for i in range(size if matters and is_new else 0):
                 is_open |= self.known[of[i]] == INFINITY
+            # The vertex beyond a joint facet.
+            over: cython.int = self.update.over[self.incident[k]] if self.n_joint > 0 and matters else -1
+            if over >= 0 and self.update.joint[over] and over != self.incident[k]:
+                u = self.corners[over // 3, over % 3]
+                self.pending[u], self.changed[over] = max(most, self.pending[u]), True
+                if self.left > 0:
+                    self.wait(u)
             for i in range(size - 1 if most > 0.0 else 0):
                 c: cython.int = i + (i >= own)
                 u = of[c]
@@ -371,7 +436,8 @@ class HopfLax:
         for k in range(self.begin[v], self.begin[v + 1]):
             u = self.ends[k, 2]
             matters = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
-            matters |= self.beyond[u] >= 0 and self.support(u, 0) == v
+            for i in range(size - 1 if self.beyond[u] >= 0 else 0):
+                matters |= self.support(u, i) == v
             if self.facet[u] >= 0 and change > self.settled and matters:
                 self.pending[u] = max(change, self.pending[u])
                 if self.left > 0:
@@ -388,13 +454,14 @@ class HopfLax:
         best: cython.double = INFINITY
         best_at: cython.int = -1
         beyond: cython.int = -1
-        kept: cython.double[3]
+        start: cython.int = -1
+        kept: cython.double[5]
         # Facets that have not changed were no better, unless the one of the last visit is worse now.
         asks_all: cython.bint = True
         for k in range(self.begin[v], self.begin[v + 1]):
             value: cython.double = self.known[self.ends[k, 2]] + self.lengths[k]
             if value < best:
-                best, best_at, beyond = value, self.ends[k, 0], self.ends[k, 1]
+                best, best_at, start = value, self.ends[k, 0], self.ends[k, 1]
         # The facet of the last visit has the same value, if its corners have.
         is_same: cython.bint = self.facet[v] >= 0 and self.beyond[v] < 0 and not self.changed[self.facet[v]]
         for i in range(self.update.p if is_same else 0):
@@ -402,7 +469,7 @@ class HopfLax:
         if is_same:
             asks_all = False
             if self.d[v] + EQUAL * fabs(self.d[v]) < best:
-                best, best_at, beyond = self.d[v], -1, -1
+                best, best_at, start = self.d[v], -1, -1
         elif self.facet[v] >= 0:
             rise = self.above(v, -self.step[v])
             asks_all = self.beyond[v] < 0 or best > self.d[v] * (1 + EQUAL)
@@ -426,13 +493,14 @@ class HopfLax:
                     continue
                 value = self.update.through(s, c, best, -1)
                 self.changed[at] = False
-                if k < self.first[v] and value < INFINITY and self.beyond[v] < 0:
+                if k < self.first[v] and value < INFINITY and (self.beyond[v] < 0 or self.update.away >= 0):
                     asks_all = value > self.d[v] * (1 + EQUAL)
                 # Facets that share the best place have equal values but for rounding: the first one stays.
                 if value + EQUAL * fabs(value) < best:
-                    best, best_at, beyond = value, at, -1
+                    best, best_at, beyond, start = value, at, self.update.away, -1
                     for i in range(size - 1):
                         kept[i] = self.update.share[i]
+                    kept[3], kept[4] = self.update.far[0], self.update.far[1]
             if best < self.d[v] + EQUAL * fabs(best):
                 break
         if best_at < 0:
@@ -450,10 +518,15 @@ class HopfLax:
         end: cython.int = c
         for i in range(size):
             end = i if self.corners[s, i] == v else end
-        if beyond >= 0:
-            self.update.crossing(best_at, end, beyond)
+        if start >= 0:
+            # On a facet beyond that has the start.
+            self.update.crossing(best_at, end, start)
+            beyond = start + 1 if (start + 1) % size else start - 1
         for i in range(size - 1):
             self.place[v, i] = self.update.share[i]
+            self.place[v, size - 1 + i] = 0.0 if beyond < 0 else kept[3 + i % 2]
+            if start >= 0:
+                self.place[v, size - 1 + i] = i + (i >= beyond % size) == start % size
         self.d[v], self.known[v], self.facet[v], self.beyond[v] = best, best, best_at, beyond
         self.step[v] = self.above(v, best)
         # Along the facet, seen from v in the simplex.
