@@ -360,3 +360,12 @@ def test_a_line_is_not_followed_across_a_gap():
     left, right = (nearest_vertex(mesh, [x, 1, 0.5]) for x in (0.25, 0.75))
     found = GeodesicSolver(mesh).distance([left, 0])
     assert found[right] == pytest.approx(2 * np.hypot(0.25, 0.5), rel=0.02)
+
+
+@pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
+def test_heat_in_a_body_does_not_know_the_one_beside_it():
+    one, other = scattered(100), shapes.box(4)
+    V = np.concatenate([one.V, 10 * other.V + 20])
+    both = heat_igl.HeatMethodSolver(Mesh(V, np.concatenate([one.F, other.F + one.n_vertices])))
+    alone = heat_igl.HeatMethodSolver(one).distance(3)
+    assert np.abs(both.distance(3)[: one.n_vertices] - alone).max() < 1e-9

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from heat_igl.errors import require_choice
 from heat_igl.intrinsic import IntrinsicTriangulation, Merged, apex
 from heat_igl.kernels.mesh import checking
+from heat_igl.mesh import connectivity
 from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -289,6 +290,9 @@ class Operators:
         if self.n_components == 1:
             return np.full(1, self.mean_edge_length)
         edges = self.edge_lengths()
+        if edges is None and self.simplices is not None:
+            graph = connectivity.shortest_edge_graph(*self.simplices.edges, self.n).tocoo()
+            edges = graph.row, graph.col, graph.data
         if edges is None:
             scale = np.asarray(self.mean_masses / self.mean_mass) ** (1 / (2 if self.is_surface else 3))
             return np.asarray(self.mean_edge_length * scale)
