@@ -1,4 +1,4 @@
-"""`HopfLaxEngine`: distance through simplices in a metric that changes from one to the next."""
+"""`HopfLaxEngine`: distance in a metric that is given per simplex."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from heat_igl.kernels.sweep.error_estimate import estimated_errors
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
 from heat_igl.mesh.connectivity import group_by_label, unique_rows
@@ -23,7 +24,7 @@ _GOLDEN = 0.618033988749895  # multiples of it, modulo 1, are spread evenly
 
 
 class HopfLaxEngine(SimplexEngine):
-    """Distance by the Hopf-Lax formula on each simplex, of second order, until nothing changes.
+    """Second-order distance by the Hopf-Lax formula on each simplex, iterated to a fixed point.
 
     Parameters
     ----------
@@ -32,7 +33,7 @@ class HopfLaxEngine(SimplexEngine):
     """
 
     def answer(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> Answer:  # noqa: ARG002
-        """What `labelled` returns, and how it shows that the mesh does not resolve the metric, if it does."""
+        """Distances, labels, and a complaint if the error estimate shows that the mesh does not resolve the metric."""
         distance, label, doubt = self._solved(sources)
         far = distance - sources.vertex_offset[label]
         away = np.flatnonzero(np.isfinite(distance) & (far > 0))
@@ -53,23 +54,23 @@ class HopfLaxEngine(SimplexEngine):
         label: AnyArray,
         fronts: list[tuple[AnyArray, ...]] | None = None,
     ) -> FloatArray:
-        """Lower distance to the least of those of second order from each source alone, and add these to `fronts`.
+        """Lower `distance` to the minimum over second-order distances from single sources; append these to `fronts`.
 
-        Returns by how much each may be wrong.
+        Returns an error estimate (n,).
         """
         scheme, limit, doubt = self._scheme, np.full(len(distance), np.inf), np.zeros(len(distance))
         if len(vertices) > 1:
             limit = distance.copy()
             self._along_edges(limit, label.copy())
-        # The order of sources, on which rounding depends, is not that of the numbers of vertices. One after the other
-        # they are far apart, so that the first ones limit the others.
+        # Rounding depends on the order of sources, which therefore does not depend on the numbering. Successive sources
+        # are far apart, so that the first ones bound the propagation from the others.
         order = np.lexsort((*self._simplices.place[vertices].T, offset))
         for k in order[np.argsort(np.arange(len(order)) * _GOLDEN % 1)]:
             found, far = scheme.spread(vertices[k], offset[k], limit)
             nearer = far < distance[found]
             distance[found[nearer]], label[found[nearer]] = far[nearer], k
             limit[found] = np.minimum(limit[found], far)
-            doubt[found[nearer]] = scheme.doubts(found[nearer])
+            doubt[found[nearer]] = estimated_errors(scheme, found[nearer])
             if fronts is not None:
                 fronts.append((np.full(len(found), k), found, far, *scheme.record(found)))
         return doubt
@@ -79,7 +80,7 @@ class HopfLaxEngine(SimplexEngine):
 
     @cached_property
     def _arguments(self) -> Any:
-        """What `HopfLax` takes, with the paths that cross facets between two metrics."""
+        """Arguments of `HopfLax`, including the paths across facets between two metrics."""
         of, corners = self._simplices, self._corners
         kernel: Any = SimplexUpdate
         metric = of.velocity, of.rows, *of.measured[:-1], of.place
@@ -90,10 +91,7 @@ class HopfLaxEngine(SimplexEngine):
         return corners, *self._incident, crossings, *metric
 
     def _marks(self) -> AnyArray:
-        """A number (m,) for the metric of each simplex, to seven digits as equal ones may differ by rounding; or 0.
-
-        It is 0 where the metric varies within the simplex.
-        """
+        """Hash (m,) of the metric of each simplex, rounded to seven digits; 0 where the metric varies within it."""
         of = self._simplices
         if of.velocity is not None and of.rows is not None:
             mark = (of.velocity @ np.sqrt(np.arange(2, 8)))[of.rows[:, 0]]
@@ -106,10 +104,10 @@ class HopfLaxEngine(SimplexEngine):
         return np.asarray(mark / max(np.abs(mark).max(initial=0), np.finfo(float).tiny), np.float32)
 
     def _crossings(self, mark: AnyArray, update: Any) -> tuple[AnyArray, ...]:
-        """The paths that cross facets between simplices of different marks."""
+        """Paths across facets between simplices of different marks, as `HopfLax` takes them."""
         corners, size, n = self._corners, self._corners.shape[1], self._simplices.n
         others = np.array([[j for j in range(size) if j != c] for c in range(size)])
-        # Marks differ at all vertices of these facets.
+        # Such a facet has only vertices at which marks differ.
         at_vertex, is_mixed, some = np.zeros(n, np.float32), np.zeros(n, bool), np.flatnonzero(mark)
         at_vertex[corners[some]] = mark[some, None]
         is_mixed[corners[some][at_vertex[corners[some]] != mark[some, None]]] = True
@@ -123,7 +121,7 @@ class HopfLaxEngine(SimplexEngine):
         pairs = np.concatenate(beside, axis=1).T
         pairs = np.ascontiguousarray(pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]])
         lengths = update.crossings(pairs)
-        # The corner opposite the facet, those where each path starts and ends, there and back.
+        # Rows: the corner opposite the facet, the corners at the start and the end; then each path reversed.
         kind, k = np.nonzero(np.isfinite(lengths.T))
         is_second, lengths = kind >= size, lengths[k, kind]
         at, start = pairs[k, is_second * 1], pairs[k, 1 - is_second]

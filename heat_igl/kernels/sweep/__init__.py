@@ -11,12 +11,14 @@ in the plane of their triangle; the distance of v is that of the straight line t
   source, and v keeps the least (formulas: `planar_updates.pxd`). If v falls below a vertex that came before, the sweep
   goes back to that one.
 
-*Hopf-Lax formula* (`heat_igl.sweep.hopf_lax`). The distance of a corner v of a simplex is the least of
-T(x) + |v - x| over the facet opposite, with T the distance on the facet and |v - x| in the metric of the simplex.
+*Hopf-Lax formula* (`heat_igl.sweep.hopf_lax`). The distance at a corner v of a simplex is the minimum of
+T(x) + |v - x| over the opposite facet, with T the distance on the facet and |v - x| in the metric of the simplex.
 
-Distances begin with those along edges. `hopf_lax` visits vertices from near to far, then in rounds, each after those it
-depends on, until no distance changes. In `simplex_updates`, the least value with T linear has a closed form, and second
-differences of the square of T are found from the slopes of distance at the corners, or from the corner beyond a facet
-between two metrics; `facets` has the least value with these, `simplex_metrics` inverse roots of tensors, fits around
-vertices, and lengths in a velocity that is linear.
+- `hopf_lax` begins with lengths of paths along edges, and updates vertices by distance, then in sweeps in the order of
+  their dependencies, until nothing changes.
+- `simplex_updates` updates a vertex in one simplex: in closed form for linear T, or with second differences of T^2 that
+  come from gradients at the corners of the facet, or from the corner beyond a facet between two metrics.
+- `facets` minimizes over a facet with second differences.
+- `simplex_metrics` has inverse roots of tensors, fits around vertices, and lengths in a linear velocity.
+- `error_estimate` finds how far the gradients contradict the distances.
 """

@@ -3,14 +3,14 @@ from heat_igl.kernels.sweep.simplex_updates cimport SimplexUpdate
 
 cdef extern from *:
     """
-    // By which share of a distance the changes along a path that are not handed on may add up, about.
+    // Relative error that changes below the threshold may add up to along a path, approximately.
     #define SETTLED 5e-4
-    // What a vertex may rise, as a share of its distance, though those it depends on do not: then its second order halves.
+    // Relative increase of a distance, without increase of those it depends on, at which its second order is halved.
     #define RISEN 0.1
-    // By how many mean edges others may be nearer to a vertex from which a source is followed on: 0 to .25 measured.
+    // A source is propagated from a vertex if others are nearer by at most so many mean edges: 0 to .25 measured.
     #define CLOSE 0.1
-    // By which share of a distance paths must exceed it to show that it is too short. On eight images of 40 x 40 pixels the
-    // mean error was .46, .42 and .52 % at .002, .01 and .04, and .58 without.
+    // Relative excess of all paths over a distance that is too short. On eight images of 40 x 40 pixels the mean error was
+    // .46, .42 and .52 % at .002, .01 and .04, and .58 without.
     #define TOO_SHORT 0.01
     """
     double SETTLED, RISEN, CLOSE, TOO_SHORT
@@ -22,47 +22,44 @@ cdef enum:
 cdef class HopfLax:
     cdef SimplexUpdate update
     cdef PriorityQueue waiting
-    # Visits from near to far that are left, but for the first one to each vertex.
+    # Updates by distance that are left, apart from the first one of each vertex.
     cdef Py_ssize_t left
     cdef const int[:, ::1] corners
     cdef const int[::1] first, incident
-    # Distance, the same of visited vertices alone, the change that visits have not taken in, and distance from all sources.
+    # Distance; the same at updated vertices only; pending change; upper bound of the distance from all sources.
     cdef double[::1] d, known, pending, limit
-    # Facets that have changed since they were asked.
+    # Facets that have changed since their last evaluation; vertices that were propagated from.
     cdef unsigned char[::1] changed, leads
-    # Which vertices lead on to those around them, and those that the source has reached, in this order.
+    # Labels, numbers of updates in sweeps, and the vertices that the source has reached, in this order.
     cdef int[::1] label, n_visits, reached
     cdef int n_reached
-    # Distance at the source, the change that is not handed on, and that of the slope of the last vertex.
+    # Initial distance of the source, threshold of changes, and change of the gradient in the last update.
     cdef double low, settled, turn[3]
-    # The paths to each vertex through a facet between two metrics: the corners at their ends, and their lengths.
+    # Paths to each vertex across a facet between two metrics, see `HopfLax`.
     cdef const int[::1] begin
     cdef const int[:, ::1] ends
     cdef const double[::1] lengths
     # The mark of each simplex, 0 where the metric varies in it, and how many facets are joint.
     cdef const float[::1] mark
     cdef int n_joint
-    # The corner whose facet gave each vertex its distance, that opposite a facet beyond if it comes from there, else -1,
-    # the places on both, and what it adds to T linear.
+    # Of the last update of each vertex: the corner opposite the facet, the corner opposite a facet beyond it or -1,
+    # barycentric coordinates of the minimizers on both, and distance minus linear T.
     cdef int[::1] facet, beyond
     cdef double[:, ::1] place
     cdef double[::1] step
-    # What each vertex rose though those at its place did not, and how far T is of second order for it.
+    # Accumulated increase, see RISEN, and weight of the second order.
     cdef double[::1] risen, weight
-    # Depth-first search has not seen a vertex, has it open, or is done with it; sums of steps over the open ones.
+    # Depth-first search: states 0 new, 1 open, 2 done; sums of steps over the open vertices.
     cdef int[::1] roots, order, stack
     cdef unsigned char[::1] state
     cdef double[::1] sum
-    # Of each vertex, the velocities at both ends of the last edge that it was asked along.
+    # Key of the last edge relaxed to each vertex: a count of velocities at starts, and the velocity at its end.
     cdef long long[::1] asked
     cdef long long n_asked
-    # By how much each distance may be wrong, and by how much of that at its last step.
-    cdef double[::1] doubt, own
 
     cdef int support(self, int v, int i) noexcept nogil
     cdef double share(self, int v, int i) noexcept nogil
     cdef double above(self, int v, double value) noexcept nogil
-    cdef double contradiction(self, int v) noexcept nogil
     cdef bint is_too_short(self, int v) noexcept nogil
     cdef int corner_over(self, int at) noexcept nogil
     cdef void forget(self, int v) noexcept nogil

@@ -1,4 +1,4 @@
-"""Kernel of distance in any metric: the Hopf-Lax formula on each triangle or tetrahedron.
+"""Hopf-Lax scheme: distance in a metric that is given per triangle or tetrahedron.
 
 The distance at a corner v of a simplex is the minimum of T(x) + |v - x| over the points x of the opposite facet. T is
 the distance on the facet, interpolated between its corners, and |v - x| is the length in the metric of the simplex.
@@ -6,18 +6,19 @@ the distance on the facet, interpolated between its corners, and |v - x| is the 
 *First order*: T is linear. Then the update is monotone in the distances at the corners, and updates in any order have
 one fixed point, which converges to the distance in a continuous metric (Bornemann and Rasch 2006).
 
-*Second order*: the square of T is quadratic, as the squared distance from a point in a constant metric is. Its second
-differences along the edges of the facet follow from the slopes of distance at the corners. They are used as far as they
-agree with the distances and with the metric of the simplex.
+*Second order*: T^2 is quadratic, which is exact for a point source in a constant metric. Its second differences along
+the edges of the facet follow from the gradients of distance at the corners, and are limited where they contradict the
+distances or the metric of the simplex.
 
-Where metrics differ, a path may cross the middle of a facet whose corners another wave reaches first. So the shortest
-path through such a facet, from the corner beyond it, is a further update. And T may be too small between two corners
-that different waves reach: any path to x comes through one of the two simplices beside the facet. Triangles where
-T(x) is less than all T(y) + |y - x| from the facets beyond take the least of T(y) + |y - x| + |x - v| from then on.
+Between two metrics, a shortest path may cross the interior of a facet although another front reaches its corners
+first: a path through such a facet from the opposite corner of the adjacent simplex is a further update. Moreover, T may
+be too small between two corners that different fronts reach. Every path to x comes through one of the two simplices at
+the facet: triangles in which T(x) is less than T(y) + |y - x| for all y on the sides beyond minimize
+T(y) + |y - x| + |x - v| from then on.
 
-The first distances are those along edges. Vertices are visited from near to far, some several times, and then in
-rounds, each vertex after those that its distance comes from. T is not smooth where the fronts of two sources meet, so
-that each source is followed alone.
+Initial distances are lengths of paths along edges. Vertices are updated in ascending order of distance, some of them
+repeatedly, and then in Gauss-Seidel sweeps in a topological order of their dependencies. Each source is propagated
+separately, since T is not smooth where the fronts of two sources meet.
 """
 
 import cython
@@ -35,20 +36,20 @@ from heat_igl.kernels.signals import raise_caught
 @cython.final
 @cython.cclass
 class HopfLax:
-    """Visits to vertices, each through its simplices.
+    """Distances from one source at a time, by updates of vertices until nothing changes.
 
     Parameters
     ----------
     corners : (m, p + 1) int32
         Vertices of each simplex.
     first, incident : (n + 1,) int32, (m (p + 1),) int32
-        Corners ``simplex * (p + 1) + corner`` that meet in vertex v, at ``first[v]`` to ``first[v + 1]`` of `incident`.
+        ``incident[first[v] : first[v + 1]]`` are the corners ``simplex * (p + 1) + corner`` at vertex v.
     crossings : (n + 1,) int32, (k, 3) int32, (k,) float64, (m,) float32
-        Paths that may cross a facet between two metrics, or run along it, ``crossings[0][v]`` to
-        ``crossings[0][v + 1]`` to vertex v: the corner, as above, opposite the facet on its side, that where the path
-        starts, and the vertex of the latter; lengths; and the mark of each simplex.
+        Paths to vertex v that cross a facet between two metrics, or run along it, are the rows ``crossings[0][v]`` to
+        ``crossings[0][v + 1]``: the corner opposite the facet in the simplex of v, the corner and the vertex at which
+        the path starts; their lengths; and the mark of each simplex.
     in_metric
-        What else `SimplexUpdate` takes of the simplices.
+        Further arguments of `SimplexUpdate`.
     """
 
     def __init__(self, corners, first, incident, crossings, *in_metric):
@@ -66,7 +67,6 @@ class HopfLax:
         update.over, update.joint = np.full(n_facets, NOT_FOUND, np.int32), np.zeros(n_facets, np.uint8)
         self.n_joint = 0
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
-        self.doubt, self.own = np.zeros(n), np.zeros(n)
         self.asked, self.n_asked = np.full(n, -1, np.int64), 0
         update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
         update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
@@ -75,10 +75,10 @@ class HopfLax:
         self.settled = SETTLED * n ** (-1.0 / update.p)
 
     def shorten(self, d: cython.double[::1], label: cython.int[::1]) -> None:
-        """Lower distances `d` (n,) to paths along edges, in place; labels (n,) are handed on (Dijkstra 1959)."""
+        """Lower distances `d` (n,) to shortest paths along edges, with their labels (n,), in place (Dijkstra 1959)."""
         self.d, self.label, self.limit, self.left, self.low = d, label, d, 0, np.min(d)
         with cython.nogil:
-            # Only along edges that may be shorter than the difference of distances.
+            # The length of an edge is evaluated only if a lower bound is below the difference of the distances.
             for s in range(self.corners.shape[0]):
                 of = cython.address(self.corners[s, 0])
                 sq = cython.address(self.update.mean[s, 0])
@@ -94,21 +94,21 @@ class HopfLax:
         raise_caught()
 
     def spread(self, source: cython.int, start: cython.double, limit: cython.double[::1]):
-        """Find distances of second order from one source, where it may be the nearest; `record` returns the rest.
+        """Compute second-order distances from one source, as far as it may be the nearest; `record` has the rest.
 
         Parameters
         ----------
         source, start : int, float
-            The vertex, and the distance at which it begins.
+            The source vertex and its initial distance.
         limit : (n,) float64
-            The distance from all sources as far as it is known, ``inf`` elsewhere.
+            Upper bounds of the distance from all sources, ``inf`` where none is known.
 
         Returns
         -------
         vertices, distance : (k,) int32, (k,) float64
             The visited vertices, the source included, in ascending order, and their distances.
         """
-        # In strongly anisotropic metrics distances depend on larger ones, and the pass from near to far takes too long.
+        # In strongly anisotropic metrics, distances depend on larger ones: so these updates are limited.
         left: cython.Py_ssize_t = len(limit) // 2
         self.limit, self.low, self.update.start = limit, start, start
         with cython.nogil:
@@ -118,7 +118,7 @@ class HopfLax:
             self.update.joint[:] = 0
             self.n_joint = 0
         self.n_reached, self.reached[0], self.d[source], self.known[source] = 1, source, start, start
-        # Where others come before it begins, a source is the nearest to no vertex.
+        # A source that another one reaches before its initial distance is nowhere the nearest.
         if start <= limit[source]:
             self.wait(source)
         found, d = np.asarray(self.reached[:1]), np.asarray(self.d)
@@ -128,11 +128,11 @@ class HopfLax:
                 self.march()
             left, self.left = self.left, 0
             found = np.sort(self.reached[: self.n_reached])
-            # Of equal distances the vertex of the lower number comes first.
+            # Ties are in the order of vertices.
             self.roots = found[np.argsort(d[found], kind="stable")]
             with cython.nogil:
                 self.sharpen()
-                # Vertices that have become nearer, and so have not led on until now.
+                # Vertices that are propagated from only now, after their distances have decreased.
                 for at in range(self.roots.shape[0]):
                     self.lead_on(self.roots[at])
                 # Those that have been too short since others became farther.
@@ -144,16 +144,16 @@ class HopfLax:
         return found, d[found]
 
     def record(self, v):
-        """What is known of visited vertices v (k,) from the last source.
+        """Dependencies and gradients of visited vertices v (k,) after `spread`.
 
         Returns
         -------
         facet, beyond, place : (k,) int32, (k,) int32, (k, 2 p) float64
-            The corner ``simplex * (p + 1) + corner`` opposite the facet that gave each vertex its distance, or -1; that
-            opposite a facet of the simplex beyond, if the distance comes from there, or -1; and the shares of the other
-            corners, in their order, at the best places on both, 0 on the second if there is none.
+            The corner ``simplex * (p + 1) + corner`` opposite the facet of the last update, or -1; the corner opposite
+            a facet of the adjacent simplex if the path comes from there, else -1; and barycentric coordinates of the
+            minimizers on both facets, 0 without the second.
         slope, is_sloped : (k, 3) float64, (k,) uint8
-            The derivative of distance by the position of each vertex, and whether it is known.
+            The gradient of distance, and whether it is known.
         weight : (k,) float64
             The weight of the second order at each vertex: 1 for all of it, 0 for linear T.
         """
@@ -161,79 +161,25 @@ class HopfLax:
         at = np.asarray(self.facet)[v], np.asarray(self.beyond)[v], np.asarray(self.place)[v]
         return *at, np.asarray(update.slope)[v], np.asarray(update.is_sloped)[v], np.asarray(self.weight)[v]
 
-    def doubts(self, v):
-        """By how much distances (k,) may be wrong: what `contradiction` finds adds up over what they come from."""
-        with cython.nogil:
-            self.update.d = cython.address(self.d[0])
-            for at in range(self.n_reached):
-                self.own[self.order[at]] = self.contradiction(self.order[at])
-                self.doubt[self.order[at]] = 0.0
-            # Where metrics turn far, the order has cycles and precedes the last visits: 5 rounds find nearly all.
-            for _round in range(5):
-                changes: cython.bint = False
-                for at in range(self.n_reached):
-                    w: cython.int = self.order[at]
-                    so_far: cython.double = self.own[w]
-                    for i in range(self.update.p if self.facet[w] >= 0 else 0):
-                        so_far += self.share(w, i) * self.doubt[self.support(w, i)]
-                    changes |= so_far != self.doubt[w]
-                    self.doubt[w] = so_far
-                if not changes:
-                    break
-        return np.asarray(self.doubt)[v]
-
     def support(self, v: cython.int, i: cython.int) -> cython.int:
-        """One of the vertices that v has its distance from: the corner i of its facet, or of one beyond this facet."""
+        """A vertex that the distance of v depends on: corner i of its facet, or of a facet beyond it."""
         size: cython.int = self.corners.shape[1]
         at: cython.int = self.beyond[v] if self.beyond[v] >= 0 else self.facet[v]
         s: cython.int = simplex_of(at, size)
         return self.corners[s, i if i < at - size * s else i + 1]
 
     def share(self, v: cython.int, i: cython.int) -> cython.double:
-        """The share of `support` i in the distance of v."""
+        """Barycentric coordinate of the minimizer of v at `support` i."""
         return self.place[v, i if self.beyond[v] < 0 else i + self.update.p]
 
     def above(self, v: cython.int, value: cython.double) -> cython.double:
-        """By how much `value` is above the mean distance of what v has its distance from, by their shares."""
+        """`value` minus linear T at the minimizer of v."""
         for i in range(self.update.p):
             value -= self.share(v, i) * self.d[self.support(v, i)]
         return value
 
-    def contradiction(self, v: cython.int) -> cython.double:
-        """By how much T may be wrong at the place that v has its distance from.
-
-        Along an edge of a facet, the square of T rises by what its values say, and by what the slopes at both ends say.
-        Both agree if it is quadratic. Else it is off in between by their difference times both shares, and by what the
-        weight takes of its second difference; at most by that of the square of the edge.
-        """
-        at: cython.int = self.beyond[v] if self.beyond[v] >= 0 else self.facet[v]
-        s: cython.int = at // self.corners.shape[1]
-        own: cython.double = 0.0
-        if at < 0:
-            return 0.0
-        T: cython.double = self.above(v, self.low)
-        self.update.face(s, at % self.corners.shape[1])
-        for i in range(self.update.p):
-            a: cython.int = self.support(v, i)
-            one: cython.double = self.d[a] - self.low
-            for j in range(i):
-                b: cython.int = self.support(v, j)
-                two: cython.double = self.d[b] - self.low
-                at_a: cython.double = 0.0
-                at_b: cython.double = 0.0
-                for k in range(3):
-                    e: cython.double = self.update.V[b, k] - self.update.V[a, k]
-                    at_a += one * self.update.slope[a, k] * e
-                    at_b += two * self.update.slope[b, k] * e
-                # Both are 0 where simplices are flat and slopes not known.
-                gap: cython.double = fabs(two * two - one * one - at_a - at_b) if at_a != 0.0 or at_b != 0.0 else 0.0
-                gap += (1.0 - self.weight[v]) * fabs(at_b - at_a - (two - one) * (two - one))
-                between: cython.double = self.update.mean[s, pair(self.update.side[i], self.update.side[j])]
-                own += self.share(v, i) * self.share(v, j) * min(gap, between)
-        return -0.5 * own / T if T < 0.0 and own >= 0.0 else 0.0
-
     def is_too_short(self, v: cython.int) -> cython.bint:
-        """Whether T is too small at the place on a facet that v has its distance from; then the facet becomes joint."""
+        """Whether T is too small at the minimizer of v on its facet, which then becomes joint."""
         at: cython.int = self.facet[v]
         if self.update.over.shape[0] == 0 or at < 0 or self.update.joint[at]:
             return False
@@ -257,9 +203,9 @@ class HopfLax:
         return True
 
     def corner_over(self, at: cython.int) -> cython.int:
-        """The corner beyond the side opposite the corner `at` of a triangle, after `face`, or `at` if there is none.
+        """The corner beyond the side opposite corner `at` of a triangle, after `face`; `at` itself on the boundary.
 
-        It is -1 where one of both has more than one metric, or there are several.
+        It is -1 if the metric varies within one of the two triangles, or if more than two share the side.
         """
         if self.update.over[at] != NOT_FOUND:
             return self.update.over[at]
@@ -276,7 +222,7 @@ class HopfLax:
         return self.update.over[at]
 
     def forget(self, v: cython.int) -> cython.void:
-        """Make v a vertex that no source has reached."""
+        """Reset v to a vertex that has not been reached."""
         self.d[v], self.known[v], self.facet[v], self.pending[v], self.leads[v] = INFINITY, INFINITY, -1, 0.0, 0
         self.weight[v], self.step[v], self.risen[v], self.n_visits[v] = 1.0, 0.0, 0.0, 0
         self.update.is_sloped[v], self.update.trusted_in[v], self.beyond[v] = 0, -1, -1
@@ -286,7 +232,7 @@ class HopfLax:
             self.place[v, k] = 0.0
 
     def march(self) -> cython.void:
-        """From near to far: visit vertices, as long as visits are left, and reach those around them."""
+        """Update vertices in ascending order of distance while updates are left, and propagate to their neighbours."""
         n_taken: cython.int = 0
         while self.waiting.count > 0:
             n_taken += 1
@@ -300,11 +246,11 @@ class HopfLax:
             self.lead_on(v)
 
     def lead_on(self, v: cython.int) -> cython.void:
-        """Reach the vertices around v once, unless other sources are clearly nearer to v.
+        """Propagate to the neighbours of v once, unless another source is nearer to v by a margin.
 
-        A shortest path runs where its source is the nearest, perhaps between vertices that are nearer to others. Fronts
-        of sources one edge h apart differ in direction by h / R at the distance R, so by h^2 / R one edge beside their
-        border. The longest edge in place of the mean would be that of slivers.
+        A shortest path stays in the Voronoi cell of its source, but may pass between vertices of other cells. At the
+        distance R, the fronts of two sources one edge h apart differ in direction by h / R, and one edge beyond their
+        bisector in distance by h^2 / R. h is the mean edge, as the longest one may belong to a sliver.
         """
         square: cython.double = 0.0
         excess: cython.double = self.d[v] - self.limit[v]
@@ -318,7 +264,7 @@ class HopfLax:
             self.reach(v)
 
     def reach(self, v: cython.int) -> cython.void:
-        """Lower distances around v to those along edges from v, where vertices were not visited."""
+        """Relax the edges from v to vertices that have not been updated."""
         size: cython.int = self.corners.shape[1]
         row: cython.int = -1
         for k in range(self.first[v], self.first[v + 1]):
@@ -331,7 +277,7 @@ class HopfLax:
                 u: cython.int = self.corners[s, i]
                 gap: cython.double = self.d[u] - self.d[v]
                 if self.facet[u] < 0 and gap > 0.0:
-                    # The simplices around an edge know the same of it, if velocities at its ends are the same in them.
+                    # An edge with the same velocities at its ends has one length in all simplices: skip repetitions.
                     if self.update.q > 1:
                         ask: cython.longlong = self.n_asked * self.update.inverses.shape[0] + self.update.rows[s, i]
                         if self.asked[u] == ask:
@@ -341,7 +287,7 @@ class HopfLax:
                     if gap * gap <= least * self.update.mean[s, pair(c, i)]:
                         continue
                     far: cython.double = self.d[v] + edge_length(self.update, s, c, i)
-                    # Not by rounding, which would pass along many edges.
+                    # Differences by rounding would propagate along many edges.
                     if far < self.d[u] * (1 - 1e-12):
                         if self.d[u] == INFINITY:
                             self.reached[self.n_reached] = u
@@ -350,26 +296,26 @@ class HopfLax:
                         self.wait(u)
 
     def wait(self, v: cython.int) -> cython.void:
-        """Let v wait, the nearest first."""
+        """Queue v by its distance."""
         self.waiting.set_key(v, 1.0 / (self.d[v] - self.low))
 
     def sharpen(self) -> cython.void:
-        """Visit vertices in rounds, each after those it has its distance from."""
+        """Gauss-Seidel sweeps in topological order, until no change exceeds its threshold."""
         is_settled: cython.bint = False
         while not is_settled and not is_interrupted():
             is_settled = True
             self.arrange()
             for at in range(self.n_reached):
                 v = self.order[at]
-                # If the metric turns far within a simplex, dependencies may be cyclic: each further visit of a vertex
-                # needs a larger change.
+                # Dependencies may be cyclic if the metric varies strongly within a simplex: the threshold grows with
+                # each update of a vertex, so that the sweeps end.
                 if self.pending[v] > self.settled * self.n_visits[v]:
                     is_settled = False
                     self.n_visits[v] += 1
                     self.renew(v)
 
     def renew(self, v: cython.int) -> cython.void:
-        """Visit v, and hand on what has changed."""
+        """Update v, and schedule the vertices that the change affects."""
         self.pending[v] = 0.0
         old: cython.double = self.d[v]
         change: cython.double = INFINITY if self.facet[v] < 0 else 0.0
@@ -385,7 +331,7 @@ class HopfLax:
         self.hand_on(v, old, change)
 
     def hand_on(self, v: cython.int, old: cython.double, change: cython.double) -> cython.void:
-        """Request visits to the vertices around v after its value, which was `old`, or its slope has changed."""
+        """Schedule updates around v after its distance, formerly `old`, or its gradient has changed."""
         size: cython.int = self.corners.shape[1]
         at = cython.address(self.update.V[v, 0])
         x: cython.double = self.turn[0]
@@ -397,7 +343,7 @@ class HopfLax:
             own: cython.int = self.incident[k] - size * s
             of = cython.address(self.corners[s, 0])
             most: cython.double = change
-            # T changes by an eighth, in the middle of an edge, of how far a slope changes along it.
+            # If the derivative along an edge changes by g at one end, T changes by g / 8 in the middle.
             for i in range(size - 1 if change < INFINITY else 0):
                 u: cython.int = of[i + (i >= own)]
                 to = cython.address(self.update.V[u, 0])
@@ -423,7 +369,7 @@ class HopfLax:
                 if not matters:
                     # No reason for a visit, but the next one finds another value there.
                     self.changed[s * size + c] |= depends
-                # Farther away, v matters to u if it now has a slope or is nearer, and u gains by that.
+                # A vertex u that does not depend on v is affected only if the new state of v lowers it.
                 elif (
                     most <= self.pending[u]
                     or self.d[v] < self.d[u]
@@ -444,10 +390,10 @@ class HopfLax:
                     self.wait(u)
 
     def visit(self, v: cython.int) -> cython.void:
-        """Give v the least value over its simplices, and the slope that goes with it.
+        """Update v: the minimum over its simplices, and the gradient at the minimizer.
 
-        With T linear, the value rises only if the distances at its last place rise. With the second order it may also
-        rise because slopes have changed there, again and again; if that adds up, the second order is reduced.
+        With linear T, the value increases only if distances at the last minimizer do. With second order it may also
+        increase because gradients have changed, repeatedly; if this adds up, the weight of the second order is halved.
         """
         size: cython.int = self.corners.shape[1]
         rise: cython.double = -INFINITY
@@ -456,7 +402,7 @@ class HopfLax:
         beyond: cython.int = -1
         start: cython.int = -1
         kept: cython.double[5]
-        # Facets that have not changed were no better, unless the one of the last visit is worse now.
+        # Facets without changes cannot be better, unless the facet of the last update has become worse.
         asks_all: cython.bint = True
         for k in range(self.begin[v], self.begin[v + 1]):
             value: cython.double = self.known[self.ends[k, 2]] + self.lengths[k]
@@ -473,17 +419,17 @@ class HopfLax:
         elif self.facet[v] >= 0:
             rise = self.above(v, -self.step[v])
             asks_all = self.beyond[v] < 0 or best > self.d[v] * (1 + EQUAL)
-        # Without corners that were not visited, for which it would be done again, if it gets nearer by the others.
+        # First the facets whose corners have all been updated. Others, to be evaluated again, only if these raise v.
         for is_open in range(2):
             self.update.d = cython.address(self.d[0]) if is_open else cython.address(self.known[0])
-            # The facet of the last visit first: it rules out most of the others.
+            # The facet of the last update comes first, as its value bounds the search in the others.
             for k in range(self.first[v] - 1 + is_same, self.first[v + 1]):
                 at: cython.int = self.facet[v] if k < self.first[v] else self.incident[k]
                 if at < 0 or (k >= self.first[v] and (at == self.facet[v] or not (asks_all or self.changed[at]))):
                     continue
                 s: cython.int = simplex_of(at, size)
                 c: cython.int = at - size * s
-                # After a path along a facet, v is not opposite it.
+                # After a path along the facet, v is one of its corners.
                 if self.corners[s, c] != v:
                     continue
                 has_open: cython.bint = not is_open
@@ -495,7 +441,7 @@ class HopfLax:
                 self.changed[at] = False
                 if k < self.first[v] and value < INFINITY and (self.beyond[v] < 0 or self.update.away >= 0):
                     asks_all = value > self.d[v] * (1 + EQUAL)
-                # Facets that share the best place have equal values but for rounding: the first one stays.
+                # Facets that share the minimizer have values equal to rounding: the first one is kept.
                 if value + EQUAL * fabs(value) < best:
                     best, best_at, beyond, start = value, at, self.update.away, -1
                     for i in range(size - 1):
@@ -529,7 +475,7 @@ class HopfLax:
                 self.place[v, size - 1 + i] = i + (i >= beyond % size) == start % size
         self.d[v], self.known[v], self.facet[v], self.beyond[v] = best, best, best_at, beyond
         self.step[v] = self.above(v, best)
-        # Along the facet, seen from v in the simplex.
+        # For a path along the facet, the gradient is that of the update from the opposite facet.
         for i in range(size if end != c else 0):
             if i != end:
                 k = i if i < c else i - 1
@@ -539,13 +485,12 @@ class HopfLax:
         self.update.find_slope(s, end)
 
     def arrange(self) -> cython.void:
-        """Order vertices topologically, each after the corners that its distance comes from, except in cycles.
+        """Sort vertices topologically by a depth-first search: each after those it depends on, except in cycles.
 
-        The distances in a cycle come from each other. The step of a vertex is what it adds to linear T; with the second
-        order it may be negative. If the steps of a cycle sum to less than 0, its vertices would lower each other for
-        ever: then the second order is reduced, see `open_circle`.
+        The step of a vertex is its distance minus linear T at the minimizer; with second order it may be negative. If
+        the steps of a cycle sum to less than 0, its vertices would lower each other forever: `open_circle` prevents it.
 
-        Of several topological orders the one by distance is taken, whatever the numbers of vertices and corners.
+        Ties are resolved by distance, so that the order does not depend on the numbers of vertices and corners.
         """
         size: cython.int = self.corners.shape[1]
         n_done: cython.int = 0
@@ -583,7 +528,7 @@ class HopfLax:
                     n_done += 1
 
     def open_circle(self, u: cython.int, n_open: cython.int) -> cython.void:
-        """Halve the second order of vertices that depend on u and on which u depends: those open above it."""
+        """Halve the weight of the second order in a cycle through u: at the open vertices down to u on the stack."""
         w: cython.int = -1
         while w != u:
             n_open -= 1
