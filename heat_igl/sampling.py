@@ -132,7 +132,7 @@ def claim_nearer(distance: FloatArray, labels: IntArray, label: int, candidate: 
 
 
 @names_guessed
-def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -> IntArray:
+def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike | None = None) -> IntArray:
     """`k` vertices, each as far as possible from those before (Gonzalez 1985; Moenning and Dodgson 2003).
 
     Parameters
@@ -141,8 +141,8 @@ def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) 
         Of any domain, or whatever `as_mesh` takes, for its `GeodesicSolver`; asked k times.
     k : int
         Number of vertices.
-    start : int, sequence of int, or (n,) mask of bool
-        The first vertex; several are all taken first, in ascending order.
+    start : int, sequence of int, or (n,) mask of bool, optional
+        The first vertex: the first that a face uses, if not given. Several are all taken first, in ascending order.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def farthest_points(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) 
 
 
 @names_guessed
-def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -> VoronoiCells:
+def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike | None = None) -> VoronoiCells:
     """The Voronoi cells of `farthest_points`, for the same queries; arguments and errors as there.
 
     Examples
@@ -178,9 +178,9 @@ def farthest_cells(solver: Solver | MeshLike, k: int, *, start: ArrayLike = 0) -
     0.707107
     """
     solver = as_solver(solver)
+    used = solver.referenced.copy()
+    start = int(used.argmax()) if start is None else start
     first = vertex_sources(cast(Any, start), solver.n_vertices, "start")
-    referenced = solver.referenced
-    used = referenced.copy()
     used[first] = True
     least, most = len(first), int(used.sum())
     if not isinstance(k, int | np.integer) or isinstance(k, bool) or not least <= k <= most:

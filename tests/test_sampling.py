@@ -51,6 +51,8 @@ def test_every_component_gets_a_point_first_and_loose_vertices_none():
     points = heat_igl.farthest_points(solver, mesh.n_vertices - 1)
     assert mesh.components[points[0]] != mesh.components[points[1]]
     assert mesh.n_vertices - 1 not in points
+    loose = Mesh(np.vstack([np.ones((1, 3)), mesh.V]), mesh.F + 1)
+    assert np.array_equal(heat_igl.farthest_points(loose, 9), heat_igl.farthest_points(mesh, 9) + 1)
 
 
 def test_several_starting_points_come_first(square):
