@@ -58,7 +58,7 @@ OPTIONS = (
     "-O2 -g0 -DCYTHON_CLINE_IN_TRACEBACK=0 -fno-math-errno -fno-trapping-math -ffp-contract=off "
     "-Wno-unused-function -Wno-sign-compare"
 )
-UNROLLED = ("sweep/facets", "sweep/simplex_metrics", "sweep/simplex_updates")
+UNROLLED = ("sweep/facets", "sweep/hopf_lax", "sweep/simplex_metrics", "sweep/simplex_updates")
 ANY_ORDER = "-O3 -fassociative-math -fno-signed-zeros -ffp-contract=fast"
 OPTIONS_MSVC = "/O2 /fp:precise"
 

@@ -349,9 +349,9 @@ class HopfLax:
                 to = cython.address(self.update.V[u, 0])
                 most = max(most, fabs(x * (to[0] - at[0]) + y * (to[1] - at[1]) + z * (to[2] - at[2])))
             matters: cython.bint = most > self.settled
-            # Through a facet with a corner that was not visited, nothing gains yet.
+            # A facet with a corner that was not visited waits for that.
             is_open: cython.bint = False
-            for i in range(size if matters and is_new else 0):
+            for i in range(size if matters else 0):
                 is_open |= self.known[of[i]] == INFINITY
             # The vertex beyond a joint facet.
             over: cython.int = self.update.over[self.incident[k]] if self.n_joint > 0 and matters else -1
@@ -372,8 +372,8 @@ class HopfLax:
                 # A vertex u that does not depend on v is affected only if the new state of v lowers it.
                 elif (
                     most <= self.pending[u]
-                    or self.d[v] < self.d[u]
                     or depends
+                    or (self.d[v] < self.d[u] and not is_open)
                     or (is_new and not is_open and self.update.through(s, c, self.d[u], own) < self.d[u])
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True

@@ -57,6 +57,7 @@ def lengths_in_velocity(
     I: cython.double[6]
     E: cython.double[12]
     rise: cython.double[4]
+    speed: cython.double[4]
     at: cython.pointer[cython.const[cython.double]][4]
     with cython.nogil:
         for i in range(velocity.shape[0]):
@@ -74,15 +75,18 @@ def lengths_in_velocity(
                     E[3 * i + x] = V[corners[s, 0], x] - V[corners[s, i], x]
                 for k in range(6):
                     W[k] += per * at[i][k]
-                rise[i] = mean_velocity(at[0]) - mean_velocity(at[i])
-                fastest = max(fastest, mean_velocity(at[i]))
+                # Divisions take longer than the rest.
+                speed[i] = mean_velocity(at[i])
+                rise[i] = speed[0] - speed[i]
+                fastest = max(fastest, speed[i])
+            per_speed: cython.double = 1.0 / mean_velocity(W)
             invert(W, I)
             for i in range(size):
                 squares_of(cython.address(inverse[rows[s, i], 0]), e, n_pairs, squares + 6 * i)
             squares_of(I, e, n_pairs, cython.address(mean[s, 0]))
             gradient(E + 3, rise + 1, size - 1, here)
             squares_of(W, here, 1, rise)
-            steep: cython.double = sqrt(rise[0]) / mean_velocity(W)
+            steep: cython.double = sqrt(rise[0]) * per_speed
             # How much faster it is in the middle between the two fastest corners than in the mean, to first order.
             faster: cython.double = 1.0
             for k in range(n_pairs):
@@ -99,7 +103,7 @@ def lengths_in_velocity(
                     variation += (one + two - 2.0 * sqrt(one * two)) / mean[s, k]
             slack[s] = 1.0 / sqrt(faster)
             # In a flat simplex, the arc over a long edge would leave it, for velocities far above those at the corners.
-            fastest /= mean_velocity(W)
+            fastest *= per_speed
             growth[s] = min(steep, 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
     return *found, variation / (n_pairs * max(m, 1))
 
