@@ -91,7 +91,7 @@ class _Bends(EdgeDistances):
     that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has `fit_of` its
     edge when it was made, the value of the way, `INFINITY` once the line has been followed, and whether it is a guess:
     it shares an end with an edge that was hidden. All edges that were offered to a vertex are in `lists` that begin at
-    `met` (n,). No way to a vertex is longer than its `bound`. Edges begin from one end if it `is_lone`.
+    `met` (n,). There is room for `most_offers` and `most_lists`. No way to a vertex is longer than its `bound`. Edges begin from one end if it `is_lone`.
     """
 
     fit_of: cython.int[::1]
@@ -101,7 +101,8 @@ class _Bends(EdgeDistances):
     lists: cython.pointer[_Met]
     n_offers: cython.int
     n_lists: cython.int
-    n_most: cython.int
+    most_offers: cython.size_t
+    most_lists: cython.size_t
     failed: cython.bint
     is_lone: cython.bint
     is_guess: cython.bint
@@ -177,10 +178,11 @@ class _Bends(EdgeDistances):
     def offer(self, i: cython.int, v: cython.int, least: cython.double) -> cython.void:
         """Make an edge a candidate for v, which waits, if the way around it would be shorter and v has not met it."""
         here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
-        if self.has_met(v, self.fit_of[i]):
+        most: cython.double = self.most(v)
+        if self.edge[i].least >= most or self.has_met(v, self.fit_of[i]):
             return
-        value: cython.double = self.around(i, here, False)
-        if value < least or value >= self.most(v) or self.lacks_room():
+        value: cython.double = self.around(i, here, most)
+        if value < least or value >= most or self.lacks_room():
             return
         k: cython.int = self.met[v]
         if k < 0 or self.lists[k].count == 14:
@@ -216,16 +218,18 @@ class _Bends(EdgeDistances):
     @cython.nogil
     def lacks_room(self) -> cython.bint:
         """Whether there is no memory for one more offer and one more list."""
-        if max(self.n_offers, self.n_lists) == self.n_most:
-            most: cython.size_t = 2 * cython.cast(cython.size_t, self.n_most) + 1024
-            offers: cython.p_void = realloc(self.offers, most * cython.sizeof(_Offer))
-            if offers != cython.NULL:
-                self.offers = cython.cast(cython.pointer[_Offer], offers)
-            lists: cython.p_void = realloc(self.lists, most * cython.sizeof(_Met))
-            if lists != cython.NULL:
-                self.lists = cython.cast(cython.pointer[_Met], lists)
-            self.failed = offers == cython.NULL or lists == cython.NULL
-            self.n_most = 0 if self.failed else cython.cast(cython.int, most)
+        if self.n_offers == self.most_offers:
+            self.most_offers = 2 * self.most_offers + 8 * self.d.shape[0]
+            found: cython.p_void = realloc(self.offers, self.most_offers * cython.sizeof(_Offer))
+            self.failed = found == cython.NULL
+            if not self.failed:
+                self.offers = cython.cast(cython.pointer[_Offer], found)
+        if self.n_lists == self.most_lists and not self.failed:
+            self.most_lists = 2 * self.most_lists + 2 * self.d.shape[0]
+            found = realloc(self.lists, self.most_lists * cython.sizeof(_Met))
+            self.failed = found == cython.NULL
+            if not self.failed:
+                self.lists = cython.cast(cython.pointer[_Met], found)
         return self.failed
 
     @cython.cfunc

@@ -3,32 +3,35 @@ from heat_igl.kernels.bodies.rays cimport Line, Ray
 
 cdef struct Piece:
     double begin, value, slope, lean
-    int label
 
 
-# All that is known of an edge stands together, as it is read. The first 25 numbers are set when it is made.
+# All that is known of an edge stands together, in the order in which it is read, in nine lines of the processor's cache:
+# for most candidates, the first one tells that they are too far. What stands before `pieces` is set when it is made.
 cdef struct Edge:
-    double tangent[3]
     double end[3]
-    double length, fits, along, height, start
-    double at[5]
+    double tangent[3]
+    double least
+    int count, fits
     double outward[3]
     double across[3]
-    double wall
     double before[2]
+    double wall, length, along, height, start
+    double at[5]
     # Between five points, and one more between each two.
     Piece pieces[9]
-    int count
+    int label[9]
+    # Up to the end of a line.
+    double unused[5]
 
 
 cdef class EdgeDistances(Ray):
     cdef const int[:, ::1] edges
     cdef int n_edges
-    cdef double[:, ::1] table
+    cdef double[::1] table
     cdef Edge* edge
     cdef int[::1] way
     cdef double bend[3]
-    cdef double share, slope
+    cdef double place, whole, share, slope
     cdef int[::1] at_end, first_at_end, point_of
     cdef unsigned char[::1] followed
     cdef int refuted, front, origin, point, n_near
@@ -49,8 +52,10 @@ cdef class EdgeDistances(Ray):
     cdef void lay_flat(self, int i, int a, int b) noexcept nogil
     cdef double shortest_to(self, int i, const double* x, double most) noexcept nogil
     cdef void add_at(self, int e, int v, const double* x, double most) noexcept nogil
+    cdef void add_beside(self, int e, const double* x, double most) noexcept nogil
     cdef void add(self, int e, int i, const double* x, double most) noexcept nogil
-    cdef double around(self, int i, const double* x, bint is_placed) noexcept nogil
+    cdef double around(self, int i, const double* x, double most) noexcept nogil
     cdef void look_back(self, int f, const double* x) noexcept nogil
     cdef bint is_lit(self, int e, int f, const double* x) noexcept nogil
+    cdef bint leaves_at_once(self, int e, const double* x) noexcept nogil
     cdef bint is_hidden_from_before(self, int i, const double* x, double size) noexcept nogil

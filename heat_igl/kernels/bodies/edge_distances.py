@@ -49,12 +49,16 @@ class EdgeDistances(Ray):
         # A vertex as an edge has a length that divides.
         lengths = np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1, keepdims=True), 1e-300)
         tangent = (ends[:, 1] - ends[:, 0]) / lengths
-        beyond, across = np.full((e, 5), np.inf), np.cross(tangent, outward)
-        known = [tangent, ends[:, 0], lengths, np.zeros((e, 4)), beyond, outward, across, np.asarray(wall)[:, None]]
-        self.table = np.zeros((e, cython.sizeof(Edge) // cython.sizeof(cython.double)))
-        np.asarray(self.table)[:, : sum(x.shape[1] for x in known)] = np.concatenate(known, axis=1)
-        if e > 0:
-            self.edge = cython.cast(cython.pointer[Edge], cython.address(self.table[0, 0]))
+        beyond, across = np.full((e, 1), np.inf), np.cross(tangent, outward)
+        known = [ends[:, 0], tangent, beyond, np.zeros((e, 1)), outward, across, np.zeros((e, 2))]
+        known += [np.asarray(wall)[:, None], lengths, np.zeros((e, 3)), beyond.repeat(5, axis=1)]
+        size: cython.int = cython.sizeof(Edge) // cython.sizeof(cython.double)
+        self.table = np.zeros((e + 1) * size)
+        # From the next beginning of a line of the cache on.
+        skipped: cython.int = -(cython.cast(cython.size_t, cython.address(self.table[0])) // 8) % 8
+        rows = np.asarray(self.table)[skipped : skipped + e * size].reshape(e, size)
+        rows[:, : sum(numbers.shape[1] for numbers in known)] = np.concatenate(known, axis=1)
+        self.edge = cython.cast(cython.pointer[Edge], cython.address(self.table[skipped]))
         self.edges, self.n_edges, self.way = edges, e, way
         self.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
         self.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
@@ -103,7 +107,9 @@ class EdgeDistances(Ray):
             if front[4 * c] >= 0 and not edge.fits:
                 self.look_back(front[4 * c], cython.address(self.body.positions[self.edges[i, c], 0]))
                 slope[4 * c] = self.slope_along(i)
-        edge.count = 0
+        edge.count, edge.least = 0, INFINITY
+        if edge.fits and 0 < edge.along < edge.length:
+            edge.least = edge.start + edge.height
         for j in range(5):
             if j > 0 and follows and not edge.fits:
                 hidden: cython.bint = front[j - 1] != front[j]
@@ -157,7 +163,8 @@ class EdgeDistances(Ray):
         """Let a piece of an edge begin at a place and a distance, where the one before it ends."""
         edge: cython.pointer[Edge] = cython.address(self.edge[i])
         piece: cython.pointer[Piece] = cython.address(edge.pieces[edge.count])
-        piece.begin, piece.value, piece.label = begin, value, label
+        piece.begin, piece.value, edge.label[edge.count] = begin, value, label
+        edge.least = min(edge.least, value)
         if edge.count > 0:
             last: cython.pointer[Piece] = cython.address(edge.pieces[edge.count - 1])
             last.slope = max(-1.0, min((value - last.value) / (begin - last.begin), 1.0))
@@ -172,7 +179,7 @@ class EdgeDistances(Ray):
         for j in range(1, edge.count):
             if fabs(edge.pieces[j].begin - place) < fabs(edge.pieces[best].begin - place):
                 best = j
-        return edge.pieces[best].label
+        return edge.label[best]
 
     def front_at(self, v: cython.int) -> cython.int:
         """The edge around which the way to v bends last; if that is straight, e added to its source; -2 if unknown."""
@@ -181,7 +188,7 @@ class EdgeDistances(Ray):
     def from_front(self, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
         """The way to a point that comes from an edge or a source, as `front_at` numbers them."""
         if f < self.n_edges:
-            return self.around(f, x, False)
+            return self.around(f, x, INFINITY)
         return self.offset[f - self.n_edges] + self.body.away(self.sources[f - self.n_edges], x)
 
     def point_along(self, i: cython.int, j: cython.double, x: cython.pointer[cython.double]) -> cython.void:
@@ -236,8 +243,8 @@ class EdgeDistances(Ray):
 
         It bends last around an edge at an end of i, around an edge around which the way to such an end or to one of its
         neighbours does, around one that shares an end with such an edge, or around an edge at a triangle that hides
-        another candidate. Or it is the straight line from
-        the source of an end, if one of them sees a source.
+        another candidate, at both walls of i if it is hidden at once. Or it is the straight line from the source of an
+        end, if one of them sees a source.
         """
         self.n_near, self.point = 0, self.point + 1
         self.point_of[i] = self.point
@@ -278,9 +285,28 @@ class EdgeDistances(Ray):
                 else:
                     self.refuted = front
                 continue
-            for c in range(1, 4):
-                self.add_at(i, self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
+            if self.line.t < 0:
+                self.add_beside(i, x, most)
+            else:
+                for c in range(1, 4):
+                    self.add_at(i, self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
         return most
+
+    def add_beside(
+        self, e: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
+    ) -> cython.void:
+        """Make the edges at the walls beside edge e candidates for its `point` x."""
+        a: cython.int = self.edges[e, 0]
+        b: cython.int = self.edges[e, 1]
+        for k in range(self.body.first[a], self.body.first[a + 1]):
+            t: cython.int = self.body.incident[k] >> 2
+            at: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[t, 0])
+            if b in (at[0], at[1], at[2], at[3]):
+                # A wall opposite corner c, with corner w besides the ends of the edge.
+                for c in range(4):
+                    for w in range(4):
+                        if at[4 + c] < 0 and w != c and at[c] not in (a, b) and at[w] not in (a, b):
+                            self.add_at(e, at[w], x, most)
 
     def add_at(
         self, e: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
@@ -295,16 +321,20 @@ class EdgeDistances(Ray):
         """Make edge i one of 256 candidates (65 at most so far) for the `point` x of e if its way may be shorter."""
         if self.point_of[i] != self.point:
             self.point_of[i] = self.point
-            value: cython.double = self.around(i, x, False)
-            is_shorter: cython.bint = value < most * (1 - GAIN) and self.n_near < 256
+            most *= 1 - GAIN
+            value: cython.double = self.around(i, x, most)
+            is_shorter: cython.bint = value < most and self.n_near < 256
             if is_shorter and self.is_hidden_from_before(i, x, self.edge[e].length):
                 self.near[self.n_near], self.near_value[self.n_near] = i, value
                 self.n_near += 1
 
     def around(
-        self, i: cython.int, x: cython.pointer[cython.const[cython.double]], is_placed: cython.bint
+        self, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
     ) -> cython.double:
-        """Length of the way to a point that bends around an edge last; if it `is_placed`, sets `bend` and `share`."""
+        """Length of the way to a point that bends around an edge last, at `place` / `whole`, if it is below `most`.
+
+        Otherwise something that is not, without a look at the pieces where the `least` distance tells.
+        """
         edge: cython.pointer[Edge] = cython.address(self.edge[i])
         away: cython.double = 0.0
         along: cython.double = 0.0
@@ -314,30 +344,38 @@ class EdgeDistances(Ray):
             along += off * edge.tangent[k]
         squared: cython.double = max(away - along * along, 0.0)
         height: cython.double = sqrt(squared)
-        both: cython.double = height + edge.height
-        place: cython.double = edge.along * height + along * edge.height
+        if edge.least + height >= most:
+            return INFINITY
+        if edge.fits:
+            both: cython.double = height + edge.height
+            self.place, self.whole = edge.along * height + along * edge.height, both * edge.length
+            if 0 < self.place < self.whole:
+                return edge.start + sqrt((along - edge.along) * (along - edge.along) + both * both)
+        self.whole = edge.length
         best: cython.double = INFINITY
-        if edge.fits and 0 < place < both * edge.length:
-            best = edge.start + sqrt((along - edge.along) * (along - edge.along) + both * both)
-        else:
-            both = 1.0
-            for j in range(edge.count):
-                if edge.fits and 0 < j < edge.count - 1:
+        # The way bends where it meets a piece with its lean, or between two of which neither has such a place.
+        comes_to_end: cython.bint = True
+        for j in range(edge.count):
+            piece: cython.pointer[Piece] = cython.address(edge.pieces[j])
+            begin: cython.double = piece.begin
+            through: cython.double = piece.value
+            if edge.fits:
+                if 0 < j < edge.count - 1:
                     continue
-                piece: cython.pointer[Piece] = cython.address(edge.pieces[j])
-                begin: cython.double = piece.begin
-                through: cython.double = piece.value
-                if not edge.fits and j < edge.count - 1:
-                    off = max(0.0, min(along - piece.lean * height, edge.pieces[j + 1].begin) - begin)
+            elif j < edge.count - 1:
+                off = along - piece.lean * height - begin
+                came_to_end: cython.bint = comes_to_end
+                comes_to_end = off >= edge.pieces[j + 1].begin - begin
+                if comes_to_end or (off <= 0 and not came_to_end):
+                    continue
+                if off > 0:
                     through += piece.slope * off
                     begin += off
-                through += sqrt(squared + (along - begin) * (along - begin))
-                if through < best:
-                    best, place = through, begin
-        if is_placed:
-            self.share = place / (both * edge.length)
-            for k in range(3):
-                self.bend[k] = edge.end[k] + self.share * edge.length * edge.tangent[k]
+            elif not comes_to_end:
+                continue
+            through += sqrt(squared + (along - begin) * (along - begin))
+            if through < best:
+                best, self.place = through, begin
         return best
 
     def look_back(self, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
@@ -345,7 +383,10 @@ class EdgeDistances(Ray):
         line: cython.pointer[Line] = cython.address(self.line)
         line.origin = x
         if f < self.n_edges:
-            self.around(f, x, True)
+            self.around(f, x, INFINITY)
+            self.share = self.place / self.whole
+            for k in range(3):
+                self.bend[k] = self.edge[f].end[k] + self.share * self.edge[f].length * self.edge[f].tangent[k]
             line.goal = self.bend
             line.goal_a = self.edges[f, 1 if self.share > 1 - NUDGE else 0]
             line.goal_b = self.edges[f, 0 if self.share < NUDGE else 1]
@@ -354,9 +395,12 @@ class EdgeDistances(Ray):
             line.goal = cython.address(self.body.positions[line.goal_a, 0])
 
     def is_lit(self, e: cython.int, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
-        """Whether the line back from a point x of edge e, as of `look_back`, stays inside."""
+        """Whether the line back from a point x of edge e, as of `look_back`, stays inside; t is -1 if it never is."""
         self.look_back(f, x)
         line: cython.pointer[Line] = cython.address(self.line)
+        line.t = -1
+        if self.leaves_at_once(e, x):
+            return False
         a: cython.int = self.edges[e, 0]
         b: cython.int = self.edges[e, 1]
         for k in range(self.body.first[a], self.body.first[a + 1]):
@@ -367,6 +411,17 @@ class EdgeDistances(Ray):
                 if found > 0 or (found == -1 and self.is_blocked(line, 2 * NUDGE * self.body.reach[a])):
                     return found > 0
         return False
+
+    def leaves_at_once(self, e: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
+        """Whether the `line` from a point x of edge e begins between the two walls outside the body."""
+        edge: cython.pointer[Edge] = cython.address(self.edge[e])
+        out: cython.double = 0.0
+        side: cython.double = 0.0
+        for k in range(3):
+            off: cython.double = self.line.goal[k] - x[k]
+            out += off * edge.outward[k]
+            side += off * edge.across[k]
+        return out - edge.wall * sqrt(out * out + side * side) > _LEVEL * edge.length
 
     def is_hidden_from_before(
         self, i: cython.int, x: cython.pointer[cython.const[cython.double]], size: cython.double
