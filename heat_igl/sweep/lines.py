@@ -59,7 +59,8 @@ class LineEngine(SimplexEngine):
     def reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
         """Boundary edges at which the inside takes more than half a turn, and edges where more than two walls meet.
 
-        A vertex at which parts of the body touch is an edge from itself to itself. Returns the edges (e, 2) int32; unit
+        A vertex at which parts of the body touch, or only one of these edges ends, is an edge from itself to itself:
+        where the place at which a way would bend is hidden, its end may be seen. Returns the edges (e, 2) int32; unit
         vectors (e, 3) out of the body, halfway between the two walls, zero where more than two meet; and cosines (e,)
         of the angles between these vectors and the walls.
         """
@@ -95,6 +96,9 @@ class LineEngine(SimplexEngine):
         fan = csgraph.connected_components(sp.coo_array((np.ones(pairs.shape[1]), pairs), shape=2 * (walls.size,)))[1]
         n_fans = np.bincount(walls.ravel()[np.unique(fan, return_index=True)[1]])
         touching = np.setdiff1d(np.flatnonzero(n_fans > 1), edges[counts > 2])
+        # Without them, ways were up to 12 % too long on rough walls.
+        lone = np.flatnonzero(np.bincount(edges[bends].ravel(), minlength=len(V)) == 1)
+        touching = np.union1d(touching, lone)
         found = self._order[np.concatenate([edges[bends], np.stack([touching, touching], axis=1)])].astype(np.int32)
         cosine = np.einsum("ij,ij->i", along_wall[one], outward)[bends]
         return found, np.pad(outward[bends], ((0, len(touching)), (0, 0))), np.pad(cosine, (0, len(touching)))

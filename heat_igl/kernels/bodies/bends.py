@@ -91,7 +91,8 @@ class _Bends(EdgeDistances):
     that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has `fit_of` its
     edge when it was made, the value of the way, `INFINITY` once the line has been followed, and whether it is a guess:
     it shares an end with an edge that was hidden. All edges that were offered to a vertex are in `lists` that begin at
-    `met` (n,). There is room for `most_offers` and `most_lists`. No way to a vertex is longer than its `bound`. Edges begin from one end if it `is_lone`.
+    `met` (n,); there is room for `most_offers` and `most_lists`. No way to a vertex is longer than its `bound`. Edges
+    begin from one end if it `is_lone`.
     """
 
     fit_of: cython.int[::1]
