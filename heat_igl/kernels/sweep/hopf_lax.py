@@ -109,7 +109,9 @@ class HopfLax:
             The visited vertices, the source included, in ascending order, and their distances.
         """
         # In strongly anisotropic metrics, distances depend on larger ones: so these updates are limited.
-        left: cython.Py_ssize_t = len(limit) // 2
+        # With 1/2 to 2/3 of the vertices, few errors differ, those of coarse discs by up to 3 %. With 1/2, the largest
+        # one in fibres 1 : 18 is 2.3 in place of 1.4 %; with 2/3, 10 % at a vertex of fibres that make triangles thin.
+        left: cython.Py_ssize_t = 4 * len(limit) // 7
         self.limit, self.low, self.update.start = limit, start, start
         with cython.nogil:
             for at in range(self.n_reached):
@@ -373,8 +375,11 @@ class HopfLax:
                 elif (
                     most <= self.pending[u]
                     or depends
-                    or (self.d[v] < self.d[u] and not is_open)
-                    or (is_new and not is_open and self.update.through(s, c, self.d[u], own) < self.d[u])
+                    or (
+                        not is_open
+                        and (is_new or (most > change and self.d[v] < self.d[u]))
+                        and self.update.through(s, c, self.d[u], own if self.d[v] >= self.d[u] else -1) < self.d[u]
+                    )
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
                     if self.left > 0:
