@@ -425,11 +425,7 @@ def test_files_are_read_back_as_written(tmp_path, torus):
 # --- The drop-ins for gdist and pygeodesic: the numbers of these libraries, from their calls
 
 
-def two_parts() -> Mesh:
-    return twice(shapes.grid(4), 3)
-
-
-@pytest.fixture(params=[lambda: bumpy(2), two_parts, lambda: shapes.torus(14, 9)], ids=["bumpy", "two parts", "torus"])
+@pytest.fixture(params=[lambda: bumpy(2), lambda: twice(shapes.grid(4), 3), lambda: shapes.torus(14, 9)])
 def mesh(request):
     return request.param()
 
