@@ -52,6 +52,7 @@ cdef class EdgeDistances(Ray):
     cdef void lay_flat(self, int i, int a, int b) noexcept nogil
     cdef double shortest_to(self, int i, const double* x, double most) noexcept nogil
     cdef void add_at(self, int e, int v, const double* x, double most) noexcept nogil
+    cdef int next_around(self, int e, int k) noexcept nogil
     cdef void add_beside(self, int e, const double* x, double most) noexcept nogil
     cdef void add(self, int e, int i, const double* x, double most) noexcept nogil
     cdef double around(self, int i, const double* x, double most) noexcept nogil

@@ -298,15 +298,27 @@ class EdgeDistances(Ray):
         """Make the edges at the walls beside edge e candidates for its `point` x."""
         a: cython.int = self.edges[e, 0]
         b: cython.int = self.edges[e, 1]
-        for k in range(self.body.first[a], self.body.first[a + 1]):
-            t: cython.int = self.body.incident[k] >> 2
-            at: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[t, 0])
-            if b in (at[0], at[1], at[2], at[3]):
-                # A wall opposite corner c, with corner w besides the ends of the edge.
-                for c in range(4):
-                    for w in range(4):
-                        if at[4 + c] < 0 and w != c and at[c] not in (a, b) and at[w] not in (a, b):
-                            self.add_at(e, at[w], x, most)
+        k: cython.int = self.next_around(e, self.body.first[a])
+        while k >= 0:
+            at: cython.pointer[cython.const[cython.int]] = cython.address(
+                self.body.cells[self.body.incident[k] >> 2, 0]
+            )
+            # A wall opposite corner c, with corner w besides the ends of the edge.
+            for c in range(4):
+                for w in range(4):
+                    if at[4 + c] < 0 and w != c and at[c] not in (a, b) and at[w] not in (a, b):
+                        self.add_at(e, at[w], x, most)
+            k = self.next_around(e, k + 1)
+
+    def next_around(self, e: cython.int, k: cython.int) -> cython.int:
+        """The place from k on at which the next tetrahedron around edge e is `incident` to its first end, or -1."""
+        for i in range(k, self.body.first[self.edges[e, 0] + 1]):
+            at: cython.pointer[cython.const[cython.int]] = cython.address(
+                self.body.cells[self.body.incident[i] >> 2, 0]
+            )
+            if self.edges[e, 1] in (at[0], at[1], at[2], at[3]):
+                return i
+        return -1
 
     def add_at(
         self, e: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
@@ -402,14 +414,12 @@ class EdgeDistances(Ray):
         if self.leaves_at_once(e, x):
             return False
         a: cython.int = self.edges[e, 0]
-        b: cython.int = self.edges[e, 1]
-        for k in range(self.body.first[a], self.body.first[a + 1]):
-            t: cython.int = self.body.incident[k] >> 2
-            at: cython.pointer[cython.const[cython.int]] = cython.address(self.body.cells[t, 0])
-            if b in (at[0], at[1], at[2], at[3]):
-                found: cython.int = self.arrives(line, 4 * t, -1, -1)
-                if found > 0 or (found == -1 and self.is_blocked(line, 2 * NUDGE * self.body.reach[a])):
-                    return found > 0
+        k: cython.int = self.next_around(e, self.body.first[a])
+        while k >= 0:
+            found: cython.int = self.arrives(line, self.body.incident[k] & ~3, -1, -1)
+            if found > 0 or (found == -1 and self.is_blocked(line, 2 * NUDGE * self.body.reach[a])):
+                return found > 0
+            k = self.next_around(e, k + 1)
         return False
 
     def leaves_at_once(self, e: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
