@@ -3,6 +3,7 @@
     python scripts/metrics_table.py metrics [--rows 48]        # tensors, speeds and two speeds, closed forms
     python scripts/metrics_table.py bodies [--points 20000]    # tetrahedra with closed forms
     python scripts/metrics_table.py walls [octopus.mesh ...]   # bodies with concave walls, or these files
+    python scripts/metrics_table.py asymmetry [--sources 60]   # the way there and back in these bodies
     python scripts/metrics_table.py layers [--border 24]       # layers of metrics
     python scripts/metrics_table.py faces [--edge 20]          # a metric per face
     python scripts/metrics_table.py images [--edge 20]         # a speed per pixel
@@ -19,6 +20,8 @@ seconds to make the solver and for a query.
 walls: bodies cut out of even or random tetrahedra, against the same solver on tetrahedra halved twice, or once on more
 than 3000 vertices: "finer" is an upper bound. Edges around which paths bend; the mean of |d - finer| / finer, the
 largest differences, and how much the worst is below the straight line; milliseconds of a query, over heat in turn.
+asymmetry: the same bodies, and distances between ``--sources`` vertices: how much longer one way is than back, at most,
+in percent, and of how many pairs by more than .3 %.
 layers, faces and images: Delaunay triangles of random points, or pixels, rotated, against shortest ways through
 ``--border`` points on each edge of a border, or ``--edge`` on all; mean and largest error, also with half as many
 points, and per face of fim-python; ``--count`` meshes each.
@@ -304,6 +307,15 @@ def in_walls(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
         row |= {"mean": np.abs(error).mean(), "longer": max(error.max(), 0), "shorter": max(-error.min(), 0)}
         row |= {"ms": 1e3 * np.median(took, axis=0)[0], "ratio": ratio}
         yield row | {"below": below_lines(mesh.V, sources, found)}
+
+
+def both_ways(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
+    for name, make in WALLS.items():
+        mesh = make(rng)
+        ends, query = rng.choice(np.unique(mesh.F), options.sources, replace=False), METHODS["default"](mesh)
+        there = np.array([query(i)[ends] for i in ends.tolist()])
+        longer = 100 * (there - there.T) / np.maximum(there.T, np.finfo(float).tiny)
+        yield {"body": name, "n": mesh.n_vertices, "most": longer.max(), "count": (longer > 0.3).sum()}
 
 
 # Layers, and a metric for each face.
@@ -769,6 +781,9 @@ TABLES: dict[str, tuple[Callable[[argparse.Namespace, Random], Iterator[Row]], d
         "body": "{body}", "vertices": "{n}", "edges": "{edges}", "mean, %": "{mean:.2g}", "longer, %": "{longer:.2g}",
         "shorter, %": "{shorter:.2g}", "below lines, %": "{below:.2g}", "ms": "{ms:.0f}",
         "ratio to heat": "{ratio:.2g}",
+    }),
+    "asymmetry": (both_ways, {
+        "body": "{body}", "vertices": "{n}", "longer than back, %": "{most:.2g}", "pairs by more than .3 %": "{count}",
     }),
     "layers": (on_layers, {"layers": "{case}"} | mean_and_largest(
         border="source on the border", beside="1.5 edges away", middle="in the middle", **HALF
