@@ -278,46 +278,36 @@ class MultifrontalFactorization:
     def solve(self, b: FloatArray) -> FloatArray:
         """Solve A x = b on the free vertices for one right-hand side (n,) or several (n, k); 0 on the others."""
         x, width = np.empty(b.shape), _solves.width
-        if b.ndim == 1:
-            self._solve(b, x)
-            return x
-        for first in range(0, b.shape[1], width):
-            columns, solved = b[:, first : first + width], x[:, first : first + width]
-            if columns.shape[1] < _FEW:
-                for i in range(columns.shape[1]):
-                    self._solve(columns[:, i], solved[:, i])
-            else:
-                self._solve(columns, solved)
+        given, solved = b.reshape(len(b), -1), x.reshape(len(b), -1)
+        for first in range(0, given.shape[1], width):
+            until = min(first + width, given.shape[1])
+            step = width if until - first >= _FEW else 1
+            for i in range(first, until, step):
+                self._solve(given[:, i : i + step], solved[:, i : i + step])
         return x
 
     def _solve(self, b: FloatArray, x: FloatArray) -> None:
-        """Write the solution for b, (n,) or at most as many columns as a block has, to x."""
-        order, place, k = self._arguments[0].order, self._arguments[0].place, b.shape[1:]
-        if k:
-            ordered = np.zeros((len(place), _solves.width))
-            ordered[:, : k[0]] = b[order]
-        else:
-            ordered = b[order].astype(np.float64, copy=False)
+        """Write the solution for b, (n, 1) or at most as many columns as a block has, to x."""
+        order, place, k = self._arguments[0].order, self._arguments[0].place, b.shape[1]
+        ordered = np.zeros((len(place), 1 if k == 1 else _solves.width))
+        ordered[:, :k] = b.take(order, axis=0)
         ordered[self._held] = 0.0
         self._substitute(ordered)
-        np.take(ordered[:, : k[0]] if k else ordered, place, axis=0, out=x, mode="clip")
+        np.take(ordered[:, :k], place, axis=0, out=x, mode="clip")
 
     def _substitute(self, x: FloatArray) -> None:
-        """Solve in place for x, (n,) or a block, in the order of elimination, on this thread's processors."""
+        """Solve in place for x, (n, 1) or a block, in the order of elimination, on this thread's processors."""
         kernel, end_entry = self._kernel, self._fronts.end_entry
-        forward, back = (
-            (kernel.forward_one, kernel.back_one) if x.ndim == 1 else (kernel.forward_block, kernel.back_block)
-        )
         last = len(end_entry) - 2
         k = max(1, min(n_threads(), last))
         shares = np.searchsorted(end_entry[:last], np.arange(k + 1) / k * end_entry[last])
         ranges = list(pairwise(shares))
-        sums = np.zeros((last + 1, len(self._above), *x.shape[1:]))
-        side_by_side(lambda pieces: forward(x, *pieces, sums), ranges)
+        sums = np.zeros((last + 1, len(self._above), x.shape[1]))
+        side_by_side(lambda pieces: kernel.forward(x, *pieces, sums), ranges)
         x[self._above] -= sums.sum(axis=0)
-        forward(x, last, last + 1, sums)
-        back(x, last, last + 1)
-        side_by_side(lambda pieces: back(x, *pieces), ranges)
+        kernel.forward(x, last, last + 1, sums)
+        kernel.back(x, last, last + 1)
+        side_by_side(lambda pieces: kernel.back(x, *pieces), ranges)
 
     def __reduce__(
         self,

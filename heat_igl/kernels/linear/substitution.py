@@ -34,140 +34,105 @@ class TriangularSolves:
         self.own_rows, self.above = fronts.own_rows, fronts.above
         self.most_rows = int(np.diff(fronts.first_row).max(initial=1))
 
-    def forward_one(
-        self, x: cython.double[::1], first: cython.Py_ssize_t, until: cython.Py_ssize_t, sums: cython.double[:, ::1]
-    ):
-        """Eliminate the columns of the pieces `first` to `until` from x (n,).
-
-        ``sums[piece]`` takes the amount that a piece subtracts from the rows above all pieces.
-        """
-        room: cython.double[::1] = np.empty(self.most_rows)
-        below: numbers = cython.address(room[0])
-        with cython.nogil:
-            for piece in range(first, until):
-                for p in range(self.piece_end[piece], self.piece_end[piece + 1]):
-                    b: cython.Py_ssize_t = self.pieces[p]
-                    start: cython.Py_ssize_t = self.start[b]
-                    columns: cython.Py_ssize_t = self.start[b + 1] - start
-                    row: cython.Py_ssize_t = self.first_row[b]
-                    left: cython.Py_ssize_t = self.first_row[b + 1] - row
-                    own: numbers = cython.address(x[start])
-                    # Of a source's heat, most fronts have none on the way forward.
-                    if _all_zero(own, columns):
-                        continue
-                    column: entries = cython.address(self.L[self.first_entry[b]])  # from the diagonal on
-                    ahead: cython.p_char = cython.cast(cython.p_char, column) - AHEAD
-                    for i in range(left):
-                        below[i] = 0.0
-                    for j in range(columns):
-                        y: cython.double = own[j]
-                        for i in range(0, 8 * (columns - j + left), 64):
-                            prefetch(ahead - i)
-                        ahead -= 8 * (columns - j + left)
-                        for i in range(1, columns - j):
-                            own[j + i] -= column[i] * y
-                        column += columns - j
-                        for i in range(left):
-                            below[i] += column[i] * y
-                        column += left
-                    for i in range(self.own_rows[b]):
-                        x[self.rows[row + i]] -= below[i]
-                    for i in range(self.own_rows[b], left):
-                        sums[piece, self.above[self.rows[row + i]]] += below[i]
-
-    def back_one(self, x: cython.double[::1], first: cython.Py_ssize_t, until: cython.Py_ssize_t):
-        """Solve for the columns of some pieces in x (n,), given those above."""
-        room: cython.double[::1] = np.empty(self.most_rows)
-        below: numbers = cython.address(room[0])
-        with cython.nogil:
-            for p in range(self.piece_end[until] - 1, self.piece_end[first] - 1, -1):
-                b: cython.Py_ssize_t = self.pieces[p]
-                start: cython.Py_ssize_t = self.start[b]
-                columns: cython.Py_ssize_t = self.start[b + 1] - start
-                row: cython.Py_ssize_t = self.first_row[b]
-                left: cython.Py_ssize_t = self.first_row[b + 1] - row
-                own: numbers = cython.address(x[start])
-                column: entries = cython.address(self.L[self.first_entry[b]])
-                for i in range(left):
-                    below[i] = x[self.rows[row + i]]
-                for j in range(columns):
-                    pivot: cython.double = column[0]
-                    column += columns - j
-                    total = 0.0
-                    for i in range(left):
-                        total += column[i] * below[i]
-                    own[j] = own[j] / pivot - total
-                    column += left
-                for j in range(columns - 1, -1, -1):
-                    column -= columns - j + left
-                    total = 0.0
-                    for i in range(1, columns - j):
-                        total += column[i] * own[j + i]
-                    own[j] -= total
-
-    def forward_block(
+    def forward(
         self,
         x: cython.double[:, ::1],
         first: cython.Py_ssize_t,
         until: cython.Py_ssize_t,
         sums: cython.double[:, :, ::1],
     ):
-        """As `forward_one`, for x (n, WIDTH)."""
-        c: cython.Py_ssize_t
-        room: cython.double[:, ::1] = np.empty((self.most_rows, WIDTH))
-        below: numbers = cython.address(room[0, 0])
+        """Eliminate the columns of the pieces `first` to `until` from x, (n, 1) or (n, WIDTH).
+
+        ``sums[piece]`` takes the amount that a piece subtracts from the rows above all pieces.
+        """
+        room: cython.double[::1] = np.empty(self.most_rows * x.shape[1])
+        below: numbers = cython.address(room[0])
         with cython.nogil:
             for piece in range(first, until):
-                for p in range(self.piece_end[piece], self.piece_end[piece + 1]):
-                    b: cython.Py_ssize_t = self.pieces[p]
-                    start: cython.Py_ssize_t = self.start[b]
-                    columns: cython.Py_ssize_t = self.start[b + 1] - start
-                    row: cython.Py_ssize_t = self.first_row[b]
-                    left: cython.Py_ssize_t = self.first_row[b + 1] - row
-                    size: cython.Py_ssize_t = columns + left
-                    own: numbers = cython.address(x[start, 0])
-                    if _all_zero(own, columns * WIDTH):
-                        continue
-                    panel: entries = cython.address(self.L[self.first_entry[b]])
-                    for j in range(columns):
-                        for i in range(j + 1, columns):
-                            _subtract_row(own + i * WIDTH, panel[in_panel(j, i, size)], own + j * WIDTH)
-                    for i in range(left * WIDTH):
-                        below[i] = 0.0
-                    _add_below(panel, columns, left, own, below)
-                    for i in range(self.own_rows[b]):
-                        for c in range(WIDTH):
-                            x[self.rows[row + i], c] -= below[i * WIDTH + c]
-                    for i in range(self.own_rows[b], left):
-                        for c in range(WIDTH):
-                            sums[piece, self.above[self.rows[row + i]], c] += below[i * WIDTH + c]
+                # With the width as a number, loops over the columns of a block become vectors, or vanish.
+                if x.shape[1] == 1:
+                    _forward(self, 1, piece, cython.address(x[0, 0]), below, sums)
+                else:
+                    _forward(self, WIDTH, piece, cython.address(x[0, 0]), below, sums)
 
-    def back_block(self, x: cython.double[:, ::1], first: cython.Py_ssize_t, until: cython.Py_ssize_t):
-        """As `back_one`, for x (n, WIDTH)."""
-        c: cython.Py_ssize_t
-        room: cython.double[:, ::1] = np.empty((self.most_rows, WIDTH))
-        below: numbers = cython.address(room[0, 0])
+    def back(self, x: cython.double[:, ::1], first: cython.Py_ssize_t, until: cython.Py_ssize_t):
+        """Solve for the columns of some pieces in x, (n, 1) or (n, WIDTH), given those above."""
+        room: cython.double[::1] = np.empty(self.most_rows * x.shape[1])
+        below: numbers = cython.address(room[0])
         with cython.nogil:
-            for p in range(self.piece_end[until] - 1, self.piece_end[first] - 1, -1):
-                b: cython.Py_ssize_t = self.pieces[p]
-                start: cython.Py_ssize_t = self.start[b]
-                columns: cython.Py_ssize_t = self.start[b + 1] - start
-                row: cython.Py_ssize_t = self.first_row[b]
-                left: cython.Py_ssize_t = self.first_row[b + 1] - row
-                size: cython.Py_ssize_t = columns + left
-                own: numbers = cython.address(x[start, 0])
-                panel: entries = cython.address(self.L[self.first_entry[b]])
-                for i in range(left):
-                    for c in range(WIDTH):
-                        below[i * WIDTH + c] = x[self.rows[row + i], c]
-                for j in range(columns):
-                    pivot: cython.double = panel[in_panel(j, j, size)]
-                    for c in range(WIDTH):
-                        own[j * WIDTH + c] /= pivot
-                    _subtract_below(panel + in_panel(j, columns, size), left, below, own + j * WIDTH)
-                for j in range(columns - 1, -1, -1):
-                    for i in range(j + 1, columns):
-                        _subtract_row(own + j * WIDTH, panel[in_panel(j, i, size)], own + i * WIDTH)
+            if x.shape[1] == 1:
+                _back(self, 1, first, until, cython.address(x[0, 0]), below)
+            else:
+                _back(self, WIDTH, first, until, cython.address(x[0, 0]), below)
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _forward(
+    s: TriangularSolves,
+    width: cython.Py_ssize_t,
+    piece: cython.Py_ssize_t,
+    x: numbers,
+    below: numbers,
+    sums: cython.double[:, :, ::1],
+) -> cython.void:
+    """`TriangularSolves.forward` for one piece."""
+    c: cython.Py_ssize_t
+    for p in range(s.piece_end[piece], s.piece_end[piece + 1]):
+        b: cython.Py_ssize_t = s.pieces[p]
+        columns: cython.Py_ssize_t = s.start[b + 1] - s.start[b]
+        row: cython.Py_ssize_t = s.first_row[b]
+        left: cython.Py_ssize_t = s.first_row[b + 1] - row
+        size: cython.Py_ssize_t = columns + left
+        own: numbers = x + s.start[b] * width
+        # Of a source's heat, most fronts have none on the way forward.
+        if _all_zero(own, columns * width):
+            continue
+        panel: entries = cython.address(s.L[s.first_entry[b]])
+        for i in range(left * width):
+            below[i] = 0.0
+        _eliminate(panel, columns, left, own, below, width)
+        for i in range(s.own_rows[b]):
+            for c in range(width):
+                x[s.rows[row + i] * width + c] += below[i * width + c]
+        for i in range(s.own_rows[b], left):
+            for c in range(width):
+                sums[piece, s.above[s.rows[row + i]], c] -= below[i * width + c]
+
+
+@cython.cfunc
+@cython.inline
+@cython.nogil
+def _back(
+    s: TriangularSolves,
+    width: cython.Py_ssize_t,
+    first: cython.Py_ssize_t,
+    until: cython.Py_ssize_t,
+    x: numbers,
+    below: numbers,
+) -> cython.void:
+    """`TriangularSolves.back`."""
+    c: cython.Py_ssize_t
+    for p in range(s.piece_end[until] - 1, s.piece_end[first] - 1, -1):
+        b: cython.Py_ssize_t = s.pieces[p]
+        columns: cython.Py_ssize_t = s.start[b + 1] - s.start[b]
+        row: cython.Py_ssize_t = s.first_row[b]
+        left: cython.Py_ssize_t = s.first_row[b + 1] - row
+        size: cython.Py_ssize_t = columns + left
+        own: numbers = x + s.start[b] * width
+        panel: entries = cython.address(s.L[s.first_entry[b]])
+        for i in range(left):
+            for c in range(width):
+                below[i * width + c] = x[s.rows[row + i] * width + c]
+        for j in range(columns):
+            pivot: cython.double = panel[in_panel(j, j, size)]
+            for c in range(width):
+                own[j * width + c] /= pivot
+            _subtract_rows(panel + in_panel(j, columns, size), left, below, own + j * width, width)
+        for j in range(columns - 1, -1, -1):
+            behind: cython.Py_ssize_t = columns - j - 1
+            _subtract_rows(panel + in_panel(j, j + 1, size), behind, own + (j + 1) * width, own + j * width, width)
 
 
 @cython.cfunc
@@ -180,57 +145,75 @@ def _all_zero(x: entries, n: cython.Py_ssize_t) -> cython.bint:
 
 
 @cython.cfunc
+@cython.inline
 @cython.nogil
-def _subtract_row(target: numbers, entry: cython.double, row: entries) -> cython.void:
-    """Subtract a row, times an entry of the factor, from another."""
+def _subtract_from_rows(
+    rows: numbers, n: cython.Py_ssize_t, column: entries, own: entries, width: cython.Py_ssize_t
+) -> cython.void:
+    """Subtract `own`, times the entries of a column, from the n rows of the column."""
     c: cython.Py_ssize_t
-    for c in range(WIDTH):
-        target[c] -= entry * row[c]
+    for i in range(n):
+        for c in range(width):
+            rows[i * width + c] -= column[i] * own[c]
 
 
 @cython.cfunc
+@cython.inline
 @cython.nogil
-def _add_below(
-    panel: entries, columns: cython.Py_ssize_t, left: cython.Py_ssize_t, own: entries, below: numbers
+def _eliminate(
+    panel: entries,
+    columns: cython.Py_ssize_t,
+    left: cython.Py_ssize_t,
+    own: numbers,
+    below: numbers,
+    width: cython.Py_ssize_t,
 ) -> cython.void:
-    """Add the rows below the columns of a front, times `own`, to `below`; four columns per turn."""
-    size: cython.Py_ssize_t = columns + left
+    """Eliminate the columns of a front from `own`, and add the rows below them to `below`; four columns per turn."""
     c: cython.Py_ssize_t
     j: cython.Py_ssize_t = 0
-    while j + 4 <= columns:
-        c0: entries = panel + in_panel(j, columns, size)
-        c1: entries = panel + in_panel(j + 1, columns, size)
-        c2: entries = panel + in_panel(j + 2, columns, size)
-        c3: entries = panel + in_panel(j + 3, columns, size)
-        x: entries = own + j * WIDTH
-        for i in range(left):
-            for c in range(WIDTH):
-                below[i * WIDTH + c] += (c0[i] * x[c] + c1[i] * x[WIDTH + c]) + (
-                    c2[i] * x[2 * WIDTH + c] + c3[i] * x[3 * WIDTH + c]
-                )
-        j += 4
+    column: entries = panel  # from the diagonal on
+    ahead: cython.p_char = cython.cast(cython.p_char, panel) - AHEAD
     while j < columns:
-        column: entries = panel + in_panel(j, columns, size)
+        together: cython.Py_ssize_t = 4 if j + 4 <= columns else 1
+        c0: entries = column + (columns - j)
+        x: entries = own + j * width
+        for _ in range(together):
+            j += 1
+            rest: cython.Py_ssize_t = columns + left - j
+            for i in range(0, 8 * rest, 64):
+                prefetch(ahead - i)
+            ahead -= 8 * (rest + 1)
+            _subtract_from_rows(own + j * width, columns - j, column + 1, own + (j - 1) * width, width)
+            column += rest + 1
+        if together == 1:
+            _subtract_from_rows(below, left, c0, x, width)
+            continue
+        c3: entries = column - left
+        c2: entries = c3 - (rest + 1)
+        c1: entries = c2 - (rest + 2)
         for i in range(left):
-            for c in range(WIDTH):
-                below[i * WIDTH + c] += column[i] * own[j * WIDTH + c]
-        j += 1
+            for c in range(width):
+                below[i * width + c] -= (c0[i] * x[c] + c1[i] * x[width + c]) + (
+                    c2[i] * x[2 * width + c] + c3[i] * x[3 * width + c]
+                )
 
 
 @cython.cfunc
+@cython.inline
 @cython.nogil
-def _subtract_below(column: entries, left: cython.Py_ssize_t, below: entries, own: numbers) -> cython.void:
-    """Subtract the rows below one column of a front, times `below`, from `own`; four rows per turn."""
+def _subtract_rows(
+    column: entries, n: cython.Py_ssize_t, rows: entries, own: numbers, width: cython.Py_ssize_t
+) -> cython.void:
+    """Subtract the n rows of a column, times the entries of the column, from `own`; four rows of a block per turn."""
     c: cython.Py_ssize_t
     i: cython.Py_ssize_t = 0
-    while i + 4 <= left:
-        b: entries = below + i * WIDTH
-        for c in range(WIDTH):
-            own[c] -= (column[i] * b[c] + column[i + 1] * b[WIDTH + c]) + (
-                column[i + 2] * b[2 * WIDTH + c] + column[i + 3] * b[3 * WIDTH + c]
+    while width > 1 and i + 4 <= n:
+        r: entries = rows + i * width
+        for c in range(width):
+            own[c] -= (column[i] * r[c] + column[i + 1] * r[width + c]) + (
+                column[i + 2] * r[2 * width + c] + column[i + 3] * r[3 * width + c]
             )
         i += 4
-    while i < left:
-        for c in range(WIDTH):
-            own[c] -= column[i] * below[i * WIDTH + c]
-        i += 1
+    for k in range(i, n):
+        for c in range(width):
+            own[c] -= column[k] * rows[k * width + c]
