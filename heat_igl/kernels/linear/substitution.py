@@ -84,7 +84,6 @@ def _forward(
         columns: cython.Py_ssize_t = s.start[b + 1] - s.start[b]
         row: cython.Py_ssize_t = s.first_row[b]
         left: cython.Py_ssize_t = s.first_row[b + 1] - row
-        size: cython.Py_ssize_t = columns + left
         own: numbers = x + s.start[b] * width
         # Of a source's heat, most fronts have none on the way forward.
         if _all_zero(own, columns * width):
