@@ -17,7 +17,7 @@ from heat_igl.sources import source_set
 from heat_igl.sweep.lines import LineEngine, along_curve
 from heat_igl.typing import BoolArray, FloatArray
 from heat_igl.validation.closed_forms import around_the_edge
-from heat_igl.validation.construction import carved, compact, tetrahedra
+from heat_igl.validation.construction import carved, compact, joined, tetrahedra
 
 
 def scattered(n: int, seed: int = 0) -> Mesh:
@@ -205,7 +205,7 @@ def test_what_is_seen_is_at_the_length_of_the_line(seed):
 def test_the_curve_through_space_fills_one_box_after_the_other():
     P = np.random.default_rng(0).permutation(np.indices((8, 8, 8)).reshape(3, -1).T) * 0.5 - 3
     for size in (2, 4):
-        boxes = P[along_curve(P)].reshape(-1, size**3, 3)
+        boxes = P[along_curve(P, np.zeros(512, int))].reshape(-1, size**3, 3)
         np.testing.assert_array_equal(np.ptp(boxes, axis=1), 0.5 * (size - 1))
 
 
@@ -290,7 +290,10 @@ def test_against_halved_tetrahedra(seed):
         error = np.delete(solver.distance(source) / np.where(exact > 0, exact, 1) - 1, source)
         assert np.abs(error).mean() < 5e-4
         assert -0.01 < error.min() <= error.max() < 0.02
-    assert GeodesicSolver(caves(1, 5)[0]).distance(3)[180] == pytest.approx((10**0.5 + 1 + 2**0.5) / 5)
+    # Also beside a large body.
+    solver = GeodesicSolver(joined(caves(1, 5)[0], scattered(1500)))
+    assert solver.distance(3)[180] == pytest.approx((10**0.5 + 1 + 2**0.5) / 5)
+    assert solver.distance(3)[47] == pytest.approx(np.hypot(5**0.5 + 2**0.5, 1) / 5)
 
 
 @pytest.mark.parametrize("seed", [9, 117, 161, 189, 293])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
 
@@ -13,7 +13,7 @@ from heat_igl.kernels.mesh import incidence
 from heat_igl.kernels.sweep.simplex_metrics import fits_around, lengths_in_velocity, velocities_at_corners
 from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
 from heat_igl.mesh import Mesh
-from heat_igl.mesh.connectivity import PARTS, edge_middles
+from heat_igl.mesh.connectivity import PARTS, connected_components, edge_middles
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 # Differences between tensors that are taken for rounding.
@@ -132,6 +132,16 @@ class MetricSimplices:
         mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths))
         return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0.0
 
+    @cached_property
+    def components(self) -> IntArray:
+        """Component label (n,) of each vertex."""
+        return connected_components(self.corners, self.n)
+
+    @cached_property
+    def sizes(self) -> IntArray:
+        """Number of vertices in the component of each vertex (n,)."""
+        return np.bincount(self.components)[self.components]
+
     def metric(self, chosen: IntArray, corner: IntArray | int) -> FloatArray:
         """The tensors (..., 3, 3) of chosen simplices (...) at corners (...)."""
         if self.tensors is not None and self.group is not None:
@@ -154,6 +164,11 @@ class MetricSimplices:
         corners = np.ascontiguousarray(self.corners, np.int32)
         lengths = kernel(corners, self.velocity, self.rows, *self.measured[:-1], self.place).edge_lengths()
         return ends.reshape(-1, 2), lengths.ravel()
+
+    def part(self, chosen: IntArray) -> MetricSimplices:
+        """Some of the simplices, with all vertices."""
+        lengths, group, rows = (None if of is None else of[chosen] for of in (self.lengths, self.group, self.rows))
+        return replace(self, corners=self.corners[chosen], lengths=lengths, group=group, rows=rows, incident=None)
 
     def halved(self) -> MetricSimplices:
         """The simplices in their metric with all edges halved; the vertices keep their numbers."""

@@ -66,7 +66,7 @@ class HopfLaxEngine(SimplexEngine):
         # are far apart, so that the first ones bound the propagation from the others.
         order = np.lexsort((*self._simplices.place[vertices].T, offset))
         for k in order[np.argsort(np.arange(len(order)) * _GOLDEN % 1)]:
-            found, far = scheme.spread(vertices[k], offset[k], limit)
+            found, far = scheme.spread(vertices[k], offset[k], limit, self._simplices.sizes[vertices[k]])
             nearer = far < distance[found]
             distance[found[nearer]], label[found[nearer]] = far[nearer], k
             limit[found] = np.minimum(limit[found], far)

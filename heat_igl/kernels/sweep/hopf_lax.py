@@ -71,8 +71,6 @@ class HopfLax:
         update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
         update.trusted, update.trusted_in = np.zeros(n), np.full(n, -1, np.int32)
         self.order, self.stack, self.state = np.zeros(n, np.int32), np.zeros(4 * n, np.int32), np.zeros(n, np.uint8)
-        # Changes add up along a path.
-        self.settled = SETTLED * n ** (-1.0 / update.p)
 
     def shorten(self, d: cython.double[::1], label: cython.int[::1]) -> None:
         """Lower distances `d` (n,) to shortest paths along edges, with their labels (n,), in place (Dijkstra 1959)."""
@@ -93,7 +91,7 @@ class HopfLax:
             self.march()
         raise_caught()
 
-    def spread(self, source: cython.int, start: cython.double, limit: cython.double[::1]):
+    def spread(self, source: cython.int, start: cython.double, limit: cython.double[::1], n: cython.int):
         """Compute second-order distances from one source, as far as it may be the nearest; `record` has the rest.
 
         Parameters
@@ -102,6 +100,8 @@ class HopfLax:
             The source vertex and its initial distance.
         limit : (n,) float64
             Upper bounds of the distance from all sources, ``inf`` where none is known.
+        n : int
+            Number of vertices in the component of the source.
 
         Returns
         -------
@@ -111,7 +111,9 @@ class HopfLax:
         # In strongly anisotropic metrics, distances depend on larger ones: so these updates are limited.
         # With 1/2 to 2/3 of the vertices, few errors differ, those of coarse discs by up to 3 %. With 1/2, the largest
         # one in fibres 1 : 18 is 2.3 in place of 1.4 %; with 2/3, 10 % at a vertex of fibres that make triangles thin.
-        left: cython.Py_ssize_t = 4 * len(limit) // 7
+        left: cython.Py_ssize_t = 4 * n // 7
+        # Changes add up along a path.
+        self.settled = SETTLED * n ** (-1.0 / self.update.p)
         self.limit, self.low, self.update.start = limit, start, start
         with cython.nogil:
             for at in range(self.n_reached):
