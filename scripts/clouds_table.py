@@ -37,23 +37,10 @@ from scipy.spatial import KDTree
 import heat_igl
 from heat_igl import GeodesicSolver, Mesh, PointCloud, VectorHeatSolver, log_map, shapes, tangent_frames
 from heat_igl.typing import FloatArray, IntArray
+from heat_igl.validation.construction import on_sphere
 from heat_igl.validation.zoo import FAMILIES
 
-from harness import (
-    Query,
-    Row,
-    Table,
-    collected,
-    drawn,
-    errors,
-    mean_error,
-    named,
-    on_sphere,
-    parsed,
-    publish,
-    seconds,
-    warned,
-)
+from harness import Query, Row, Table, collected, drawn, errors, mean_error, named, parsed, publish, seconds, warned
 
 Points = tuple[FloatArray, Query]
 Scan = Callable[[FloatArray, np.random.Generator], tuple[FloatArray, IntArray]]

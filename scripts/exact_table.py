@@ -29,10 +29,10 @@ from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.runtime import PeakMemory
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.construction import hull, planar
+from heat_igl.validation.construction import hull, on_sphere, planar
 from heat_igl.windows.exact import ExactSurface
 
-from harness import METHODS, Row, Table, collected, drawn, named, on_sphere, paired, parsed, publish, seconds
+from harness import METHODS, Row, Table, collected, drawn, named, paired, parsed, publish, seconds
 from harness import vtp as run_vtp
 
 # Local queries: how many, the share of the vertices that a radius holds, mean edges between the ends of a pair, and how

@@ -204,12 +204,6 @@ def moved_inside(mesh: Mesh, rng: np.random.Generator, most: float, fixed: Float
     return Mesh(V, mesh.F)
 
 
-def on_sphere(n: int, rng: np.random.Generator) -> FloatArray:
-    """Random points (n, 3) on the unit sphere."""
-    P = rng.standard_normal((n, 3))
-    return np.asarray(P / np.linalg.norm(P, axis=1, keepdims=True))
-
-
 def drawn(mesh: Mesh, count: int, seed: int = 0) -> list[int]:
     """Different vertices of faces."""
     usable = np.unique(mesh.F)

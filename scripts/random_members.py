@@ -48,13 +48,12 @@ from heat_igl.mesh.connectivity import boundary_loops
 from heat_igl.operators import operators
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
-from heat_igl.validation.construction import hull, planar
-from heat_igl.validation.shapes import lattice_faces
+from heat_igl.validation.construction import hull, on_sphere, planar, revolved
 from heat_igl.validation.zoo import FAMILIES
 from heat_igl.windows import ExactSurface, exact_distance
 from heat_igl.windows.tables import MARGIN, from_mesh
 
-from harness import Row, Table, on_sphere, parsed, publish
+from harness import Row, Table, parsed, publish
 
 Random = np.random.Generator
 # Kind, figures, and what of them the rounding of lengths explains.
@@ -95,14 +94,12 @@ def needles(rng: Random) -> Mesh:
 
 def long_tube(rng: Random) -> Mesh:
     """Rings of few vertices, up to 1.6 times as far from the next as from the one before; ridges that are straight."""
-    around, along = rng.integers(3, 9), int(rng.integers(10, 31))
-    turn = rng.choice([0.0, 0.5]) * np.arange(along)[:, None]
-    angle = 2 * np.pi * (np.arange(around) + turn) / around
-    height = np.broadcast_to(np.cumsum(rng.uniform(1.2, 1.6) ** np.arange(along))[:, None], angle.shape)
-    V = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
-    V = V @ np.linalg.qr(rng.normal(size=(3, 3)))[0] if rng.random() < 0.5 else V
+    around, along = int(rng.integers(3, 9)), int(rng.integers(10, 31))
+    turn, height = rng.choice([0.0, np.pi / around]), np.cumsum(rng.uniform(1.2, 1.6) ** np.arange(along))
+    tube = revolved(np.ones(along), height, around, turn)
+    V = tube.V @ np.linalg.qr(rng.normal(size=(3, 3)))[0] if rng.random() < 0.5 else tube.V
     V = V.astype(np.float32).astype(float) if rng.random() < 0.5 else V
-    return Mesh(V, lattice_faces(along, around, wrap_columns=True))
+    return Mesh(V, tube.F)
 
 
 COARSE: dict[str, Callable[[Random], Mesh]] = {

@@ -12,7 +12,7 @@ from conftest import perturbed
 from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
 from heat_igl.sources import Sources, SourceSet, source_set
 from heat_igl.typing import ArrayLike, FloatArray
-from heat_igl.validation.construction import dual, joined, merged, planar, ring
+from heat_igl.validation.construction import dual, hull, joined, merged, on_sphere, planar, ring
 
 
 def twice(mesh: Mesh, apart: float | np.ndarray = 5.0) -> Mesh:
@@ -52,8 +52,7 @@ def pressed(height: float) -> Mesh:
 
 
 def points_of_sphere(n: int, seed: int = 0) -> np.ndarray:
-    P = np.random.default_rng(seed).standard_normal((n, 3))
-    return P / np.linalg.norm(P, axis=1, keepdims=True)
+    return on_sphere(n, np.random.default_rng(seed))
 
 
 def points_of_moebius_strip(turn: np.ndarray, side: np.ndarray) -> np.ndarray:
@@ -121,9 +120,8 @@ def rough_field(seed: int) -> Mesh:
 
 def rough_star(seed: int) -> Mesh:
     rng = np.random.default_rng(seed)
-    P = rng.normal(size=(rng.integers(8, 50), 3))
-    P /= np.linalg.norm(P, axis=1)[:, None]
-    return Mesh(P * np.exp(rng.normal(size=(len(P), 1)) * 0.4), scipy.spatial.ConvexHull(P).simplices)
+    ball = hull(on_sphere(int(rng.integers(8, 50)), rng))
+    return Mesh(ball.V * np.exp(rng.normal(size=(ball.n_vertices, 1)) * 0.4), ball.F)
 
 
 def random_disk(n: int, seed: int) -> Mesh:

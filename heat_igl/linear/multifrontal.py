@@ -19,7 +19,7 @@ from __future__ import annotations
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from importlib import import_module
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -288,7 +288,7 @@ class MultifrontalFactorization:
 
     def _solve(self, b: FloatArray, x: FloatArray) -> None:
         """Write the solution for b, (n, 1) or at most as many columns as a block has, to x."""
-        order, place, k = self._arguments[0].order, self._arguments[0].place, b.shape[1]
+        order, place, k = cast(IntArray, self._arguments[0].order), self._arguments[0].place, b.shape[1]
         ordered = np.zeros((len(place), 1 if k == 1 else _solves.width))
         ordered[:, :k] = b.take(order, axis=0)
         ordered[self._held] = 0.0

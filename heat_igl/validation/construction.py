@@ -30,6 +30,12 @@ def ring(around: int, begin: float = 0.0) -> FloatArray:
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
+def on_sphere(n: int, rng: Generator) -> FloatArray:
+    """Random points (n, 3) on the unit sphere."""
+    P = rng.standard_normal((n, 3))
+    return np.asarray(P / np.linalg.norm(P, axis=1, keepdims=True))
+
+
 def inside(outline: FloatArray, points: FloatArray) -> BoolArray:
     """Whether points (k, 2) lie inside a polygon (e, 2)."""
     corner = np.arange(len(outline))
@@ -65,10 +71,13 @@ def tube(centre: FloatArray, along: FloatArray, radius: float, around: int, up: 
 
 def extruded(points: FloatArray, F: IntArray, height: float) -> Mesh:
     """Two sheets of triangles on points (k, 2), at a height and at 0, joined along the boundary."""
-    n = len(points)
-    return compact(
-        np.concatenate([raised(points, height), raised(points)]), np.concatenate([F, F[:, ::-1] + n, walls(F, n)])
-    )
+    return closed(raised(points, height), raised(points), F)
+
+
+def closed(upper: FloatArray, lower: FloatArray, F: IntArray) -> Mesh:
+    """Two sheets of the same triangles, on positions (k, 3) each, joined along the boundary."""
+    n = len(upper)
+    return compact(np.concatenate([upper, lower]), np.concatenate([F, F[:, ::-1] + n, walls(F, n)]))
 
 
 def caps(rings: int, around: int) -> IntArray:

@@ -139,8 +139,8 @@ def shell(rng: Generator) -> Mesh:
     points += rng.uniform(0, 0.3) / np.sqrt(n) * rng.standard_normal((n, 2))
     F, bend = build.delaunay(points), rng.uniform(0.3, 1.0)
     height = np.sqrt(np.maximum(1.5 - bend * (points**2).sum(axis=1), 0.01))
-    V = np.concatenate([build.raised(points, height), build.raised(points * (1 - thickness), height * (1 - thickness))])
-    return build.compact(V, np.concatenate([F, F[:, ::-1] + n, build.walls(F, n)]))
+    outer = build.raised(points, height)
+    return build.closed(outer, outer * (1 - thickness), F)
 
 
 def carved_voxels(rng: Generator) -> Mesh:

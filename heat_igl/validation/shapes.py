@@ -190,11 +190,10 @@ def cone(around: int, along: int, half_angle: float = np.pi / 6) -> Mesh:
 def torus(around: int, along: int, tube: float = 0.4) -> Mesh:
     """A torus about the z axis: circles of radius `tube` (`around` vertices) along a circle of radius 1 (`along`)."""
     around, along = _at_least("around", around, 3), _at_least("along", along, 3)
-    i, j = np.divmod(np.arange(around * along), around)
-    theta, psi = 2 * np.pi * i / along, 2 * np.pi * j / around
-    radius = 1 + tube * np.cos(psi)
-    V = np.stack([radius * np.cos(theta), radius * np.sin(theta), tube * np.sin(psi)], axis=1)
-    return Mesh(V, lattice_faces(along, around, wrap_rows=True, wrap_columns=True)[:, ::-1])
+    theta, psi = 2 * np.pi * np.arange(along)[:, None] / along, 2 * np.pi * np.arange(around) / around
+    x, y = (1 + tube * np.cos(psi)) * [np.cos(theta), np.sin(theta)]
+    mesh = lattice_mesh(x, y, tube * np.sin(psi), wrap_rows=True, wrap_columns=True)
+    return Mesh(mesh.V, mesh.F[:, ::-1])
 
 
 def flat_torus(n: int) -> IntrinsicTriangulation:

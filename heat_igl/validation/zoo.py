@@ -60,8 +60,7 @@ def _scattered(n: int, seed: int) -> Mesh:
 
 
 def _on_sphere(n: int, seed: int) -> FloatArray:
-    points = seeded(seed).standard_normal((n, 3))
-    return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
+    return build.on_sphere(n, seeded(seed))
 
 
 def _bumps(V: FloatArray) -> FloatArray:
@@ -93,9 +92,8 @@ def _cells(n: int, where: Callable[[IntArray], Any]) -> Mesh:
 
 def _latitudes() -> Mesh:
     """A sphere by meridians and parallels, with fans of thin triangles at the poles."""
-    theta, phi = np.meshgrid(np.linspace(0, np.pi, 31), np.linspace(0, 2 * np.pi, 61)[:-1], indexing="ij")
-    x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
-    return build.merged(shapes.lattice_mesh(x, y, np.cos(theta), wrap_columns=True))
+    theta = np.linspace(0, np.pi, 31)
+    return build.merged(build.revolved(np.sin(theta), np.cos(theta), 60))
 
 
 # Surfaces without an orientation, or with edges of many faces.
@@ -268,16 +266,8 @@ def _labyrinth() -> Mesh:
 
 
 def _lantern(around: int, along: int) -> Mesh:
-    """Schwarz's lantern: rings of a cylinder, every other one turned by half a step."""
-    ring, k = np.divmod(np.arange(around * (along + 1)), around)
-    angle = 2 * np.pi * (k + 0.5 * (ring % 2)) / around
-    V = np.stack([np.cos(angle), np.sin(angle), 3 * ring / along], axis=1)
-    a = np.arange(around * along).reshape(along, 1, around)
-    ahead = np.roll(a, -1, axis=2)
-    b, b_ahead, is_turned = a + around, ahead + around, np.arange(along)[:, None, None] % 2
-    first = np.stack([a, np.where(is_turned, b_ahead, ahead), b], axis=-1)
-    even, odd = np.stack([ahead, b_ahead, b], axis=-1), np.stack([a, ahead, b_ahead], axis=-1)
-    return Mesh(V, np.concatenate([first, np.where(is_turned[..., None], odd, even)], axis=1).reshape(-1, 3))
+    """Schwarz's lantern: rings of a cylinder, each turned by half a step against the one before."""
+    return build.revolved(np.ones(along + 1), 3 * np.arange(along + 1) / along, around, np.pi / around)
 
 
 def _sphere_with_slivers() -> Mesh:
@@ -340,11 +330,8 @@ def _elbow() -> Mesh:
     x = np.concatenate([[-8.0], 2 * np.sin(bend), [2.0]])
     y = np.concatenate([[0.0], 2 - 2 * np.cos(bend), [12.0]])
     slope = np.concatenate([[0.0], bend, [np.pi / 2]])
-    angle = 2 * np.pi * np.arange(32) / 32
-    outward = np.stack([-np.sin(slope), np.cos(slope), np.zeros(26)], axis=1)
-    rings = np.stack([x, y, np.zeros(26)], axis=1)[:, None] + outward[:, None] * np.cos(angle)[:, None]
-    rings += np.array([0, 0, 1.0]) * np.sin(angle)[:, None]
-    return shapes.lattice_mesh(*np.moveaxis(rings, 2, 0), wrap_columns=True)
+    centre, along = np.stack([x, y], axis=1), np.stack([np.cos(slope), np.sin(slope)], axis=1)
+    return build.tube(build.raised(centre), build.raised(along), 1.0, 32, up=(0, 0, -1))
 
 
 def _drum() -> Mesh:
