@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from heat_igl.kernels.sweep.adjacent_updates import AdjacentUpdate
 from heat_igl.kernels.sweep.error_estimate import estimated_errors
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
@@ -83,11 +84,12 @@ class HopfLaxEngine(SimplexEngine):
         """Arguments of `HopfLax`, including the paths across facets between two metrics."""
         of, corners = self._simplices, self._corners
         kernel: Any = SimplexUpdate
+        between: Any = AdjacentUpdate
         metric = of.velocity, of.rows, *of.measured[:-1], of.place
         mark = self._marks()
         crossings: tuple[AnyArray, ...] = np.zeros(of.n + 1, np.int32), np.empty((0, 3), np.int32), np.empty(0), mark
         if (mark != 0).any():
-            crossings = self._crossings(mark, kernel(corners, *metric))
+            crossings = self._crossings(mark, between(kernel(corners, *metric), *self._incident, mark))
         return corners, *self._incident, crossings, *metric
 
     def _marks(self) -> AnyArray:
@@ -103,7 +105,7 @@ class HopfLaxEngine(SimplexEngine):
             mark = np.zeros(len(self._corners))
         return np.asarray(mark / max(np.abs(mark).max(initial=0), np.finfo(float).tiny), np.float32)
 
-    def _crossings(self, mark: AnyArray, update: Any) -> tuple[AnyArray, ...]:
+    def _crossings(self, mark: AnyArray, adjacent: Any) -> tuple[AnyArray, ...]:
         """Paths across facets between simplices of different marks, as `HopfLax` takes them."""
         corners, size, n = self._corners, self._corners.shape[1], self._simplices.n
         others = np.array([[j for j in range(size) if j != c] for c in range(size)])
@@ -119,17 +121,18 @@ class HopfLaxEngine(SimplexEngine):
         at, facet = (size * some[:, None] + np.arange(size)).astype(np.int32).ravel()[order], facet[order]
         beside = [np.stack([at[k:], at[:-k]])[:, facet[k:] == facet[:-k]] for k in range(1, counts.max(initial=2))]
         pairs = np.concatenate(beside, axis=1).T
-        pairs = np.ascontiguousarray(pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]])
-        lengths = update.crossings(pairs)
-        # Rows: the corner opposite the facet, the corners at the start and the end; then each path reversed.
-        kind, k = np.nonzero(np.isfinite(lengths.T))
-        is_second, lengths = kind >= size, lengths[k, kind]
-        at, start = pairs[k, is_second * 1], pairs[k, 1 - is_second]
-        end = at // size * size + np.where(is_second, others[at % size, (kind - size) % (size - 1)], kind)
-        paths = np.concatenate([np.stack([at, start, end], axis=1), np.stack([start, end, start], axis=1)])
+        pairs = pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]]
+        # From the corner opposite the facet beyond to all of a simplex; the other way, to those of the facet.
+        kind, k = divmod(np.arange((2 * size - 1) * len(pairs)), max(len(pairs), 1))
+        at, start = pairs[k, (kind >= size) * 1], pairs[k, (kind < size) * 1]
+        end = at // size * size + np.where(kind < size, kind, others[at % size, (kind - size) % (size - 1)])
+        paths = np.stack([at, start, end], axis=1).astype(np.int32)
+        lengths = adjacent.crossings(paths)
+        paths, lengths = paths[np.isfinite(lengths)], lengths[np.isfinite(lengths)]
+        paths = np.concatenate([paths, paths[:, [1, 2, 1]]])
         begins, order = group_by_label(corners.ravel()[paths[:, 2]], n)
         paths[:, 2] = corners.ravel()[paths[:, 1]]
-        return begins.astype(np.int32), paths[order].astype(np.int32), np.tile(lengths, 2)[order], mark
+        return begins.astype(np.int32), paths[order], np.tile(lengths, 2)[order], mark
 
     @property
     def _scheme(self) -> Any:

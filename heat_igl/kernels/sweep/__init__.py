@@ -17,7 +17,7 @@ T(x) + |v - x| over the opposite facet, with T the distance on the facet and |v 
 - `hopf_lax` begins with lengths of paths along edges, and updates vertices by distance, then in sweeps in the order of
   their dependencies, until nothing changes.
 - `simplex_updates` updates a vertex in one simplex: in closed form for linear T, or with second differences of T^2 that
-  come from gradients at the corners of the facet, or from the corner beyond a facet between two metrics.
+  come from gradients at the corners of the facet; `adjacent_updates` in two, through a facet between two metrics.
 - `facets` minimizes over a facet with second differences.
 - `simplex_metrics` has inverse roots of tensors, fits around vertices, and lengths in a linear velocity.
 - `error_estimate` finds how far the gradients contradict the distances.

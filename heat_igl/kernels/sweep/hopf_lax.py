@@ -10,11 +10,7 @@ one fixed point, which converges to the distance in a continuous metric (Bornema
 the edges of the facet follow from the gradients of distance at the corners, and are limited where they contradict the
 distances or the metric of the simplex.
 
-Between two metrics, a shortest path may cross the interior of a facet although another front reaches its corners
-first: a path through such a facet from the opposite corner of the adjacent simplex is a further update. Moreover, T may
-be too small between two corners that different fronts reach. Every path to x comes through one of the two simplices at
-the facet: triangles in which T(x) is less than T(y) + |y - x| for all y on the sides beyond minimize
-T(y) + |y - x| + |x - v| from then on.
+Between two metrics, T(x) may differ from the paths to x through the adjacent simplex: `adjacent_updates` has these.
 
 Initial distances are lengths of paths along edges. Vertices are updated in ascending order of distance, some of them
 repeatedly, and then in Gauss-Seidel sweeps in a topological order of their dependencies. Each source is propagated
@@ -25,8 +21,9 @@ import cython
 import numpy as np
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
 from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
+from cython.cimports.heat_igl.kernels.sweep.adjacent_updates import AdjacentUpdate
 from cython.cimports.heat_igl.kernels.sweep.facets import pair, simplex_of
-from cython.cimports.heat_igl.kernels.sweep.hopf_lax import CLOSE, NOT_FOUND, RISEN, SETTLED, TOO_SHORT
+from cython.cimports.heat_igl.kernels.sweep.hopf_lax import CLOSE, RISEN, SETTLED
 from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, SimplexUpdate, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, sqrt
 
@@ -54,18 +51,15 @@ class HopfLax:
 
     def __init__(self, corners, first, incident, crossings, *in_metric):
         self.corners, self.first, self.incident, n = corners, first, incident, len(first) - 1
-        self.begin, self.ends, self.lengths, self.mark = crossings
+        self.begin, self.ends, self.lengths, mark = crossings
         update = self.update = SimplexUpdate(corners, *in_metric)
+        self.adjacent = AdjacentUpdate(update, first, incident, mark)
         self.waiting, self.reached, self.n_reached = PriorityQueue(n), np.zeros(n, np.int32), 0
         self.facet, self.pending, self.known = np.full(n, -1, np.int32), np.zeros(n), np.full(n, INFINITY)
         self.beyond = np.full(n, -1, np.int32)
         self.leads, self.label, self.d = np.zeros(n, np.uint8), np.full(n, -1, np.int32), np.full(n, INFINITY)
         self.changed = np.zeros(incident.shape[0], np.uint8)
         self.place, self.step, self.weight = np.zeros((n, 2 * update.p)), np.zeros(n), np.ones(n)
-        # On an edge of a tetrahedron, paths end in all that are around it.
-        n_facets = corners.size if update.p == 2 and (np.asarray(self.mark) != 0).any() else 0
-        update.over, update.joint = np.full(n_facets, NOT_FOUND, np.int32), np.zeros(n_facets, np.uint8)
-        self.n_joint = 0
         self.risen, self.sum, self.n_visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int32)
         self.asked, self.n_asked = np.full(n, -1, np.int64), 0
         update.slope, update.is_sloped, update.weight = np.zeros((n, 3)), np.zeros(n, np.uint8), self.weight
@@ -118,9 +112,8 @@ class HopfLax:
         with cython.nogil:
             for at in range(self.n_reached):
                 self.forget(self.reached[at])
-        if self.n_joint > 0:
-            self.update.joint[:] = 0
-            self.n_joint = 0
+        if self.adjacent.n_joint > 0:
+            self.adjacent.joint[:], self.adjacent.n_joint = 0, 0
         self.n_reached, self.reached[0], self.d[source], self.known[source] = 1, source, start, start
         # A source that another one reaches before its initial distance is nowhere the nearest.
         if start <= limit[source]:
@@ -185,45 +178,11 @@ class HopfLax:
     def is_too_short(self, v: cython.int) -> cython.bint:
         """Whether T is too small at the minimizer of v on its facet, which then becomes joint."""
         at: cython.int = self.facet[v]
-        if self.update.over.shape[0] == 0 or at < 0 or self.update.joint[at]:
-            return False
-        most: cython.double = self.d[v] + TOO_SHORT * (self.d[v] - self.low)
         self.update.d = cython.address(self.known[0])
-        self.update.face(at // 3, at % 3)
-        for i in range(2):
-            if self.update.level[i] + sqrt(self.update.mean[at // 3, pair(at % 3, self.update.side[i])]) <= most:
-                return False
-        over: cython.int = self.corner_over(at)
-        if self.beyond[v] >= 0 or over < 0 or self.known[self.corners[over // 3, over % 3]] == INFINITY:
+        if at < 0 or self.beyond[v] >= 0 or not self.adjacent.joins(at, cython.address(self.place[v, 0]), self.d[v]):
             return False
-        a: cython.int = self.update.at[0]
-        self.update.share[0], self.update.share[1], self.update.share[2] = 0.5, 0.5, 0.0
-        for i in range(3 if over != at else 0):
-            t: cython.double = self.place[v, self.corners[over // 3, 3 - over % 3 - i] != a] if i != over % 3 else 0.0
-            if i != over % 3 and self.update.over_both(at // 3, at % 3, i, t, most) < INFINITY:
-                return False
-        self.update.joint[at] = self.changed[at] = True
-        self.n_joint += 1
+        self.changed[at] = True
         return True
-
-    def corner_over(self, at: cython.int) -> cython.int:
-        """The corner beyond the side opposite corner `at` of a triangle, after `face`; `at` itself on the boundary.
-
-        It is -1 if the metric varies within one of the two triangles, or if more than two share the side.
-        """
-        if self.update.over[at] != NOT_FOUND:
-            return self.update.over[at]
-        over: cython.int = at
-        v: cython.int = self.update.at[0]
-        for k in range(self.first[v], self.first[v + 1]):
-            s: cython.int = self.incident[k] // 3
-            for i in range(3 if s != at // 3 else 0):
-                if self.corners[s, i] == self.update.at[1]:
-                    over = 3 * s + 3 - i - self.incident[k] % 3 if self.mark[s] != 0.0 and over == at else -1
-        self.update.over[at] = over if self.mark[at // 3] != 0.0 else -1
-        if self.update.over[at] >= 0:
-            self.update.over[over] = at
-        return self.update.over[at]
 
     def forget(self, v: cython.int) -> cython.void:
         """Reset v to a vertex that has not been reached."""
@@ -358,8 +317,8 @@ class HopfLax:
             for i in range(size if matters else 0):
                 is_open |= self.known[of[i]] == INFINITY
             # The vertex beyond a joint facet.
-            over: cython.int = self.update.over[self.incident[k]] if self.n_joint > 0 and matters else -1
-            if over >= 0 and self.update.joint[over] and over != self.incident[k]:
+            over: cython.int = self.adjacent.over[self.incident[k]] if self.adjacent.n_joint > 0 and matters else -1
+            if over >= 0 and self.adjacent.joint[over] and over != self.incident[k]:
                 u = self.corners[over // 3, over % 3]
                 self.pending[u], self.changed[over] = max(most, self.pending[u]), True
                 if self.left > 0:
@@ -380,7 +339,7 @@ class HopfLax:
                     or (
                         not is_open
                         and (is_new or (most > change and self.d[v] < self.d[u]))
-                        and self.update.through(s, c, self.d[u], own if self.d[v] >= self.d[u] else -1) < self.d[u]
+                        and self.through(s, c, self.d[u], own if self.d[v] >= self.d[u] else -1) < self.d[u]
                     )
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
@@ -395,6 +354,13 @@ class HopfLax:
                 self.pending[u] = max(change, self.pending[u])
                 if self.left > 0:
                     self.wait(u)
+
+    def through(self, s: cython.int, c: cython.int, best: cython.double, far: cython.int) -> cython.double:
+        """`SimplexUpdate.through`, or `AdjacentUpdate.through` if the facet is joint."""
+        self.adjacent.away = -1
+        if self.adjacent.n_joint > 0 and self.adjacent.joint[3 * s + c]:
+            return self.adjacent.through(3 * s + c)
+        return self.update.through(s, c, best, far)
 
     def visit(self, v: cython.int) -> cython.void:
         """Update v: the minimum over its simplices, and the gradient at the minimizer.
@@ -444,16 +410,16 @@ class HopfLax:
                     has_open |= i != c and self.known[self.corners[s, i]] == INFINITY
                 if not has_open:
                     continue
-                value = self.update.through(s, c, best, -1)
+                value = self.through(s, c, best, -1)
                 self.changed[at] = False
-                if k < self.first[v] and value < INFINITY and (self.beyond[v] < 0 or self.update.away >= 0):
+                if k < self.first[v] and value < INFINITY and (self.beyond[v] < 0 or self.adjacent.away >= 0):
                     asks_all = value > self.d[v] * (1 + EQUAL)
                 # Facets that share the minimizer have values equal to rounding: the first one is kept.
                 if value + EQUAL * fabs(value) < best:
-                    best, best_at, beyond, start = value, at, self.update.away, -1
+                    best, best_at, beyond, start = value, at, self.adjacent.away, -1
                     for i in range(size - 1):
                         kept[i] = self.update.share[i]
-                    kept[3], kept[4] = self.update.far[0], self.update.far[1]
+                    kept[3], kept[4] = self.adjacent.far[0], self.adjacent.far[1]
             if best < self.d[v] + EQUAL * fabs(best):
                 break
         if best_at < 0:
@@ -473,7 +439,7 @@ class HopfLax:
             end = i if self.corners[s, i] == v else end
         if start >= 0:
             # On a facet beyond that has the start.
-            self.update.crossing(best_at, end, start)
+            self.adjacent.crossing(best_at, start, v)
             beyond = start + 1 if (start + 1) % size else start - 1
         for i in range(size - 1):
             self.place[v, i] = self.update.share[i]

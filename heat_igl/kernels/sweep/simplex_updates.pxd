@@ -15,11 +15,6 @@ cdef extern from *:
     double EQUAL
     void FETCH(const void* place) noexcept nogil
 
-
-cdef enum:
-    # Places are found to 2^-16, and values to the square of that.
-    MOST_TURNS = 16
-
 cdef class SimplexUpdate(Facet):
     cdef const int[:, ::1] corners, rows
     cdef const double[:, ::1] mean, velocity, inverses, V
@@ -27,13 +22,6 @@ cdef class SimplexUpdate(Facet):
     cdef int side[3], at[3]
     cdef double level[3]
     cdef double* d
-    # For each corner, the one beyond the facet opposite, and whether paths through this facet are found in both triangles.
-    cdef int[::1] over
-    cdef unsigned char[::1] joint
-    # The place on a side of the triangle beyond, the corner opposite that side, or -1, and the derivative of a length.
-    cdef double far[2]
-    cdef int away
-    cdef double turn
     # What bounds the values through each simplex.
     cdef const double[::1] widest, slack, growths
     # The derivative of distance by position, where known, and its trust in the metric of one row or simplex.
@@ -44,9 +32,6 @@ cdef class SimplexUpdate(Facet):
     # How far T is of second order for each vertex.
     cdef double[::1] weight
 
-    cdef double crossing(self, int at, int end, int start) noexcept nogil
-    cdef double over_both(self, int s, int c, int i, double t, double limit) noexcept nogil
-    cdef double through_both(self, int s, int c) noexcept nogil
     cdef double face(self, int s, int c) noexcept nogil
     cdef double linear(self, int s, int c, double limit) noexcept nogil
     cdef double over_edge(self, int s, int c, int i, int j, double least) noexcept nogil

@@ -2,13 +2,10 @@
 
 import cython
 import numpy as np
-from cython.cimports.heat_igl.kernels.signals import ASK, is_interrupted
 from cython.cimports.heat_igl.kernels.sweep import facets
 from cython.cimports.heat_igl.kernels.sweep.facets import Facet, gradient, mean_velocity, pair, squares_of
-from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, FETCH, MOST_TURNS, edge_length
+from cython.cimports.heat_igl.kernels.sweep.simplex_updates import EQUAL, FETCH, edge_length
 from cython.cimports.libc.math import INFINITY, fabs, log, sqrt
-
-from heat_igl.kernels.signals import raise_caught
 
 
 @cython.final
@@ -51,148 +48,6 @@ class SimplexUpdate(Facet):
                     for j in range(i):
                         lengths[s, pair(i, j)] = edge_length(self, s, i, j)
         return found
-
-    def crossings(self, corners: cython.const[cython.int][:, ::1]):
-        """The lengths (k, 2 p + 1) of `crossing` through facets between two simplices, opposite their corners (k, 2).
-
-        They are those from the second corner to all of the first simplex, and from the first to those of the facet.
-        """
-        found, unused = np.empty((len(corners), 2 * self.p + 1)), np.zeros(len(self.V))
-        lengths: cython.double[:, ::1] = found
-        levels: cython.double[::1] = unused
-        self.d = cython.address(levels[0])
-        size: cython.int = self.p + 1
-        with cython.nogil:
-            for k in range(lengths.shape[0]):
-                if k % ASK == 0 and is_interrupted():
-                    break
-                for i in range(lengths.shape[1]):
-                    at: cython.int = corners[k, i > self.p]
-                    # All corners of the first simplex, and those of the facet in the second one.
-                    end: cython.int = i if i <= self.p else i - size + (i - size >= at % size)
-                    lengths[k, i] = self.crossing(at, end, corners[k, i <= self.p])
-        raise_caught()
-        return found
-
-    def crossing(self, at: cython.int, end: cython.int, start: cython.int) -> cython.double:
-        """The least |u - x| + |x - v| over a facet between two simplices of one metric each; sets `share`.
-
-        The facet is opposite the corner `at`, v is the corner `end` of that simplex, u the corner `start` of the other
-        one. If u or v is on the facet, the path runs along it. It is inf if the path is no shorter than along an edge.
-        """
-        q: cython.int = self.q
-        s: cython.int = at // (self.p + 1)
-        other: cython.int = start // (self.p + 1)
-        u: cython.int = start % (self.p + 1)
-        own = cython.address(self.mean[s, 0])
-        sq = cython.address(self.mean[other, 0])
-        m = cython.address(self.product[0])
-        where: cython.int[3]
-        nearest: cython.int = 0
-        along: cython.double = INFINITY
-        falls: cython.bint = False
-        self.face(s, at % (self.p + 1))
-        for i in range(self.p):
-            where[i] = 0
-            while self.corners[other, where[i]] != self.corners[s, self.side[i]]:
-                where[i] += 1
-            self.share[i], self.D[i] = 1.0 / self.p, sqrt(sq[pair(u, where[i])]) if u != where[i] else 0.0
-            m[4 * i] = own[pair(end, self.side[i])] if end != self.side[i] else 0.0
-            if self.D[i] + sqrt(m[4 * i]) < along:
-                along, nearest = self.D[i] + sqrt(m[4 * i]), i
-            for j in range(i):
-                m[3 * i + j] = m[3 * j + i] = 0.5 * (m[4 * i] + m[4 * j] - own[pair(self.side[i], self.side[j])])
-                # As T from u in the other metric, whose square is quadratic.
-                rise: cython.double = self.D[i] - self.D[j]
-                self.sag[i][j] = self.sag[j][i] = sq[pair(where[i], where[j])] - rise * rise
-        # Lengths are convex: if they rise from a corner towards all others, none is less than there.
-        D: cython.double = self.D[nearest]
-        to: cython.double = m[4 * nearest]
-        for i in range(self.p):
-            side: cython.double = self.sag[nearest][i] + (self.D[i] - D) * (self.D[i] - D)
-            slope: cython.double = 0.5 * ((self.D[i] - D) * (self.D[i] + D) - side) / D if D > 0.0 else sqrt(side)
-            slope += (m[3 * nearest + i] - to) / sqrt(to) if to > 0.0 else sqrt(m[4 * i])
-            falls |= i != nearest and slope < 0.0
-        if not falls:
-            return INFINITY
-        self.q = 1
-        length: cython.double = self.newton(self.length(self.share), INFINITY) - self.start
-        self.q = q
-        return length if length < along * (1.0 - EQUAL) else INFINITY
-
-    def over_both(
-        self, s: cython.int, c: cython.int, i: cython.int, t: cython.double, limit: cython.double
-    ) -> cython.double:
-        """The least T(y) + |y - x| + |x - v| over y opposite corner i of the triangle beyond, inf if not below `limit`.
-
-        The place x opposite corner c of s has the share t of the corner that it has in common with y. y begins at
-        `share` and sets it, and `turn` is the derivative by t. Below a finite limit any such value will do.
-        """
-        other: cython.int = self.over[3 * s + c] // 3
-        u: cython.int = self.over[3 * s + c] % 3
-        end: cython.int = 3 - u - i
-        own = cython.address(self.mean[s, 0])
-        sq = cython.address(self.mean[other, 0])
-        m = cython.address(self.product[0])
-        rest: cython.double = 1.0 - t
-        # The square of a side is the entry 2 less the corner opposite.
-        one: cython.int = (c + 1 + (self.corners[s, (c + 1) % 3] != self.corners[other, end])) % 3
-        to: cython.double = own[c + one - 1]
-        back: cython.double = own[2 - one]
-        length: cython.double = sqrt(t * to + rest * back - t * rest * own[2 - c])
-        to_end: cython.double = rest * rest * sq[2 - u]
-        to_u: cython.double = t * sq[2 - i] + rest * sq[2 - end] - t * rest * sq[2 - u]
-        nearest: cython.double = self.face(other, i) + sqrt(max(to_end, to_u)) + length
-        if nearest <= limit < INFINITY:
-            return nearest
-        if self.level[0] + self.level[1] == INFINITY:
-            return INFINITY
-        self.lay(other, i)
-        for j in range(2):
-            # How far slopes are trusted does not depend on x, with which the triangle may be flat.
-            self.trust(other, j)
-        for j in range(2):
-            m[4 * j] = to_u if self.side[j] == u else to_end
-            for k in range(3):
-                self.E[j][k] -= t * (self.V[self.corners[other, end], k] - self.V[self.corners[other, i], k])
-        m[1] = m[3] = 0.5 * (to_end + to_u - sq[2 - i])
-        value: cython.double = length + self.sagging(other, self.weight[self.corners[s, c]], limit - length, -INFINITY)
-        self.length(self.share)
-        self.turn = 0.5 * (to - back - (1.0 - 2.0 * t) * own[2 - c]) / length - self.g[self.side[0] == u] / rest
-        return value if value < limit else INFINITY
-
-    def through_both(self, s: cython.int, c: cython.int) -> cython.double:
-        """The least T(y) + |y - x| + |x - v| over a side of a triangle and those beyond; sets `share`, `far`, `away`.
-
-        Over each side beyond, the sum is convex. Where there is no triangle beyond, x is a corner.
-        """
-        best: cython.double = INFINITY
-        place: cython.double[3]
-        other: cython.int = self.over[3 * s + c] // 3
-        u: cython.int = self.over[3 * s + c] % 3
-        for i in range(3 if other != s else 0):
-            low: cython.double = 0.0
-            high: cython.double = 1.0
-            self.share[0], self.share[1], self.share[2] = 0.5, 0.5, 0.0
-            for _turn in range(MOST_TURNS if i != u else 0):
-                t: cython.double = 0.5 * (low + high)
-                value: cython.double = self.over_both(s, c, i, t, INFINITY)
-                if value < best:
-                    best, self.away, self.far[0], self.far[1] = value, 3 * other + i, self.share[0], self.share[1]
-                    for j in range(3):
-                        place[j] = t if self.corners[s, j] == self.corners[other, 3 - u - i] else 1.0 - t
-                if self.turn > 0.0:
-                    high = t
-                else:
-                    low = t
-        self.face(s, c)
-        for i in range(2):
-            self.share[i] = place[self.side[i]]
-        for i in range(2):
-            value = self.level[i] + sqrt(self.mean[s, pair(c, self.side[i])])
-            if value <= best * (1.0 + 1e3 * EQUAL):
-                best, self.away, self.share[i], self.share[1 - i] = value, -1, 1.0, 0.0
-        return best
 
     def face(self, s: cython.int, c: cython.int) -> cython.double:
         """Look at the facet opposite corner c of s: sets `side`, `at` and `level`, returns the least distance."""
@@ -307,9 +162,6 @@ class SimplexUpdate(Facet):
         Its lower bound is what T linear and the nearest corner say, with some margin. It is also inf if corner `far`,
         which is farther than c, at `best`, can lower none. That is -1 if there is no such corner.
         """
-        self.away = -1
-        if self.joint.shape[0] > 0 and self.joint[3 * s + c]:
-            return self.through_both(s, c)
         nearest: cython.double = self.face(s, c)
         farther: cython.double = self.level[0] + self.level[1] + self.level[2]  # the third of a triangle is 0
         # A corner was not reached yet.
