@@ -11,3 +11,10 @@ cdef extern from *:
     """
     double TINY
     int ROUNDS
+
+cdef double _invert(const double[:, ::1] P, const int[::1] index, const double[:, ::1] axes,
+                    float[:, ::1] inverted) noexcept nogil
+cdef void _shares(float[:, ::1] inverted, const float[:, ::1] directions, float[:, ::1] share) noexcept nogil
+cdef void _average(const float[:, ::1] directions, float[:, ::1] share, double[::1] normal) noexcept nogil
+cdef bint _sees_the_same(Py_ssize_t i, Py_ssize_t j, const double[:, ::1] normals, const double[:, ::1] radii,
+                         double[:, :, ::1] centre) noexcept nogil

@@ -46,14 +46,7 @@ def roomiest_normals(
     return normals, radii
 
 
-@cython.cfunc
-@cython.nogil
-def _invert(
-    P: cython.const[cython.double][:, ::1],
-    index: cython.const[cython.int][::1],
-    axes: cython.const[cython.double][:, ::1],
-    inverted: cython.float[:, ::1],
-) -> cython.double:
+def _invert(P, index, axes, inverted):
     """The neighbours d as 2 R d / |d|^2 (R is returned): the ball of radius R / max(that . u) along u is empty."""
     way: cython.double[3]
     last: cython.int = index[index.shape[0] - 1]
@@ -72,11 +65,7 @@ def _invert(
     return reach
 
 
-@cython.cfunc
-@cython.nogil
-def _shares(
-    inverted: cython.float[:, ::1], directions: cython.const[cython.float][:, ::1], share: cython.float[:, ::1]
-) -> cython.void:
+def _shares(inverted, directions, share):
     """Radii of the largest empty balls along all directions and opposite to them, in shares of the reach, at most 1."""
     x: cython.float[LANES]
     y: cython.float[LANES]
@@ -101,11 +90,7 @@ def _shares(
             share[0, begin + lane], share[1, begin + lane] = 1.0 / most[lane], -1.0 / least[lane]
 
 
-@cython.cfunc
-@cython.nogil
-def _average(
-    directions: cython.const[cython.float][:, ::1], share: cython.float[:, ::1], normal: cython.double[::1]
-) -> cython.void:
+def _average(directions, share, normal):
     """The mean direction on the side of the largest ball; `share` takes the fourth powers."""
     mean: cython.float[12]
     best: cython.Py_ssize_t = 0
@@ -191,15 +176,7 @@ def on_one_side(
     return found, distances
 
 
-@cython.cfunc
-@cython.nogil
-def _sees_the_same(
-    i: cython.Py_ssize_t,
-    j: cython.Py_ssize_t,
-    normals: cython.const[cython.double][:, ::1],
-    radii: cython.const[cython.double][:, ::1],
-    centre: cython.double[:, :, ::1],
-) -> cython.bint:
+def _sees_the_same(i, j, normals, radii, centre):
     alike: cython.double = normals[i, 0] * normals[j, 0] + normals[i, 1] * normals[j, 1] + normals[i, 2] * normals[j, 2]
     for side in range(2):
         # The side of j that is on the side of i towards which the normal of i points, or the other.

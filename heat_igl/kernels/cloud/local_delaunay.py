@@ -46,18 +46,7 @@ def delaunay_stars(
     return corners[:m].copy(), closed
 
 
-@cython.cfunc
-@cython.nogil
-def _neighbours_around(
-    i: cython.Py_ssize_t,
-    P: cython.const[cython.double][:, ::1],
-    axes: cython.const[cython.double][:, :, ::1],
-    neighbours: cython.const[cython.int][:, ::1],
-    least_cosine: cython.const[cython.double][::1],
-    star: cython.double[:, ::1],
-    members: cython.int[::1],
-    stack: cython.int[::1],
-) -> cython.Py_ssize_t:
+def _neighbours_around(i, P, axes, neighbours, least_cosine, star, members, stack):
     """Put the neighbours of point i into `star` and `members`, sorted by angle and inverted; return how many there are.
 
     The inversion p / |p|^2 takes circles through the point to straight lines: the star of the point is the part of the
@@ -105,9 +94,7 @@ def _neighbours_around(
     return size
 
 
-@cython.cfunc
-@cython.nogil
-def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.Py_ssize_t:
+def _visible_hull(size, star, stack):
     """The scan around the point, from the neighbour that is nearest in the plane: `stack` gets the corners of the hull.
 
     Returns how many sides there are; the last corner is the first.
@@ -130,9 +117,7 @@ def _visible_hull(size: cython.Py_ssize_t, star: cython.double[:, ::1], stack: c
     return top
 
 
-@cython.cfunc
-@cython.nogil
-def _reach(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.int[::1]) -> cython.double:
+def _reach(top, star, stack):
     """Squared distance beyond which neighbours are in no circle of the star; infinite if it is not around the point."""
     largest: cython.double = 0.0
     for a in range(top):
@@ -147,18 +132,7 @@ def _reach(top: cython.Py_ssize_t, star: cython.double[:, ::1], stack: cython.in
     return _OUTSIDE * largest
 
 
-@cython.cfunc
-@cython.nogil
-def _triangles(
-    i: cython.Py_ssize_t,
-    top: cython.Py_ssize_t,
-    star: cython.double[:, ::1],
-    members: cython.int[::1],
-    stack: cython.int[::1],
-    largest: cython.double,
-    found: cython.int[:, ::1],
-    m: cython.Py_ssize_t,
-) -> cython.Py_ssize_t:
+def _triangles(i, top, star, members, stack, largest, found, m):
     """Append the triangles of point i on the sides of the hull to the m that are found; return how many there are."""
     for a in range(top):
         p: cython.Py_ssize_t = stack[a]
@@ -174,17 +148,11 @@ def _triangles(
     return m
 
 
-@cython.cfunc
-@cython.nogil
-def _square(star: cython.double[:, ::1], a: cython.Py_ssize_t) -> cython.double:
+def _square(star, a):
     return star[a, X] * star[a, X] + star[a, Y] * star[a, Y]
 
 
-@cython.cfunc
-@cython.nogil
-def _is_hidden(
-    star: cython.double[:, ::1], p: cython.Py_ssize_t, q: cython.Py_ssize_t, r: cython.Py_ssize_t
-) -> cython.bint:
+def _is_hidden(star, p, q, r):
     """Whether q lies behind the line from p to r, less than half a turn apart."""
     if star[p, X] * star[r, Y] - star[p, Y] * star[r, X] <= 0.0:
         return False

@@ -67,11 +67,7 @@ def onto_quadrics(P: cython.const[cython.double][:, ::1], index: cython.const[cy
     return positions, deviations
 
 
-@cython.cfunc
-@cython.nogil
-def _around(
-    P: cython.const[cython.double][:, ::1], index: cython.const[cython.int][::1], local: cython.double[:, ::1]
-) -> cython.double:
+def _around(P, index, local):
     """Put 1, the way to each neighbour in units of the radius, and its weight into columns 0 to 3 and 7; the radius."""
     farthest: cython.double = 0.0
     for j in range(index.shape[0]):
@@ -91,16 +87,12 @@ def _around(
     return radius
 
 
-@cython.cfunc
-@cython.nogil
-def _along(axis: cython.double[::1], term: cython.double[::1]) -> cython.double:
+def _along(axis, term):
     """The component of a way, see `_around`, along an axis."""
     return axis[0] * term[1] + axis[1] * term[2] + axis[2] * term[3]
 
 
-@cython.cfunc
-@cython.nogil
-def _moments(local: cython.double[:, ::1], n: cython.int, moment: cython.p_double) -> cython.void:
+def _moments(local, n, moment):
     """Weighted sums of products of the first n columns: the upper half of a matrix (n, n)."""
     a: cython.int
     b: cython.int
@@ -113,9 +105,7 @@ def _moments(local: cython.double[:, ::1], n: cython.int, moment: cython.p_doubl
                 moment[n * a + b] += weighted * local[j, b]
 
 
-@cython.cfunc
-@cython.nogil
-def _eliminate(system: cython.p_double) -> cython.void:
+def _eliminate(system):
     """Solve for the last of seven columns; the matrix is symmetric and positive definite: its upper half is enough."""
     a: cython.int
     b: cython.int
@@ -131,9 +121,7 @@ def _eliminate(system: cython.p_double) -> cython.void:
         system[7 * c + 6] /= system[8 * c]
 
 
-@cython.cfunc
-@cython.nogil
-def _principal(local: cython.double[:, ::1], axes: cython.double[:, ::1]) -> cython.double:
+def _principal(local, axes):
     """The axes of most, less and least variance of the ways, see `_around`; the ratio of the two smaller variances."""
     moment: cython.double[16]
     work: cython.double[18]

@@ -28,3 +28,31 @@ cdef struct Rims:
     # Vertices by bucket; where intervals of cuts begin (+1) and end (-1) in whose rims vertices are, left and right.
     long long inside[BUCKETS]
     long long rim[2][BUCKETS]
+
+
+cdef class Dissecting:
+    cdef const int[::1] ends, neighbours
+    cdef int[::1] order
+    cdef unsigned char[::1] is_start
+    cdef long long[::1] parent
+    # Of each vertex, the place in the order, and the piece that it is in, -1 in separators.
+    cdef int[::1] position, piece
+    cdef int n_pieces
+    # The pieces left to do.
+    cdef Piece[::1] stack
+    cdef Py_ssize_t depth
+    # Distances from both ends of the piece; of `near` then buckets, then parts as -1 - part.
+    cdef int[::1] near, far, queue
+    # The function that the vertices are sorted by.
+    cdef float[::1] f, smooth
+
+cdef void _push(Dissecting d, Py_ssize_t low, Py_ssize_t high, Py_ssize_t above, int number) noexcept nogil
+cdef void _dissect_piece(Dissecting d, Piece piece) noexcept nogil
+cdef Py_ssize_t _line_up(Dissecting d, Py_ssize_t low, Py_ssize_t high) noexcept nogil
+cdef Py_ssize_t _breadth_first(Dissecting d, int root, int[::1] distance) noexcept nogil
+cdef void _average(Dissecting d, Py_ssize_t low, Py_ssize_t high, float[::1] f, float[::1] smooth) noexcept nogil
+cdef bint _fill_buckets(Dissecting d, Py_ssize_t first, Py_ssize_t end) noexcept nogil
+cdef Cut _best_cut(Dissecting d, Py_ssize_t first, Py_ssize_t end) noexcept nogil
+cdef void _assign(Dissecting d, Py_ssize_t low, Py_ssize_t high, Cut cut) noexcept nogil
+cdef int _side(int code, Cut cut) noexcept nogil
+cdef Py_ssize_t _arrange(Dissecting d, Py_ssize_t position, Py_ssize_t low, Py_ssize_t high, int part) noexcept nogil

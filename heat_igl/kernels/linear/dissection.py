@@ -104,22 +104,6 @@ class Dissecting:
     Most arrays hold a value per vertex, which only the piece that is being cut uses.
     """
 
-    ends: cython.const[cython.int][::1]
-    neighbours: cython.const[cython.int][::1]
-    order: cython.int[::1]
-    is_start: cython.uchar[::1]
-    parent: cython.longlong[::1]
-    position: cython.int[::1]  # of each vertex in the order
-    piece: cython.int[::1]  # that a vertex is in, -1 in separators
-    n_pieces: cython.int
-    stack: Piece[::1]  # the pieces left to do
-    depth: cython.Py_ssize_t
-    near: cython.int[::1]  # distance from one end of the piece; then buckets, then parts as -1 - part
-    far: cython.int[::1]  # distance from the other end
-    queue: cython.int[::1]
-    f: cython.float[::1]  # the function that the vertices are sorted by
-    smooth: cython.float[::1]
-
     def __init__(self, ends, neighbours, order, is_start, parent):
         self.ends, self.neighbours, self.order, self.is_start, self.parent = ends, neighbours, order, is_start, parent
         n = len(order)
@@ -134,19 +118,13 @@ class Dissecting:
         self.f, self.smooth = np.empty(n, np.float32), np.empty(n, np.float32)
 
 
-@cython.cfunc
-@cython.nogil
-def _push(
-    d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, above: cython.Py_ssize_t, number: cython.int
-) -> cython.void:
+def _push(d, low, high, above, number):
     if low < high:
         d.stack[d.depth] = Piece(low, high, above, number)
         d.depth += 1
 
 
-@cython.cfunc
-@cython.nogil
-def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
+def _dissect_piece(d, piece):
     """Cut a piece in two, or make it a block; the parts wait on the stack."""
     low: cython.Py_ssize_t = piece.low
     high: cython.Py_ssize_t = piece.high
@@ -192,9 +170,7 @@ def _dissect_piece(d: Dissecting, piece: Piece) -> cython.void:
     d.n_pieces += 2
 
 
-@cython.cfunc
-@cython.nogil
-def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> cython.Py_ssize_t:
+def _line_up(d, low, high):
     """Set f to the difference of the distances of a vertex from both ends of the piece.
 
     Returns the size of the piece, or that of the component in the queue if the piece is not connected.
@@ -220,9 +196,7 @@ def _line_up(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t) -> 
     return size
 
 
-@cython.cfunc
-@cython.nogil
-def _breadth_first(d: Dissecting, root: cython.int, distance: cython.int[::1]) -> cython.Py_ssize_t:
+def _breadth_first(d, root, distance):
     """Number the vertices of root's piece by their distance from it; the queue keeps them in that order."""
     here: cython.int = d.piece[root]
     d.queue[0] = root
@@ -244,11 +218,7 @@ def _breadth_first(d: Dissecting, root: cython.int, distance: cython.int[::1]) -
     return tail
 
 
-@cython.cfunc
-@cython.nogil
-def _average(
-    d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, f: cython.float[::1], smooth: cython.float[::1]
-) -> cython.void:
+def _average(d, low, high, f, smooth):
     """The mean of f over each vertex and the neighbours in the piece."""
     for i in range(low, high):
         v: cython.Py_ssize_t = d.order[i]
@@ -262,9 +232,7 @@ def _average(
         smooth[v] = cython.cast(cython.double, total) / count
 
 
-@cython.cfunc
-@cython.nogil
-def _fill_buckets(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> cython.bint:
+def _fill_buckets(d, first, end):
     """Divide the range of f evenly; false if f is constant. `near` takes the buckets."""
     low: cython.float = d.f[d.order[first]]
     high: cython.float = low
@@ -278,9 +246,7 @@ def _fill_buckets(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_
     return True
 
 
-@cython.cfunc
-@cython.nogil
-def _best_cut(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -> Cut:
+def _best_cut(d, first, end):
     """The cut whose separator is smallest for how evenly it divides the piece.
 
     A vertex is in the left rim of every cut between the vertex's bucket and the highest among its neighbours, so
@@ -325,9 +291,7 @@ def _best_cut(d: Dissecting, first: cython.Py_ssize_t, end: cython.Py_ssize_t) -
     return cut
 
 
-@cython.cfunc
-@cython.nogil
-def _assign(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, cut: Cut) -> cython.void:
+def _assign(d, low, high, cut):
     """Turn buckets into parts: 0 and 1 for the two sides and 2 for the separator, encoded as -1 - part."""
     for i in range(low, high):
         v: cython.Py_ssize_t = d.order[i]
@@ -341,20 +305,14 @@ def _assign(d: Dissecting, low: cython.Py_ssize_t, high: cython.Py_ssize_t, cut:
         d.near[v] = -1 - part
 
 
-@cython.cfunc
-@cython.nogil
-def _side(code: cython.int, cut: Cut) -> cython.int:
+def _side(code, cut):
     """The side of a vertex by bucket, or by part; a separator is on the side that gives it."""
     if code >= 0:
         return code > cut.bucket
     return cut.side if code == -1 - SEPARATOR else -1 - code
 
 
-@cython.cfunc
-@cython.nogil
-def _arrange(
-    d: Dissecting, position: cython.Py_ssize_t, low: cython.Py_ssize_t, high: cython.Py_ssize_t, part: cython.int
-) -> cython.Py_ssize_t:
+def _arrange(d, position, low, high, part):
     """Collect the vertices of a part in the queue, in their old order; return their end in the new one."""
     for i in range(low, high):
         v: cython.int = d.order[i]
