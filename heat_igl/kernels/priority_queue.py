@@ -16,11 +16,11 @@ class PriorityQueue:
         self.key, self.heap, self.place = np.zeros(size), np.empty(size, np.int64), np.full(size, -1)
         self.count = 0
 
-    def first(self) -> cython.longlong:
+    def first(self):
         """The number with the largest key; the queue must not be empty."""
         return self.heap[0]
 
-    def set_key(self, i: cython.longlong, key: cython.double) -> cython.void:
+    def set_key(self, i, key):
         """Give i another key, at least 0: insert it, move it, or remove it."""
         k: cython.longlong = self.place[i]
         if k < 0:
@@ -47,7 +47,7 @@ class PriorityQueue:
             self._lift(k)
             self._sink(self.place[last])
 
-    def _lift(self, k: cython.longlong) -> cython.void:
+    def _lift(self, k):
         """Restore the heap above index k, whose key may be too large for that place."""
         i: cython.longlong = self.heap[k]
         while k > 0:
@@ -60,7 +60,7 @@ class PriorityQueue:
         self.heap[k] = i
         self.place[i] = k
 
-    def _sink(self, k: cython.longlong) -> cython.void:
+    def _sink(self, k):
         """Restore the heap below index k, whose key may be too small for that place."""
         i: cython.longlong = self.heap[k]
         while True:

@@ -11,7 +11,7 @@ _caught = []
 _thread = threading.local()
 
 
-def is_interrupted() -> cython.bint:
+def is_interrupted():
     """Whether a loop must end: a signal handler has raised (main thread), or the event of `obey` is set (others)."""
     with cython.gil:
         try:

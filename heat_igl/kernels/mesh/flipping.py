@@ -9,7 +9,7 @@ from cython.cimports.heat_igl.kernels.mesh.triangles import area, next_half_edge
 from cython.cimports.libc.math import sqrt
 
 
-def _move(ring: cython.int[::1], old: cython.int, new: cython.int) -> cython.void:
+def _move(ring, old, new):
     """Let another half-edge take the place of one that stands among those of an edge of more than two faces."""
     h: cython.int = old
     while ring[h] != old:
@@ -65,7 +65,7 @@ class Flips:
         """The moves (k, 3) and their numbers (k, 5), as `Moved` has them; none if they are not recorded."""
         return np.array(self.kind[: self.n_moves]), np.array(self.numbers[: self.n_moves])
 
-    def measure(self, f: cython.int) -> cython.void:
+    def measure(self, f):
         """The area of a face, and which angles are obtuse: the terms are those of `improves`."""
         h: cython.int = 3 * f
         self.area[f] = 2.0 * area(self.length[h], self.length[h + 1], self.length[h + 2])
@@ -76,7 +76,7 @@ class Flips:
         self.is_obtuse[h + 1] = c + a < b
         self.is_obtuse[h + 2] = a + b < c
 
-    def wait(self, h: cython.int) -> cython.void:
+    def wait(self, h):
         """Let the edge of half-edge h wait, unless it does already or has one face."""
         if self.twin[h] > h:
             h = self.twin[h]
@@ -85,7 +85,7 @@ class Flips:
             self.waiting[self.n_waiting] = h
             self.n_waiting += 1
 
-    def next(self) -> cython.int:
+    def next(self):
         """The next waiting half-edge whose edge is to be flipped; -1 if there is none."""
         while self.n_waiting > 0:
             self.n_waiting -= 1
@@ -95,7 +95,7 @@ class Flips:
                 return h
         return -1
 
-    def improves(self, h: cython.int) -> cython.bint:
+    def improves(self, h):
         """Whether the edge of half-edge h is to be flipped; keeps the length of the new one."""
         t: cython.int = self.twin[h]
         if t < 0:
@@ -123,7 +123,7 @@ class Flips:
         self.diagonal = sqrt(x * x + y * y)
         return area(pa, aq, self.diagonal) > 0.0 and area(qb, bp, self.diagonal) > 0.0
 
-    def flip(self, h: cython.int) -> cython.int:
+    def flip(self, h):
         """Flip the edge of half-edge h, and let the four edges around it wait."""
         t: cython.int = self.twin[h]
         after_h: cython.int = next_half_edge(h)
@@ -152,7 +152,7 @@ class Flips:
         self.wait(previous_half_edge(t))
         return 0
 
-    def glue(self, old: cython.int, new: cython.int, twin: cython.int) -> cython.void:
+    def glue(self, old, new, twin):
         """Give half-edge `new` what half-edge `old` was glued to."""
         self.twin[new] = twin
         if twin >= 0:
@@ -160,7 +160,7 @@ class Flips:
         elif twin == -2:
             _move(self.ring, old, new)
 
-    def append_move(self, kind: cython.int, h: cython.int, mate: cython.int) -> cython.int:
+    def append_move(self, kind, h, mate):
         """Append a move and return the row of it; the caller fills in the numbers."""
         if self.n_moves == self.kind.shape[0]:
             with cython.gil:  # twice the room

@@ -45,7 +45,7 @@ class _Refinement:
         self.is_sharp = np.zeros(n_vertices, np.uint8)
         self.n_faces, self.n_vertices = size // 3, n_vertices
 
-    def run(self, most_vertices: cython.longlong) -> cython.int:
+    def run(self, most_vertices):
         """Refine until no triangle is bad, or there are `most_vertices`."""
         f: cython.int
         for f in range(self.n_faces):
@@ -61,12 +61,12 @@ class _Refinement:
                 self.insert(center)
         return 0
 
-    def judge(self, f: cython.int) -> cython.void:
+    def judge(self, f):
         """Measure a triangle that is new or has changed, and move it to the right place in the queue, or out of it."""
         self.flips.measure(f)
         self.bad.set_key(f, self.badness(f))
 
-    def badness(self, f: cython.int) -> cython.double:
+    def badness(self, f):
         """Circumradius of a bad triangle in the unit of the face, 0 of another."""
         h: cython.int = 3 * f
         a: cython.double = self.flips.length[h]
@@ -87,7 +87,7 @@ class _Refinement:
         tip: cython.int = self.flips.vertex[h + shortest]
         return 0.0 if tip < self.is_sharp.shape[0] and self.is_sharp[tip] else badness
 
-    def insert(self, at: Location) -> cython.int:
+    def insert(self, at):
         """Make a location a vertex and flip edges until all are Delaunay."""
         u: cython.double = max(at.u, _LEAST)
         v: cython.double = max(at.v, _LEAST)
@@ -113,7 +113,7 @@ class _Refinement:
             h = self.flips.next()
         return 0
 
-    def split(self, f: cython.int, u: cython.double, v: cython.double, w: cython.double) -> cython.int:
+    def split(self, f, u, v, w):
         """Split face f at barycentric coordinates u, v, w, which sum to 1: a new vertex, and two faces at the end."""
         length: cython.double[::1] = self.flips.length
         vertex: cython.int[::1] = self.flips.vertex
@@ -152,7 +152,7 @@ class _Refinement:
         self.glue(g + 2, k + 1)
         return 0
 
-    def glue(self, h: cython.int, t: cython.int) -> cython.void:
+    def glue(self, h, t):
         """Make two half-edges twins."""
         self.flips.twin[h] = t
         self.flips.twin[t] = h
@@ -165,7 +165,7 @@ class _Refinement:
         return *arrays, int(self.n_vertices), *flips.moves()
 
 
-def _find_sharp(t: Flips, n_faces: cython.int, seen: cython.uchar[::1], is_sharp: cython.uchar[::1]) -> cython.void:
+def _find_sharp(t, n_faces, seen, is_sharp):
     """Mark vertices with a fan of faces whose angles sum to less than `_SHARPEST`: no split or flip changes that."""
     for first in range(3 * n_faces):
         at: cython.int = first
@@ -184,7 +184,7 @@ def _find_sharp(t: Flips, n_faces: cython.int, seen: cython.uchar[::1], is_sharp
             is_sharp[t.vertex[first]] = True
 
 
-def _circumcenter(t: Flips, f: cython.int) -> Location:
+def _circumcenter(t, f):
     """Locate the circumcenter of a triangle, in the triangle or straight on from it; face -1 if it is not found."""
     a: cython.double = t.length[3 * f]
     b: cython.double = t.length[3 * f + 1]

@@ -16,12 +16,7 @@ class SegmentList:
         """Faces (n,) int64, and barycentric coordinates (n, 2, 3)."""
         return np.array(self.face[: self.n], np.int64), np.array(self.place[: self.n])
 
-    def append(
-        self,
-        f: cython.int,
-        start: cython.pointer[cython.const[cython.double]],
-        end: cython.pointer[cython.const[cython.double]],
-    ) -> cython.int:
+    def append(self, f, start, end):
         """Add a segment in face f."""
         if self.n == self.face.shape[0]:
             with cython.gil:  # twice the room

@@ -20,9 +20,7 @@ class Funnel:
     def __init__(self):
         self.gate, self.bend = np.empty(64, _GATE), np.empty(66, _BEND)
 
-    def lay_out(
-        self, s: FaceTable, face: cython.int, start: cython.pointer[cython.const[Place]], strip: Strip
-    ) -> cython.int:
+    def lay_out(self, s, face, start, strip):
         """Lay out the strip that begins in a face, for paths from `start` there."""
         if strip.count > self.gate.shape[0]:
             with cython.gil:
@@ -66,7 +64,7 @@ class Funnel:
         self.last = p
         return 0
 
-    def pull_tight(self, x: cython.double, y: cython.double) -> cython.void:
+    def pull_tight(self, x, y):
         """The shortest path to (x, y): `bend` 0 is the start and the last one the end."""
         k: cython.int = self.n_gates
         count: cython.int = 1
@@ -104,7 +102,7 @@ class Funnel:
         self.bend[count] = FunnelCorner(x, y, -1, k, k)
         self.n_bends = count + 1
 
-    def corner(self, at: cython.int, side: cython.int) -> FunnelCorner:
+    def corner(self, at, side):
         """An end of the crossing `at`, with all crossings there that share it."""
         gate = cython.address(self.gate[at])
         first: cython.int = at
@@ -115,14 +113,14 @@ class Funnel:
             last += 1
         return FunnelCorner(gate.x[side], gate.y[side], side, first, last)
 
-    def length(self) -> cython.double:
+    def length(self):
         """Length of the shortest path."""
         total: cython.double = 0.0
         for i in range(1, self.n_bends):
             total += hypot(self.bend[i].x - self.bend[i - 1].x, self.bend[i].y - self.bend[i - 1].y)
         return total
 
-    def share(self, j: cython.int, i: cython.int) -> cython.double:
+    def share(self, j, i):
         """The share from right end (0) to left end (1) at which the path passes crossing j on the way to bend i."""
         gate = cython.address(self.gate[j])
         if self.bend[i].side >= 0 and self.bend[i].first <= j:

@@ -96,16 +96,16 @@ class Shortener:
                 self.emit()
         return stuck, self.length, *self.segments.arrays()
 
-    def begin(self, face: cython.int, start: Place) -> cython.void:
+    def begin(self, face, start):
         """Begin a strip."""
         self.ends.face, self.ends.start, self.strip.count = face, start, 0
         self.ends.vertex = vertex_at(self.s, face, cython.address(start))
 
-    def last_face(self) -> cython.int:
+    def last_face(self):
         """The face that the strip ends in."""
         return self.strip.crossing[self.strip.count - 1].enter // 3 if self.strip.count > 0 else self.ends.face
 
-    def turn(self, v: cython.int, goal: cython.int) -> cython.bint:
+    def turn(self, v, goal):
         """Lead the strip, which ends at vertex v, around it to face `goal`, the shorter way; False if there is none."""
         f: cython.int = self.last_face()
         if f == goal:
@@ -116,17 +116,17 @@ class Shortener:
         self.strip.extend(self.detour.way, 0, count)
         return count >= 0
 
-    def save(self) -> cython.int:
+    def save(self):
         """Keep the path as it is now, in place of the one kept before."""
         self.kept_ends = self.ends
         return self.kept.copy(self.strip)
 
-    def restore(self) -> cython.int:
+    def restore(self):
         """Return to the path that was kept."""
         self.ends = self.kept_ends
         return self.strip.copy(self.kept)
 
-    def emit(self) -> cython.int:
+    def emit(self):
         """Append the segments of the path through the strip, without those of no length."""
         k: cython.int = self.strip.count
         i: cython.int = 1
@@ -151,7 +151,7 @@ class Shortener:
                 x = self.on(j, f, share)
         return 0
 
-    def on(self, j: cython.int, f: cython.int, share: cython.double) -> Place:
+    def on(self, j, f, share):
         """The place in face f that lies `share` of the way from the right to the left end of crossing j."""
         gate = cython.address(self.funnel.gate[j])
         x: Place
@@ -160,7 +160,7 @@ class Shortener:
         x.c[corner_of(self.s, f, gate.vertex[1])] = 1.0 - share
         return x
 
-    def settle(self) -> cython.double:
+    def settle(self):
         """Lead the strip until the shortest path in it is locally shortest; returns the length."""
         shortest: cython.double = INFINITY
         failures: cython.int = 0
@@ -173,7 +173,7 @@ class Shortener:
                 break
         return length
 
-    def lay_out(self) -> cython.double:
+    def lay_out(self):
         """Find the shortest path in the strip as it is; returns the length."""
         self.trim()
         self.funnel.lay_out(self.s, self.ends.face, cython.address(self.ends.start), self.strip)
@@ -181,7 +181,7 @@ class Shortener:
         self.funnel.pull_tight(weighted(end, self.funnel.last.x), weighted(end, self.funnel.last.y))
         return self.funnel.length()
 
-    def repair(self) -> cython.int:
+    def repair(self):
         """Lead the strip the other way around the bends if that is shorter; 0 if there are none."""
         self.other.count = 0
         copied: cython.int = 0
@@ -203,7 +203,7 @@ class Shortener:
         self.strip.copy(self.other)
         return 1
 
-    def shorter_way(self, i: cython.int) -> cython.int:
+    def shorter_way(self, i):
         """Find a shorter way around the i-th bend; returns the number of crossings in ``detour.way``, -1 if none."""
         bend = cython.address(self.funnel.bend[i])
         first = cython.address(self.funnel.gate[bend.first])
@@ -228,7 +228,7 @@ class Shortener:
             before.this = INFINITY  # on the side of the strip there is no other way
         return self.detour.find(self.s, v, h, before, e, g, after, M_PI - _NEARLY_STRAIGHT)
 
-    def is_one_way(self, first: cython.int, last: cython.int, v: cython.int) -> cython.bint:
+    def is_one_way(self, first, last, v):
         """Whether these crossings at v neither close around it nor cross an edge at which ways branch.
 
         Then the angle on the side of the strip, pi at least, is the only one there.
@@ -238,7 +238,7 @@ class Shortener:
                 return False
         return last - first < self.s.first_corner[v + 1] - self.s.first_corner[v] - 1
 
-    def trim(self) -> cython.void:
+    def trim(self):
         """Drop crossings of edges on which the path starts or ends: rounding would put it on either side."""
         n_dropped: cython.int = 0
         end_vertex: cython.int = vertex_at(self.s, self.last_face(), cython.address(self.ends.end))
@@ -269,7 +269,7 @@ class Shortener:
         if end_vertex >= 0:
             self.ends.end = at_corner(corner_of(self.s, self.last_face(), end_vertex))
 
-    def improve(self, length: cython.double) -> cython.double:
+    def improve(self, length):
         """Lead a settled path past vertices on the other side while that makes it shorter; returns the length."""
         self.n_tried = 0
         is_better: cython.bint = True
@@ -288,7 +288,7 @@ class Shortener:
                 self.settle()
         return length
 
-    def propose(self) -> cython.int:
+    def propose(self):
         """Keep the strip of a straightened path, and note the vertices not tried before; returns their number.
 
         Laid flat, a path around one vertex is shorter on the other side if it spans more than half of the angles there.
@@ -319,7 +319,7 @@ class Shortener:
                         self.note(j, side, 2.0 * (product * cos(turn) - spanned) / squared)
         return self.n_choices
 
-    def note(self, j: cython.int, side: cython.int, saved: cython.double) -> cython.void:
+    def note(self, j, side, saved):
         """Insert the vertex at a side of crossing j into the sorted choices."""
         v: cython.int = self.funnel.gate[j].vertex[side]
         # The promise looks at one vertex alone, and those beside it may turn a loss into a gain: an open path tries it.
@@ -341,7 +341,7 @@ class Shortener:
         at: FunnelCorner = self.funnel.corner(j, side)
         self.choice[i] = Choice(saved, v, at.first, at.last)
 
-    def lead(self, choice: Choice) -> cython.bint:
+    def lead(self, choice):
         """Lead the path that was kept around a vertex the other way; False if no faces are there."""
         if self.n_tried == _MOST_TRIED:
             return False
@@ -363,7 +363,7 @@ class Shortener:
         self.strip.extend(self.kept.crossing, choice.last + 1, self.kept.count)
         return True
 
-    def shorten_loop(self) -> cython.double:
+    def shorten_loop(self):
         """Lead the strip to the shortest loop of its class that is found; returns the length."""
         # Past all bends once, from each of the first bases.
         for _ in range(_FIRST_BASES):
@@ -387,7 +387,7 @@ class Shortener:
                 break
         return length
 
-    def slide(self, length: cython.double) -> cython.double:
+    def slide(self, length):
         """Move the base of a settled loop without a bend along the edge that it is on; returns the length."""
         side: cython.int = side_of(cython.address(self.ends.start))
         if self.ends.vertex >= 0 or side < 0 or self.funnel.n_bends > 2:
@@ -428,9 +428,7 @@ class Shortener:
             share = 0.5 * (share + here)
         return self.settle()
 
-    def place_base(
-        self, f: cython.int, a: cython.int, b: cython.int, a_end: cython.int, b_end: cython.int, share: cython.double
-    ) -> cython.void:
+    def place_base(self, f, a, b, a_end, b_end, share):
         """Put the base `share` of the way from a to b: corners of the first face f, and of the last face."""
         for c in range(3):
             self.ends.start.c[c] = self.ends.end.c[c] = 0.0
@@ -443,7 +441,7 @@ class Shortener:
         self.ends.face = f
         self.ends.vertex = vertex_at(self.s, f, cython.address(self.ends.start))
 
-    def move_base(self) -> cython.bint:
+    def move_base(self):
         """Base the loop elsewhere: at the middle one of its bends, or else on the middle one of its edges."""
         n_bends: cython.int = self.funnel.n_bends
         at: cython.int = self.strip.count // 2
@@ -476,7 +474,7 @@ class Shortener:
         )
         return True
 
-    def close(self) -> cython.bint:
+    def close(self):
         """Lead the strip on past the base into the first face; False if no face leads there."""
         f: cython.int = self.last_face()
         if f == self.ends.face:

@@ -21,13 +21,7 @@ _IDLE = cython.declare(cython.double, 1e-6)
 class _Tracer:
     """Triangles, the geodesic being traced, and room for the segments of all, if they are stored."""
 
-    def trace_one(
-        self,
-        face: cython.longlong,
-        at: cython.pointer[cython.const[cython.double]],
-        turn: cython.double,
-        length: cython.double,
-    ) -> cython.int:
+    def trace_one(self, face, at, turn, length):
         """One geodesic, to ``leave`` in ``end_face``; `travelled` is -1 if it is lost among faces without area.
 
         It begins at barycentric coordinates `at` in `face`, at the angle `turn` from the direction of corner 0 to
@@ -69,7 +63,7 @@ class _Tracer:
             self.store(self.end_face)
         return 0
 
-    def start(self, f: cython.longlong, turn: cython.double) -> cython.bint:
+    def start(self, f, turn):
         """Set the ray off in face f from `entry`; false if it leads out of the surface at once."""
         # From the nearest corner on, so that near it the vector to it keeps its digits.
         k: cython.int = 0
@@ -98,7 +92,7 @@ class _Tracer:
         self.ray = Heading(cython.cast(cython.int, 3 * f + side), INSIDE, x, y, cos(turn), sin(turn))
         return True
 
-    def leave_corner(self, corner: cython.longlong, turn: cython.double) -> cython.bint:
+    def leave_corner(self, corner, turn):
         """Let the ray leave a vertex at the angle `turn` from the side that leaves from `corner`; false if it cannot.
 
         It cannot if that is beyond the boundary.
@@ -138,7 +132,7 @@ class _Tracer:
         self.ray = Heading(h, OUT_OF_TAIL, 0.0, 0.0, cos(turn), sin(turn))
         return True
 
-    def find_exit(self) -> cython.double:
+    def find_exit(self):
         """Find the point at which the ray leaves the face; returns the length of the segment up to there.
 
         The point is the share `share` of the half-edge ``exit.h``.
@@ -160,7 +154,7 @@ class _Tracer:
         self.leave[(p.h + 2) % 3] = self.share
         return max(p.tail_ahead + self.share * (p.head_ahead - p.tail_ahead), 0.0)
 
-    def pass_vertex(self) -> cython.bint:
+    def pass_vertex(self):
         """Go on past the vertex that the ray meets, with equal angles on both sides; false if the surface ends."""
         p = cython.address(self.exit)
         f: cython.longlong = p.h // 3
@@ -182,7 +176,7 @@ class _Tracer:
             self.leave_corner(3 * f + k, turn - M_PI)
         return True
 
-    def cross_side(self) -> cython.bint:
+    def cross_side(self):
         """Go on in the face across the side that the ray meets; false on the boundary."""
         p = cython.address(self.exit)
         t: cython.longlong = self.twin[p.h]
@@ -196,7 +190,7 @@ class _Tracer:
         self.ray = Heading(cython.cast(cython.int, t), OVER_SIDE, x, 0.0, p.dx / size, fabs(p.dy) / size)
         return True
 
-    def store(self, f: cython.longlong) -> cython.int:
+    def store(self, f):
         """Store the segment from `entry` to `leave` of face f, if segments are asked for."""
         if self.segments is not None:
             self.segments.append(cython.cast(cython.int, f), self.entry, self.leave)

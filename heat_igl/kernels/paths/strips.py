@@ -21,7 +21,7 @@ class Strip:
     def __init__(self):
         self.crossing = np.empty(64, _CROSSING)
 
-    def push(self, leave: cython.int, enter: cython.int) -> cython.int:
+    def push(self, leave, enter):
         """Add a crossing; two over one edge are joined, and going back takes both away."""
         last: cython.int = self.count - 1
         if last < 0 or self.crossing[last].enter != leave:
@@ -36,18 +36,18 @@ class Strip:
             self.count -= 1
         return 0
 
-    def extend(self, crossing: Crossing[::1], begin: cython.int, end: cython.int) -> cython.int:
+    def extend(self, crossing, begin, end):
         """Add crossings `begin` to `end`, exclusive."""
         for j in range(begin, end):
             self.push(crossing[j].leave, crossing[j].enter)
         return 0
 
-    def copy(self, other: Strip) -> cython.int:
+    def copy(self, other):
         """Become a copy of another strip."""
         self.count = 0
         return self.extend(other.crossing, 0, other.count)
 
-    def drop(self, k: cython.int) -> cython.void:
+    def drop(self, k):
         """Take away the first k."""
         self.count -= k
         for i in range(self.count):
@@ -64,17 +64,7 @@ class Detour:
         room = 4 * n_corners + 4
         self.step, self.tip, self.way = np.empty(room, _AROUND), np.empty(room, _TIP), np.empty(room, _CROSSING)
 
-    def find(
-        self,
-        s: FaceTable,
-        v: cython.int,
-        h: cython.int,
-        before: Sides,
-        goal: cython.int,
-        end: cython.int,
-        after: Sides,
-        limit: cython.double,
-    ) -> cython.int:
+    def find(self, s, v, h, before, goal, end, after, limit):
         """The shortest way around v from the face of half-edge h to face `goal`.
 
         The length is the sum of the angles at v: in the first face `before`, of h; in the last face `after`, of
@@ -133,7 +123,7 @@ class Detour:
                 n_steps += 1
         return -1
 
-    def _crossings(self, last: cython.int) -> cython.int:
+    def _crossings(self, last):
         """The crossings of the way with this last step; returns how many."""
         count: cython.int = 0
         at: cython.int = last

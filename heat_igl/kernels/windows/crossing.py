@@ -258,9 +258,7 @@ def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
     prefetch(s.bulge + t)
 
 
-@cython.cfunc
-@cython.nogil
-def cross(s: cython.pointer(Search), h: cython.int) -> cython.void:
+def cross(s, h):
     """Propagate the windows that wait at half-edge h across its face."""
     place: cython.int = s.slot[h]
     one: cython.pointer(List) = cython.address(s.lists[place])
@@ -367,9 +365,7 @@ def _measure(
         j = s.next_target[j]
 
 
-@cython.cfunc
-@cython.nogil
-def over_corners(s: cython.pointer(Search), j: cython.int) -> cython.void:
+def over_corners(s, j):
     """Update the distance of target j by paths over the corners of its face."""
     f: cython.int = s.target_face[j]
     c: cython.int

@@ -32,7 +32,7 @@ from cython.cimports.heat_igl.kernels.windows.surface import beyond, third, turn
 from cython.cimports.libc.math import fabs, sqrt
 
 
-def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
+def emit_point(s, p):
     """Emit windows from a source point inside a face over the three sides of the face."""
     f: cython.int = s.point_face[p]
     root: cython.int = s.n + p
@@ -81,7 +81,7 @@ def emit_point(s: cython.pointer(Search), p: cython.int) -> cython.void:
         j = s.next_target[j]
 
 
-def emit_segment(s: cython.pointer(Search), i: cython.int) -> cython.void:
+def emit_segment(s, i):
     """Distances from source segment i to the corners and targets of its face, and windows over the sides."""
     f: cython.int = s.segment_face[i]
     root: cython.int = s.n + s.n_points + i
@@ -267,7 +267,7 @@ def _fill(
         side = s.twin[side]
 
 
-def emit_vertex(s: cython.pointer(Search), v: cython.int) -> cython.void:
+def emit_vertex(s, v):
     """Emit windows from vertex v into all directions in which a shortest path can continue."""
     h: cython.int = s.entered[v]
     at: cython.double = s.crossing[v]

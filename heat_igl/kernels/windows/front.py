@@ -31,7 +31,7 @@ from cython.cimports.libc.stdlib import free
 from cython.cimports.libc.string import memmove
 
 
-def allocate(s: cython.pointer(Search)) -> cython.void:
+def allocate(s):
     """Allocate the memory of a front."""
     s.n_lists = s.n_made_lists = s.n_heap = s.n_touched = s.n_found = 0
     s.n_all_lists = s.n_all_heap = 0
@@ -45,14 +45,14 @@ def allocate(s: cython.pointer(Search)) -> cython.void:
     more_room(s, 128)
 
 
-def more_room(s: cython.pointer(Search), n: cython.int) -> cython.void:
+def more_room(s, n):
     """Allocate room for n windows on each side of an apex."""
     room, failed = cython.address(s.n_out), cython.address(s.failed)
     s.to_left = cython.cast(cython.pointer(Window), grown(s.to_left, room, n, cython.sizeof(Window), failed))
     s.to_right = cython.cast(cython.pointer(Window), grown(s.to_right, room, n, cython.sizeof(Window), failed))
 
 
-def empty_front(s: cython.pointer(Search)) -> cython.void:
+def empty_front(s):
     """Remove all waiting windows and queue entries; lists and queue keep their memory."""
     for i in range(s.n_lists):
         if s.lists[i].half_edge >= 0:
@@ -67,7 +67,7 @@ def empty_front(s: cython.pointer(Search)) -> cython.void:
         s.kept = cython.NULL
 
 
-def free_front(s: cython.pointer(Search)) -> cython.void:
+def free_front(s):
     """Return the memory of a front."""
     for i in range(s.n_made_lists):
         free(s.lists[i].windows)
@@ -77,7 +77,7 @@ def free_front(s: cython.pointer(Search)) -> cython.void:
     free(s.to_right)
 
 
-def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cython.void:
+def push(s, key, what):
     """Add to the queue, a binary heap."""
     if s.n_heap == s.n_all_heap:
         more = grown(s.heap, cython.address(s.n_all_heap), s.n_heap + 1, cython.sizeof(Entry), cython.address(s.failed))
@@ -96,7 +96,7 @@ def push(s: cython.pointer(Search), key: cython.double, what: cython.int) -> cyt
     s.heap[i].what = what
 
 
-def pop(s: cython.pointer(Search)) -> Entry:
+def pop(s):
     """Take the entry with the smallest key."""
     heap: cython.pointer(Entry) = s.heap
     top: Entry = heap[0]
@@ -123,7 +123,7 @@ def pop(s: cython.pointer(Search)) -> Entry:
     return top
 
 
-def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython.void:
+def aim_at(s, v, goal):
     """Make the search from v one for the distance of `goal` alone, bounded by the length of a path along edges.
 
     The path is greedy: each edge minimizes its length plus the straight distance from its end to the goal. There is no
@@ -153,7 +153,7 @@ def aim_at(s: cython.pointer(Search), v: cython.int, goal: cython.int) -> cython
     s.within = with_rounding(length)
 
 
-def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int) -> cython.int:
+def towards_goal(s, e, run, n):
     """Keep the windows over e that may contain a path to the goal no longer than the known bound; returns their number.
 
     A path from a point of e to the goal is at least as long as the straight line from an end of e to the goal, minus
@@ -176,19 +176,7 @@ def towards_goal(s: cython.pointer(Search), e: cython.int, run: cython.pointer(W
     return k
 
 
-@cython.cfunc
-@cython.nogil
-def relax(
-    s: cython.pointer(Search),
-    v: cython.int,
-    distance: cython.double,
-    root: cython.int,
-    entered: cython.int,
-    crossing: cython.double,
-    corner: cython.int,
-    x: cython.double,
-    y: cython.double,
-) -> cython.void:
+def relax(s, v, distance, root, entered, crossing, corner, x, y):
     """Lower the distance of v to `distance` if that is smaller, and store the path: root, half-edge, and crossing.
 
     The last straight part of the path leaves the root through a corner, in the direction (x, y). The first axis of the
@@ -227,7 +215,7 @@ def relax(
         push(s, distance, s.n_half_edges + v)
 
 
-def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root: cython.int) -> cython.void:
+def take(s, j, distance, root):
     """Lower the distance of target j to one along a straight line inside the face, if that is shorter."""
     if distance < s.target_distance[j]:
         s.target_distance[j] = distance
@@ -235,7 +223,7 @@ def take(s: cython.pointer(Search), j: cython.int, distance: cython.double, root
         s.target_entered[j] = -1
 
 
-def tell(s: cython.pointer(Search), v: cython.int, distance: cython.double) -> cython.void:
+def tell(s, v, distance):
     """Record a distance of vertex v for the search on the other thread."""
     n: cython.int = s.n_news[s.parity]
     if n == s.n_all_news[s.parity]:
@@ -283,14 +271,7 @@ def _mirrored(w: Window, length: cython.double) -> Window:
     return w
 
 
-def append(
-    s: cython.pointer(Search),
-    t: cython.int,
-    run: cython.pointer(Window),
-    n: cython.int,
-    turns: cython.int,
-    mirrored: cython.bint,
-) -> cython.void:
+def append(s, t, run, n, turns, mirrored):
     """Add windows to those that wait at half-edge t."""
     place: cython.int = s.slot[t]
     to: cython.pointer(Window)
@@ -362,9 +343,7 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
     return place
 
 
-def add(
-    s: cython.pointer(Search), e: cython.int, run: cython.pointer(Window), n: cython.int, turns: cython.int
-) -> cython.void:
+def add(s, e, run, n, turns):
     """Add windows that cross half-edge e out of its face; their frame runs from the head of e to its tail."""
     t: cython.int = s.twin[e]
     if s.aim >= 0:
@@ -380,7 +359,7 @@ def add(
             t = s.ring[t]
 
 
-def start_at(s: cython.pointer(Search), v: cython.int, offset: cython.double, label: cython.int) -> cython.void:
+def start_at(s, v, offset, label):
     """Make vertex v a source with the given offset."""
     if not s.failed and offset < s.upper[v]:
         s.label[v] = label

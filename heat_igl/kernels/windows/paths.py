@@ -92,20 +92,14 @@ class PathTracer:
         self.segment_face, self.segment = segments.faces, segments.barycentric
         self.segment_offset = sources.segment_offset
 
-    def source_face(self, root: cython.int) -> cython.int:
+    def source_face(self, root):
         """The face of a source inside a face; -1 if the root is a vertex."""
         i: cython.int = root - self.n
         if i < 0:
             return -1
         return self.point_face[i] if i < self.n_points else self.segment_face[i - self.n_points]
 
-    def nearest_source(
-        self,
-        side: cython.pointer[cython.const[cython.double]],
-        root: cython.int,
-        here: cython.p_double,
-        found: cython.p_double,
-    ) -> cython.double:
+    def nearest_source(self, side, root, here, found):
         """Find the point of a source that is nearest to a point of its face; returns the offset of the source."""
         i: cython.int = root - self.n
         if i < self.n_points:
@@ -116,7 +110,7 @@ class PathTracer:
         nearest_on(side, cython.address(self.segment[i, 0, 0]), here, found)
         return self.segment_offset[i]
 
-    def along_bends(self, v: cython.int) -> cython.int:
+    def along_bends(self, v):
         """Trace the path from vertex v to a source; AT_SOURCE or LOST."""
         while v >= 0:
             if self.root[v] == v:
@@ -124,7 +118,7 @@ class PathTracer:
             v = self.from_vertex(v)
         return v
 
-    def from_vertex(self, v: cython.int) -> cython.int:
+    def from_vertex(self, v):
         """The vertex at which the last straight part of the path to v starts, AT_SOURCE for one in a face, or LOST."""
         begin: LineEnd
         h: cython.int = self.entered[v]
@@ -148,7 +142,7 @@ class PathTracer:
         begin.x, begin.y, begin.z = h % 3 == 0, h % 3 == 1, h % 3 == 2
         return self.straight(cython.address(begin))
 
-    def straight(self, begin: cython.pointer[cython.const[LineEnd]]) -> cython.int:
+    def straight(self, begin):
         """The vertex at which the straight part of a path that ends at `begin` starts, or as `along_bends`."""
         h: cython.int = begin.entered
         f: cython.int = begin.face
@@ -185,15 +179,13 @@ class PathTracer:
                 return v
         return LOST
 
-    def leads(self, begin: cython.pointer[cython.const[LineEnd]], v: cython.int, left: cython.double) -> cython.bint:
+    def leads(self, begin, v, left):
         """Whether the distance of v plus the length `left` equals the distance at `begin`."""
         tolerance: cython.double = _AT_ROOT if v == begin.root else _ON_LINE
         d: cython.double = self.distance[v]
         return d < begin.distance and d + left - begin.distance <= tolerance * begin.distance
 
-    def go_through(
-        self, begin: cython.pointer[cython.const[LineEnd]], line: cython.pointer[cython.const[Line]]
-    ) -> cython.int:
+    def go_through(self, begin, line):
         """Continue a line through the face that it enters: a vertex at which it starts, GO_ON, AT_SOURCE or LOST."""
         t: cython.int = line.ray.h
         g: cython.int = t // 3
@@ -225,9 +217,7 @@ class PathTracer:
         self.go_over(cython.address(out))
         return GO_ON
 
-    def is_too_far(
-        self, begin: cython.pointer[cython.const[LineEnd]], line: cython.pointer[cython.const[Line]]
-    ) -> cython.bint:
+    def is_too_far(self, begin, line):
         """Whether an end of the half-edge that a line crosses is too far from the source for the line to be a path.
 
         If the search ended at the distance of `begin`, larger distances are only known to be larger.
@@ -238,7 +228,7 @@ class PathTracer:
         at_tail: cython.double = min(self.distance[self.vertex[next_half_edge(h)]], begin.distance)
         return at_head > left + line.ray.x or at_tail > left + self.length[h] - line.ray.x
 
-    def go_over(self, line: cython.pointer[cython.const[Line]]) -> cython.void:
+    def go_over(self, line):
         """Store a line, in the outward frame of the half-edge that it crosses, for each face on the other side."""
         h: cython.int = line.ray.h
         t: cython.int = self.twin[h]
@@ -250,7 +240,7 @@ class PathTracer:
                 self.note(t, line, self.vertex[next_half_edge(t)] == self.vertex[next_half_edge(h)])
                 t = self.ring[t]
 
-    def note(self, t: cython.int, line: cython.pointer[cython.const[Line]], mirrored: cython.bint) -> cython.void:
+    def note(self, t, line, mirrored):
         """Store a line that enters a face over half-edge t, with its frame mirrored if the faces are not aligned."""
         if self.n_lines == MOST_LINES:
             return
@@ -261,9 +251,7 @@ class PathTracer:
             to.ray.x, to.ray.dx = self.length[t] - line.ray.x, -line.ray.dx
         self.n_lines += 1
 
-    def is_at_source(
-        self, begin: cython.pointer[cython.const[LineEnd]], f: cython.int, here: cython.p_double, walked: cython.double
-    ) -> cython.bint:
+    def is_at_source(self, begin, f, here, walked):
         """Whether the source of the path lies inside face f, at the distance that is left."""
         there: cython.double[3]
         side: cython.pointer[cython.const[cython.double]] = cython.address(self.length[3 * f])
@@ -272,14 +260,14 @@ class PathTracer:
         walked += self.nearest_source(side, begin.root, here, there)
         return fabs(walked + apart(side, here, there) - begin.distance) <= _AT_ROOT * begin.distance
 
-    def add(self, f: cython.int, here: cython.p_double, h: cython.int, x: cython.double) -> cython.int:
+    def add(self, f, here, h, x):
         """Add a segment that ends at x in the outward frame of half-edge h."""
         there: cython.double[3]
         share: cython.double = x / self.length[h]
         there[h % 3], there[previous_half_edge(h) % 3], there[next_half_edge(h) % 3] = 0.0, 1.0 - share, share
         return self.segments.append(f, here, there)
 
-    def add_to_source(self, f: cython.int, here: cython.p_double, root: cython.int) -> cython.int:
+    def add_to_source(self, f, here, root):
         """Add a segment that ends at a source inside face f."""
         there: cython.double[3]
         if self.source_face(root) != f:

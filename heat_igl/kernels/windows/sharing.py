@@ -29,12 +29,12 @@ from cython.cimports.libc.stdlib import free, malloc
 _TRIES = cython.declare(cython.int, 2000)
 
 
-def load(s: cython.pointer(Search)) -> cython.longlong:
+def load(s):
     """Estimated amount of work on the front, as a number of windows; 0 if there is none."""
     return s.n_waiting + PER_LIST * s.n_heap
 
 
-def meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
+def meet(s, which):
     """Wait for the other thread, at first by spinning, since rounds are short."""
     PyThread_release_lock(s.arrived[which])
     for _ in range(_TRIES):
@@ -43,7 +43,7 @@ def meet(s: cython.pointer(Search), which: cython.int) -> cython.void:
     PyThread_acquire_lock(s.other.arrived[which], WAIT_LOCK)
 
 
-def balance(s: cython.pointer(Search)) -> cython.bint:
+def balance(s):
     """Hand over windows if one thread has more work; true if one thread has all, because there is little work."""
     o: cython.pointer(Search) = s.other
     mine: cython.longlong = s.load[s.parity]

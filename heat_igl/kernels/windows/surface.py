@@ -13,7 +13,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     JOINS,
     PASSED,
     Direction,
-    Search,
     twice_product,
 )
 from cython.cimports.libc.math import fabs
@@ -84,12 +83,12 @@ def shapes(tables) -> bool:
     return is_delaunay
 
 
-def third(k: cython.int, side: cython.int) -> cython.int:
+def third(k, side):
     """The third half-edge of the face of half-edges k and side."""
     return 9 * (k // 3) + 3 - k - side
 
 
-def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython.int:
+def beyond(s, k, side):
     """The corner of the same vertex in the face across a side of corner k; -1 if there is none or more than one."""
     t: cython.int = s.twin[side]
     is_tail: cython.bint = side == previous_half_edge(k)
@@ -100,7 +99,7 @@ def beyond(s: cython.pointer(Search), k: cython.int, side: cython.int) -> cython
     return next_half_edge(t) if is_tail else previous_half_edge(t)
 
 
-def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Direction)) -> cython.void:
+def turn(s, k, side, ray):
     """Rotate a direction by the angle of corner k, one of whose sides is `side`."""
     p: cython.double = s.length[side]
     q: cython.double = s.length[third(k, side)]
@@ -110,7 +109,7 @@ def turn(s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython
     ray.cosine, ray.sine = ray.cosine * cosine - ray.sine * sine, ray.cosine * sine + ray.sine * cosine
 
 
-def classify(s: cython.pointer(Search), v: cython.int) -> cython.uchar:
+def classify(s, v):
     """The kind of vertex v, by a walk around it: whether the faces are one fan, and whether the angles exceed 2 pi."""
     start: cython.int = s.corner_of_vertex[v]
     k: cython.int = start

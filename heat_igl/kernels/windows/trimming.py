@@ -370,9 +370,7 @@ def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double)
     return s.upper[v] + slack * (s.upper[v] + length)
 
 
-@cython.cfunc
-@cython.nogil
-def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int) -> cython.int:
+def trim(s, windows, n, h):
     """Trim windows where a path over an end of h or through another window is shorter; returns how many are left."""
     k: cython.int = 0
     w: cython.pointer(Window)
@@ -397,16 +395,7 @@ def trim(s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.i
     return k
 
 
-@cython.cfunc
-@cython.nogil
-def is_covered(
-    s: cython.pointer(Search),
-    before: cython.pointer(cython.const[Window]),
-    n_before: cython.int,
-    windows: cython.pointer(cython.const[Window]),
-    n: cython.int,
-    h: cython.int,
-) -> cython.bint:
+def is_covered(s, before, n_before, windows, n, h):
     """Whether n trimmed windows, or paths over the ends, give the windows before trimming no larger distance."""
     length: cython.double = s.length[h]
     j: cython.int
@@ -430,11 +419,7 @@ def is_covered(
     return True
 
 
-@cython.cfunc
-@cython.nogil
-def trim_by_kept(
-    s: cython.pointer(Search), windows: cython.pointer(Window), n: cython.int, h: cython.int, turns: cython.int
-) -> cython.int:
+def trim_by_kept(s, windows, n, h, turns):
     """Trim windows where one that crossed h before is shorter; returns how many are left.
 
     Far from the ends of a needle, lines that wind around it reach each half-edge after those of the winding before have
