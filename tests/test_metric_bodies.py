@@ -1,6 +1,7 @@
 """Metrics that change from place to place: maps of space whose image is convex, bounds, activation times."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import igl
 import numpy as np
@@ -19,7 +20,7 @@ from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine
 from heat_igl.typing import FloatArray
 from heat_igl.validation.closed_forms import straight
-from heat_igl.validation.construction import tetrahedra
+from heat_igl.validation.construction import joined, tetrahedra
 from heat_igl.validation.random_shapes import FAMILIES
 
 
@@ -67,6 +68,25 @@ def test_speeds_in_a_plane_are_the_same_however_it_lies_in_space():
     found = [MetricSimplices.in_metric(Mesh(V, mesh.F), metric, 0.3) for V in (mesh.V, mesh.V @ turn + 5)]
     flat, turned = (simplices.velocity[simplices.rows] for simplices in found)
     assert turned == pytest.approx(flat, abs=1e-8)
+
+
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
+def test_a_body_does_not_know_those_beside_it():
+    """In one metric it is exact; with tensors without order, or smooth ones that are 1e10 times as large, as alone."""
+    n, rng = (60, 300, 90), np.random.default_rng(0)
+    bodies = [tetrahedra(rng.random((k, 3))) for k in n]
+    x, _, z = bodies[2].V[bodies[2].F].mean(axis=1).T
+    random, turned = rng.standard_normal((bodies[1].n_faces, 3)), np.stack([np.cos(x), np.sin(x), 0 * z], axis=1)
+    metrics = [np.tile(np.diag([9.0, 4.0, 1.0]), (bodies[0].n_faces, 1, 1)), fibre_metric(random, 1, 4)]
+    metrics.append(fibre_metric(turned, 1e5, 2e5))
+    both, begin = solver(joined(*bodies), np.concatenate(metrics)), np.cumsum([0, *n])
+    own = [both.distance(start + 7)[start:end] for start, end in pairwise(begin)]
+    assert own[0] == pytest.approx(np.linalg.norm((bodies[0].V - bodies[0].V[7]) * [3, 2, 1], axis=1), rel=1e-9)
+    for body, metric, distance in zip(bodies, metrics, own, strict=True):
+        assert distance == pytest.approx(solver(body, metric).distance(7), rel=1e-9)
+    found = both.voronoi([367, 67, 7])
+    assert found.distance == pytest.approx(np.concatenate(own), rel=1e-9)
+    assert found.labels.tolist() == np.repeat([2, 1, 0], n).tolist()
 
 
 def test_layers_and_smooth_speeds_of_tetrahedra():

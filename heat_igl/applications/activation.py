@@ -11,7 +11,7 @@ from heat_igl.geodesic import GeodesicSolver
 from heat_igl.mesh import MeshLike, as_simplices
 from heat_igl.mesh.surface_points import points_beside
 from heat_igl.operators import metric_operators
-from heat_igl.operators.metric import least_eigenvalue, symmetric_tensors
+from heat_igl.operators.metric import check_eigenvalues, symmetric_tensors
 from heat_igl.operators.metric_simplices import inverse_root
 from heat_igl.sources import OffsetSources, Sources, are_positions, source_set
 from heat_igl.typing import ArrayLike, FloatArray
@@ -69,7 +69,7 @@ def activation_times(mesh: MeshLike, D: ArrayLike, sites: Sources, times: ArrayL
     each = D[None] if D.shape == (3, 3) else D
     if D.shape not in ((3, 3), (m, 3, 3), (n, 3, 3)):
         raise ValueError(f"D must have shape (3, 3), {(m, 3, 3)} per face or {(n, 3, 3)} per vertex, not {D.shape}")
-    least_eigenvalue("D", inverse_root(symmetric_tensors("D", each))[2][:, 0], each)
+    check_eigenvalues("D", inverse_root(symmetric_tensors("D", each))[2][:, 0], each)
     start = real_numbers("times", times)
     first_time = start.min(initial=np.inf, where=np.isfinite(start))
     with np.errstate(over="ignore", invalid="ignore"):

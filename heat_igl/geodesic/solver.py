@@ -20,7 +20,15 @@ from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod, Method, Plan, Surfa
 from heat_igl.runtime import n_threads
 from heat_igl.sources import OffsetSources, Sources, SourceSet, named_vertices, require_resolved, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
-from heat_igl.windows import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
+from heat_igl.windows import (
+    ComponentEngine,
+    Engine,
+    GuardedEngine,
+    MeshTriangles,
+    OperatorTriangles,
+    Triangles,
+    guarded_windows,
+)
 
 if TYPE_CHECKING:
     from heat_igl.geodesic.derivatives import DistanceDerivative
@@ -227,15 +235,18 @@ class GeodesicSolver(BatchedSolver):
             return distance_plan("tetrahedra", method, tolerance), LineEngine(MetricSimplices.in_space(domain))
         if isinstance(domain, Operators):
             if domain.simplices is not None:
-                from heat_igl.sweep import HopfLaxEngine, LineEngine
+                from heat_igl.sweep import engine_through
 
+                engine = engine_through(domain.simplices)
                 if domain.simplices.is_in_space:
-                    return distance_plan("tetrahedra", method, tolerance), LineEngine(domain.simplices)
+                    return distance_plan("tetrahedra", method, tolerance), engine
                 fits = domain.has_surface
                 chosen = distance_plan("varying metric" if fits else "separate simplices", method, tolerance)
+                if any(part.is_in_space for part in domain.simplices.parts):
+                    chosen = replace(chosen, reason=f"{chosen.reason}; in a component with one metric, paths are lines")
                 if chosen.engine == "hopf-lax":
                     self._triangles = OperatorTriangles(domain) if fits else None
-                    return chosen, HopfLaxEngine(domain.simplices)
+                    return chosen, engine
             if not domain.has_surface:
                 raise MeshError("distance is measured along simplices, and these operators know none: give the mesh")
         chosen = distance_plan("points" if isinstance(domain, PointCloud) else "triangles", method, tolerance)
@@ -356,8 +367,8 @@ class GeodesicSolver(BatchedSolver):
         Hopf-Lax formula, it is a `SimplexDerivative`. ``phi`` is what `distance` returns, but for a metric or speed per
         face on triangles where `plan` names the Hopf-Lax formula: value and derivative are those of windows there, and
         ``phi`` may differ from `distance` by the difference of both engines. ``method="exact"`` makes both the same. In
-        tetrahedra with one tensor for all, both are of the formula. ``pull_back.distance`` is what is differentiated:
-        of the formula its fixed point, which ``phi`` is near.
+        tetrahedra with one tensor in a component, both are of the formula. ``pull_back.distance`` is what is
+        differentiated: of the formula its fixed point, which ``phi`` is near.
         """
         from heat_igl.geodesic.derivatives import DistanceDerivative, require_differentiable
         from heat_igl.sweep import HopfLaxEngine
@@ -366,8 +377,10 @@ class GeodesicSolver(BatchedSolver):
         chosen, domain = self._source_set(sources), self._domain
         require_differentiable(domain, chosen)
         # The formula interpolates tensors per face before it uses them: it has no derivatives by those given.
-        if isinstance(asked := self._asked(chosen), SimplexEngine) and not getattr(domain, "metric", None):
-            asked = HopfLaxEngine(same) if (same := getattr(domain, "in_tensors", None)) else asked
+        asked = self._asked(chosen)
+        given = None if isinstance(asked, HopfLaxEngine) else getattr(domain, "in_tensors", None)
+        asked = asked if given is None else HopfLaxEngine(given)
+        if isinstance(asked, SimplexEngine) and not getattr(domain, "metric", None):
             distance, _, complaint = asked.answer(chosen)
             warn_of(complaint)
             return distance, asked.derivative(chosen)
@@ -382,7 +395,9 @@ class GeodesicSolver(BatchedSolver):
     def _asked(self, sources: SourceSet) -> Engine:
         """The engine for these sources: points and curves in a varying metric are those of windows."""
         is_in_faces = self._plan.engine == "hopf-lax" and not sources.on_vertices_alone
-        return self._unfolded if is_in_faces else self._engine
+        if is_in_faces:
+            return self._unfolded
+        return self._engine.of(sources) if isinstance(self._engine, ComponentEngine) else self._engine
 
     @cached_property
     def _unfolded(self) -> GuardedEngine:

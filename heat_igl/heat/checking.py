@@ -14,7 +14,7 @@ from heat_igl.kernels.mesh import checking
 from heat_igl.operators import Operators, Surface
 from heat_igl.plan import Plan, sweep_plan
 from heat_igl.sources import SourceSet
-from heat_igl.sweep import HopfLaxEngine, LineEngine, SweepEngine
+from heat_igl.sweep import SweepEngine, engine_through
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows import Engine, OperatorTriangles, WindowEngine
 from heat_igl.windows.invariants import raise_to_lines, source_places
@@ -220,7 +220,7 @@ class Comparisons:
     def _made(self) -> Engine:
         domain, surface = self._domain, self._domain.surface
         if surface is None and domain.simplices is not None:
-            return (LineEngine if domain.simplices.is_in_space else HopfLaxEngine)(domain.simplices)
+            return engine_through(domain.simplices)
         triangles = OperatorTriangles(domain)
         sweep = SweepEngine(triangles)
         if sweep_plan(sweep.measures, _BY_SWEEP).engine == "sweep":
@@ -252,7 +252,7 @@ class Checker:
     def __init__(self, domain: Operators, V: FloatArray | None, holds: bool) -> None:
         surface, simplices, referenced = domain.source_surface, domain.simplices, domain.referenced[: domain.n_given]
         if V is None and simplices is not None:
-            V = simplices.least * simplices.place
+            V = simplices.lines
         self._V, self._holds = None if V is None else np.ascontiguousarray(V, np.float64), holds
         self._surface, self._F = surface, None if surface is None else surface.given_faces
         self._referenced, self._uses_all = referenced, bool(referenced.all())

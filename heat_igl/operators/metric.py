@@ -17,7 +17,7 @@ from heat_igl.intrinsic import IntrinsicTriangulation, intrinsic_delaunay, intri
 from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
-from heat_igl.operators.metric_simplices import MetricSimplices, equal_runs, inverse_root
+from heat_igl.operators.metric_simplices import MetricSimplices, equal_runs, inverse_root, least_of_components
 from heat_igl.operators.suitability import mean_angle_defect
 from heat_igl.operators.triangles import check_measures, edge_length_operators, intrinsic_operators, longest_sides
 from heat_igl.plan import hopf_lax_is_nearer
@@ -68,7 +68,7 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
         unfolding is straight: there is no `surface`, flips end at such edges, sources are vertices, and distance is
         that of the Hopf-Lax formula, per face on the triangles after flips if most edges have one length.
 
-        Tetrahedra: in one metric for all, distance is exact as in space, else that of the Hopf-Lax formula.
+        Tetrahedra: in components with one metric, distance is exact as in space, else that of the Hopf-Lax formula.
 
         This is of first order, sharpened to second where the metric and the distance are smooth. Where tensors per
         face are those of a smooth field, their velocities are carried to the vertices first.
@@ -166,7 +166,8 @@ def speed_operators(mesh: MeshLike, speed: ArrayLike) -> Operators:
     outside = (s < 1 / largest) | (s > largest)
     raise_at_first(outside, "speed", s, f"is not between {1 / largest:g} and {largest:g}", f"{remedy}, or rescale")
     each, group = equal_runs(s[:, None, None])
-    least, root = 1 / float(s.max()), (each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None)
+    least = least_of_components(1 / s, mesh.components[mesh.F[:, 0]], mesh.components)
+    root = (each[:, 0] * np.eye(3)[np.triu_indices(3)], None, None)
     # A metric without a name here does not outlive its use there.
     if mesh.is_tetrahedral:
         return _of_groups(mesh, np.eye(3) / each**2, least, root, group)
@@ -268,7 +269,7 @@ def _squared_factor(name: str, given: ArrayLike, k: int) -> FloatArray:
 def operators_in_metric(
     mesh: Mesh,
     g: FloatArray,
-    least: float,
+    least: float | FloatArray,
     root: Any,
     group: Any,
     given: FloatArray,
@@ -316,7 +317,7 @@ def _of_triangles(mesh: Mesh, simplices: Any, laplacian: Laplacian, given: Float
     return replace(domain, simplices=simplices, metric=metric, originals=mesh.originals)
 
 
-def _of_smooth_metric(mesh: Mesh, g: Any, least: float, root: Any, laplacian: Laplacian) -> Operators:
+def _of_smooth_metric(mesh: Mesh, g: Any, least: Any, root: Any, laplacian: Laplacian) -> Operators:
     """The operators of simplices with what `_checked_at_corners` returns."""
     if mesh.is_tetrahedral:
         return _of_groups(mesh, g, least, root)
@@ -358,7 +359,7 @@ def _keeps_shape(sides: FloatArray, was: FloatArray) -> bool:
 
 
 def _refracting(
-    mesh: Mesh, apart: IntrinsicTriangulation, sides: FloatArray, least: float, in_metric: Any, laplacian: Laplacian
+    mesh: Mesh, apart: IntrinsicTriangulation, sides: FloatArray, least: Any, in_metric: Any, laplacian: Laplacian
 ) -> Operators:
     """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
     # Cut apart at the edges that are seen at two lengths.
@@ -384,10 +385,11 @@ def _refracting(
     return replace(domain, simplices=simplices)
 
 
-def _of_groups(mesh: Mesh, g: FloatArray, least: float, root: Any, group: Any = None) -> Operators:
+def _of_groups(mesh: Mesh, g: FloatArray, least: Any, root: Any, group: Any = None) -> Operators:
     """The operators of tetrahedra in metrics g (k, 3, 3) of each `group` (m,), or at each vertex."""
     simplices = MetricSimplices.in_metric(mesh, g, least, group is None, root, group)
-    kept = g[:1].copy() if group is None else g  # at vertices, its inverse root is known
+    # At vertices, its inverse root is known.
+    kept = g[np.unique(mesh.components, return_index=True)[1]] if group is None else g
     return _LaterOperators(mesh, simplices, _of_tetrahedra, mesh, simplices, kept, group)
 
 
@@ -413,15 +415,19 @@ class _LaterOperators(Operators):
 
     @property
     def in_tensors(self) -> MetricSimplices | None:
-        """The simplices with the given tensors, where `simplices` have none since these are all the same."""
-        if self.is_surface or self.simplices is None or not self.simplices.is_in_space:
+        """The simplices of a body with the given tensors; `simplices` have none where these are the same."""
+        if self.is_surface or self.simplices is None:
             return None
-        mesh, _, g, group = self._of
-        corners, (root, _, sizes) = mesh.F.astype(np.int32), inverse_root(g)
-        in_space = MetricSimplices(corners, mesh.n_vertices, mesh.V, float(np.sqrt(sizes[0, 0])), is_given=True)
+        mesh, simplices = self.mesh, self.simplices
+        *_, g, group = self._of
+        if group is None and not simplices.is_in_space:
+            return replace(simplices, parts=())
+        component, corners, (root, _, sizes) = mesh.components, mesh.F.astype(np.int32), inverse_root(g)
         if group is not None:
-            return replace(in_space, tensors=g, group=group)
-        return replace(in_space, velocity=np.tile(root[0], (mesh.n_vertices, 1)), rows=corners)
+            least = least_of_components(np.sqrt(sizes[group, 0]), component[corners[:, 0]], component)
+            return MetricSimplices(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=True)
+        least, velocity = np.sqrt(sizes[component, 0]), root[component]
+        return MetricSimplices(corners, mesh.n_vertices, mesh.V, least, velocity=velocity, rows=corners, is_given=True)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # an instance that is not filled yet, as in `pickle`
@@ -440,7 +446,9 @@ def _of_tetrahedra(mesh: Mesh, simplices: MetricSimplices, g: FloatArray, group:
     """The operators of tetrahedra with a metric on each or at each vertex for heat, and `simplices` for distance."""
     m, n = mesh.n_faces, mesh.n_vertices
     at_corners = (simplices.metric(np.arange(m), corner) for corner in range(4))
-    g = g[group] if group is not None else g if simplices.velocity is None else np.asarray(sum(at_corners)) / 4
+    if group is None and simplices.velocity is None:
+        group = mesh.components[mesh.F[:, 0]]
+    g = g[group] if group is not None else np.asarray(sum(at_corners)) / 4
     # Each in a space of its own: edges times C have the lengths of the metric C C^T.
     corners = mesh.V[mesh.F]
     corners = (corners - corners[:, :1]) @ np.linalg.cholesky(g)
@@ -486,7 +494,7 @@ def _with_shortest_edges(domain: Operators, mesh: Mesh, pairs: AnyArray, lengths
     )
 
 
-def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, Any, Any]:
+def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, Any, Any, Any]:
     """The metric (k, 3, 3) of triangles, or of groups (m,) of tetrahedra, its least length and `inverse_root`."""
     m, p = mesh.n_faces, mesh.F.shape[1] - 1
     shapes = [(m, 3, 3), (mesh.n_vertices, 3, 3)] + [(m, 2, 2)] * (p == 2)
@@ -501,15 +509,19 @@ def _checked(g: FloatArray, mesh: Mesh) -> tuple[FloatArray, float, Any, Any]:
         symmetric = np.swapaxes(axes, 1, 2) @ symmetric @ axes
     symmetric, group = equal_runs(symmetric) if p == 3 else (symmetric, slice(None))
     root = inverse_root(symmetric, mesh)
-    return symmetric, float(np.sqrt(least_eigenvalue("metric", root[2][group, 0], g))), root, group
+    smallest = root[2][group, 0]
+    check_eigenvalues("metric", smallest, g)
+    return symmetric, least_of_components(smallest**0.5, mesh.components[mesh.F[:, 0]], mesh.components), root, group
 
 
-def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[Any, float, Any]:
+def _checked_at_corners(g: FloatArray, mesh: Mesh) -> tuple[Any, Any, Any]:
     """Of tetrahedra the metric (n, 3, 3) at vertices, else None; its least length and `inverse_root`."""
     symmetric = symmetric_tensors("metric", g)
     root = inverse_root(symmetric, mesh, True)
     smallest = np.where(mesh.referenced, root[2][:, 0], np.inf)
-    return symmetric if mesh.is_tetrahedral else None, float(np.sqrt(least_eigenvalue("metric", smallest, g))), root
+    check_eigenvalues("metric", smallest, g)
+    least = least_of_components(smallest**0.5, mesh.components, mesh.components)
+    return symmetric if mesh.is_tetrahedral else None, least, root
 
 
 def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
@@ -525,12 +537,10 @@ def symmetric_tensors(name: str, g: FloatArray) -> FloatArray:
     return np.asarray((g + np.swapaxes(g, 1, 2)) / 2)
 
 
-def least_eigenvalue(name: str, smallest: FloatArray, g: FloatArray) -> float:
-    """The least of the smallest eigenvalues (k,) of tensors g (k, p, p); an error unless doubles hold all of them."""
+def check_eigenvalues(name: str, smallest: FloatArray, g: FloatArray) -> None:
+    """An error unless the smallest eigenvalues (k,) of tensors g (k, p, p) are positive, and doubles hold all."""
     raise_at_first(~(smallest > 0), name, g, "must be positive definite")
-    least = float(smallest.min())
-    if least < 1 / _LARGEST or np.abs(g).max() > _LARGEST:
+    if smallest.min() < 1 / _LARGEST or np.abs(g).max() > _LARGEST:
         outside = (smallest < 1 / _LARGEST) | (np.abs(g) > _LARGEST).any(axis=(1, 2))
         needed = f"must have entries and eigenvalues between {1 / _LARGEST:g} and {_LARGEST:g}"
         raise_at_first(outside, name, g, needed, "squares leave the range of doubles, take another unit")
-    return least

@@ -13,11 +13,11 @@ from heat_igl.kernels.mesh import incidence
 from heat_igl.kernels.sweep.simplex_metrics import fits_around, lengths_in_velocity, velocities_at_corners
 from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
 from heat_igl.mesh import Mesh
-from heat_igl.mesh.connectivity import PARTS, connected_components, edge_middles
-from heat_igl.typing import AnyArray, FloatArray, IntArray
+from heat_igl.mesh.connectivity import PARTS, connected_components, edge_middles, group_by_label, mask_of
+from heat_igl.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 # Differences between tensors that are taken for rounding.
-_ROUNDING = 1e-9
+_ROUNDING, _TINY = 1e-9, np.finfo(float).tiny
 # Rows and columns of the entries of a symmetric matrix on and above the diagonal.
 _ABOVE = np.triu_indices(3)
 
@@ -34,8 +34,9 @@ class MetricSimplices:
         Number of vertices.
     place : (n, 3) float64
         Positions in the space in which the metric is given.
-    least : float
-        Smallest length in any metric per length in that space: no path is shorter than a straight line times this.
+    least : float or (n,) float64
+        Smallest length in any metric, or any of the component of each vertex, per length in that space: no path is
+        shorter than a straight line times this.
     lengths : (m, pairs) float64 or None
         Distances between the corners, pairs in the order of `np.tril_indices`, if not those in `tensors`.
     tensors, group : (k, 3, 3) float64, (m,) int32, or None
@@ -51,12 +52,16 @@ class MetricSimplices:
         derivatives by them.
     incident : (n + 1,) and (m (p + 1),) int32, or None
         The corners at each vertex, as of `corners_by_vertex`, if they are known.
+    labels : (n,) int64 or None
+        The component of each vertex, if it is known.
+    parts : tuple of MetricSimplices
+        If components are of several kinds (in one metric, with `tensors`, with `velocity`), those of each kind.
     """
 
     corners: AnyArray
     n: int
     place: FloatArray
-    least: float = 1.0
+    least: float | FloatArray = 1.0
     lengths: FloatArray | None = None
     tensors: FloatArray | None = None
     group: AnyArray | None = None
@@ -64,6 +69,8 @@ class MetricSimplices:
     rows: AnyArray | None = None
     is_given: bool = False
     incident: tuple[AnyArray, AnyArray] | None = None
+    labels: IntArray | None = None
+    parts: tuple[MetricSimplices, ...] = ()
 
     @classmethod
     def in_space(cls, mesh: Mesh) -> MetricSimplices:
@@ -72,37 +79,80 @@ class MetricSimplices:
 
     @classmethod
     def in_metric(
-        cls, mesh: Mesh, g: Any, least: float, at_vertices: bool = False, root: Any = None, group: Any = None
+        cls, mesh: Mesh, g: Any, least: Any, at_vertices: bool = False, root: Any = None, group: Any = None
     ) -> MetricSimplices:
         """The faces of a mesh with a metric (m, 3, 3) on each, or (n, 3, 3) at each vertex, and its `least` length.
 
-        Where it is the same everywhere, distance is that in space after a linear map. What `inverse_root` returns may
-        be given, of triangles alone. Tetrahedra may have metrics (k, 3, 3) by `group`.
+        Where it is the same on a component, distance is that in space after a linear map. What `inverse_root` returns
+        may be given, of triangles alone. Tetrahedra may have metrics (k, 3, 3) by `group`.
         """
         p, corners = mesh.F.shape[1] - 1, mesh.F.astype(np.int32)
-        if p == 3 and all(np.abs(some - g[0]).max() <= _ROUNDING * np.abs(g[0]).max() for some in (g[-9:], g)):
-            # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
-            return cls(mesh.F, mesh.n_vertices, (mesh.V - mesh.V[mesh.F[0, 0]]) @ np.linalg.cholesky(g[0]))
+        component = mesh.components
+        space = cls(corners, mesh.n_vertices, mesh.V, least, is_given=p == 3, labels=component)
+        unfolded, is_same = space, np.zeros(1, bool)
+        if p == 3:
+            unfolded, is_same = space._in_one_metric(g, corners if at_vertices else group)
+        if is_same.all():
+            return unfolded
         velocity, rows, _ = inverse_root(g, mesh, at_vertices) if root is None else root
         if at_vertices:
-            rows = corners if p == 3 else rows
-            return cls(corners, mesh.n_vertices, mesh.V, least, None, None, None, velocity, rows, True)
+            made = replace(space, velocity=velocity, rows=corners if p == 3 else rows, is_given=True)
+            return made._with_kinds(np.where(is_same, 0, 2), unfolded, made, made)
         # The velocities are taken for samples of a smooth field. Those at the corners of a simplex are fitted if at
         # each this explains all of the variance and is positive definite, and are those of the simplex if it leaves a
         # quarter or more at one, as it leaves of a step: jumps stay where they are.
         group = np.arange(len(corners), dtype=np.int32) if group is None else group
         incident = incidence.corners_by_vertex(corners, mesh.n_vertices)
-        at_vertex, share = fits_around(corners, mesh.V, velocity, group, *incident)
-        if not (share > _ROUNDING).any():
+        fit: Any = fits_around
+        middle = _middles(component, corners, mesh.V, velocity, group)
+        at_vertex, share = fit(corners, mesh.V, velocity, group, component.astype(np.int32), middle, *incident)
+        is_smooth = mask_of(component[share > _ROUNDING], component.max() + 1)
+        apart = smooth = replace(space, incident=incident)
+        if not is_smooth.all():
             g = np.linalg.matrix_power(symmetric(velocity), -2) if g is None else g
-            return cls(corners, mesh.n_vertices, mesh.V, least, None, g, group, is_given=p == 3, incident=incident)
-        smallest, largest = inverse_root(at_vertex)[2].T
-        share[smallest <= 0] = 0
-        share[share >= 1 - _ROUNDING] = 1
-        faces = corners if p == 2 else np.empty((0, 3), np.int32)
-        velocity, rows, _ = velocities_at_corners(corners, at_vertex, velocity, group, share, faces, mesh.V, False)
-        least = min(least, float(1 / largest.max()))
-        return cls(corners, mesh.n_vertices, mesh.V, least, velocity=velocity, rows=rows, incident=incident)
+            apart = replace(apart, tensors=g, group=group)
+        if is_smooth.any():
+            smallest, largest = inverse_root(at_vertex)[2].T
+            share[smallest <= 0] = 0
+            share[share >= 1 - _ROUNDING] = 1
+            faces = corners if p == 2 else np.empty((0, 3), np.int32)
+            velocity, rows, _ = velocities_at_corners(corners, at_vertex, velocity, group, share, faces, mesh.V, False)
+            fitted = least_of_components(1 / np.maximum(largest, _TINY), component, component)
+            least = np.minimum(least, fitted if is_smooth.all() else np.where(is_smooth[component], fitted, np.inf))
+            smooth = replace(smooth, least=least, velocity=velocity, rows=rows, is_given=False)
+        return space._with_kinds(np.where(is_same, 0, 1 + is_smooth), unfolded, apart, smooth)
+
+    def _in_one_metric(self, g: FloatArray, rows: Any) -> tuple[MetricSimplices, BoolArray]:
+        """The simplices after a linear map for each component, and whether it has one metric (k,).
+
+        `rows` (m,) or (m, p + 1) are those of the metrics g of each simplex, or at its corners; they are 0, 1, ... if
+        they are None.
+        """
+        component, corners = self.components, self.corners
+        k = int(component.max()) + 1
+        first, is_same = np.zeros(k, np.int64), np.ones(k, bool)
+        if k == 1 and any(np.abs(some - g[0]).max() > _ROUNDING * np.abs(g[0]).max() for some in (g[-9:], g)):
+            return self, ~is_same
+        rows = np.arange(len(corners)) if rows is None else rows
+        if k > 1:
+            of = component[corners[:, 0]]
+            first[of[::-1]] = np.arange(len(of))[::-1]
+        own = g[rows[first] if rows.ndim == 1 else rows[first, 0]]
+        if k > 1:
+            apart = np.abs(g[rows] - (own[of] if rows.ndim == 1 else own[of][:, None])).reshape(len(of), -1)
+            is_same[of[apart.max(axis=1) > _ROUNDING * np.abs(own).max(axis=(1, 2))[of]]] = False
+        # |e|^2 = e^T g e = |C^T e|^2 with g = C C^T; relative to a vertex, as digits are lost far from the origin.
+        place = self.place - self.place[corners[first, 0]][component]
+        place = np.einsum("ni,nij->nj", place, np.linalg.cholesky(own)[component])
+        return MetricSimplices(corners, self.n, place, labels=component), is_same
+
+    def _with_kinds(self, kind: IntArray, *found: MetricSimplices) -> MetricSimplices:
+        """The simplices of the one `kind` (k,) of the components, or the last of them with those of each as `parts`."""
+        of = kind[self.components[self.corners[:, 0]]] if len(kind) > 1 else np.full(len(self.corners), kind[0])
+        kinds = np.flatnonzero(np.bincount(of)).tolist()
+        parts = (found[i].part(np.flatnonzero(of == i)) for i in kinds)
+        whole: MetricSimplices = found[kinds[-1]]
+        return replace(whole, parts=tuple(parts)) if len(kinds) > 1 else whole
 
     @classmethod
     def of_sides(cls, V: FloatArray, F: IntArray, sides: FloatArray, least: float) -> MetricSimplices:
@@ -135,7 +185,7 @@ class MetricSimplices:
     @cached_property
     def components(self) -> IntArray:
         """Component label (n,) of each vertex."""
-        return connected_components(self.corners, self.n)
+        return connected_components(self.corners, self.n) if self.labels is None else self.labels
 
     @cached_property
     def sizes(self) -> IntArray:
@@ -165,6 +215,15 @@ class MetricSimplices:
         lengths = kernel(corners, self.velocity, self.rows, *self.measured[:-1], self.place).edge_lengths()
         return ends.reshape(-1, 2), lengths.ravel()
 
+    @cached_property
+    def lines(self) -> FloatArray:
+        """Positions (n, 3) between which no path within a component is shorter than a straight line."""
+        found = np.reshape(self.least, (-1, 1)) * self.place
+        for part in self.parts:
+            at = part.corners if part.is_in_space else part.corners[:0]
+            found[at] = part.place[at]
+        return found
+
     def part(self, chosen: IntArray) -> MetricSimplices:
         """Some of the simplices, with all vertices."""
         lengths, group, rows = (None if of is None else of[chosen] for of in (self.lengths, self.group, self.rows))
@@ -193,6 +252,33 @@ class MetricSimplices:
         e, column = len(ends), np.concatenate([np.arange(self.n), ends.ravel()])
         row = np.concatenate([np.arange(self.n), self.n + np.repeat(np.arange(e), 2)])
         return sp.csr_array((np.repeat([1, 0.5], [self.n, 2 * e]), (row, column)), shape=(self.n + e, self.n))
+
+
+def _middles(component: IntArray, corners: AnyArray, V: FloatArray, W: FloatArray, group: AnyArray) -> FloatArray:
+    """The mean position and velocity (k, 9) in each component (n,), of vertices at V and velocities W by `group`."""
+    k = component.max() + 1
+    if k == 1:
+        return np.concatenate([V.mean(axis=0), np.bincount(group) @ W / len(group)])[None]
+    middle, vertices = np.zeros((k, 9)), group_by_label(component, k)
+    simplices = group_by_label(component[corners[:, 0]], k)
+    for i in np.flatnonzero(np.diff(simplices.first)).tolist():
+        at, rows = vertices.of(np.array([i]))[0], group[simplices.of(np.array([i]))[0]]
+        used = slice(rows.min(), rows.max() + 1)
+        middle[i] = _middles(0 * at, np.empty((0, 0)), V[at], W[used], rows - used.start)
+    return middle
+
+
+def least_of_components(values: FloatArray, of: IntArray, component: IntArray) -> FloatArray | float:
+    """The least value (n,) in the `component` (n,) of each vertex, of values (r,) in components `of` (r,).
+
+    One number if there is one component; 1 where there is no finite value.
+    """
+    if not component.any():
+        return float(values.min())
+    least = np.full(component.max() + 1, np.inf)
+    np.minimum.at(least, of, values)
+    least[np.isinf(least)] = 1
+    return np.asarray(least[component])
 
 
 def inverse_root(

@@ -84,6 +84,12 @@ class SourceSet:
         """The label of every vertex, point and segment; then -1 for nothing, at which the index -1 looks."""
         return np.concatenate([self.vertex_label, self.points.label, self.segments.label, [-1]])
 
+    def among(self, is_chosen: AnyArray) -> SourceSet:
+        """Those of the source vertices that are chosen (n,)."""
+        kept = is_chosen[self.vertices]
+        own = {name: getattr(self, name)[kept] for name in ("vertices", "vertex_label", "vertex_offset")}
+        return replace(self, **own)
+
     def with_offsets(self, offsets: FloatArray) -> SourceSet:
         """The same sources with other offsets, of every vertex, point and segment."""
         k = len(self.vertices)

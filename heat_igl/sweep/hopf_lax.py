@@ -12,12 +12,14 @@ from heat_igl.kernels.sweep.error_estimate import estimated_errors
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
 from heat_igl.kernels.sweep.simplex_updates import SimplexUpdate
 from heat_igl.mesh.connectivity import group_by_label, unique_rows
+from heat_igl.operators import MetricSimplices
 from heat_igl.plan import MOST_DOUBT, MOST_DOUBT_AT_WORST
 from heat_igl.sources import SourceSet
+from heat_igl.sweep.lines import LineEngine
 from heat_igl.sweep.simplex_derivative import FixedPointDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray
-from heat_igl.windows.engine import Answer
+from heat_igl.windows.engine import Answer, ComponentEngine, Engine
 
 # Relative differences of velocities below this are rounding.
 _ROUNDING = 1e-9
@@ -145,3 +147,13 @@ class HopfLaxEngine(SimplexEngine):
         distance = self._solved(sources, fronts)[0]
         record = (np.concatenate(part) for part in zip(*fronts, strict=True))
         return FixedPointDerivative(self._simplices, sources, distance, *record)
+
+
+def engine_through(simplices: MetricSimplices) -> Engine:
+    """The engine that passes through simplices: along lines in space, else by the Hopf-Lax formula."""
+    if not simplices.parts:
+        return (LineEngine if simplices.is_in_space else HopfLaxEngine)(simplices)
+    which = np.zeros(simplices.n, np.int64)
+    for number, part in enumerate(simplices.parts):
+        which[part.corners] = number
+    return ComponentEngine([engine_through(part) for part in simplices.parts], which)

@@ -52,6 +52,9 @@ class LineEngine(SimplexEngine):
         self._V, corners = simplices.place[self._order], self._number[self._corners]
         self._corners = corners[np.argsort(corners.min(axis=1), kind="stable")]
         self._is_small = simplices.sizes <= SMALL_BODY
+        # A further coordinate, by which no body is near another one.
+        component = simplices.components[self._order, None]
+        self._apart = np.hstack([self._V, 2 * np.ptp(self._V, axis=0).sum() * component])
         self._small = simplices.part(np.flatnonzero(self._is_small[simplices.corners[:, 0]]))
         is_refined = len(self._small.corners) > 0 and not is_halved and self._is_small[self.reflex_edges[0]].any()
         self._finer = LineEngine(self._small.halved(), is_halved=True) if is_refined else None
@@ -116,10 +119,10 @@ class LineEngine(SimplexEngine):
             nearest = np.where(self._is_small[self._order, None], 0, -1)
         else:
             # Where another arrives before a source begins, no line comes from the source.
-            first = np.unique(nearest_in_value(self._V[vertices], self._V[vertices], offset)[1])
+            first = np.unique(nearest_in_value(self._apart[vertices], self._apart[vertices], offset)[1])
             # A wall may hide the nearest one, and the next one be seen between vertices that belong to others.
             count = min(_MOST_FIRST if len(self.reflex_edges[0]) else 1, len(first))
-            far, which = nearest_in_value(self._V, self._V[vertices[first]], offset[first], count)
+            far, which = nearest_in_value(self._apart, self._apart[vertices[first]], offset[first], count)
             nearest = first[which]
         return np.argsort(far, kind="stable").astype(np.int32), nearest.astype(np.int32)
 
@@ -199,7 +202,7 @@ def along_curve(places: FloatArray, component: IntArray) -> IntArray:
 def nearest_in_value(
     V: FloatArray, places: FloatArray, offset: FloatArray, count: int = 1
 ) -> tuple[FloatArray, IntArray]:
-    """The least sum of an offset (k,) and the distance from its place (k, 3) in space, at each V (n, 3).
+    """The least sum of an offset (k,) and the distance from its place (k, d) in space, at each V (n, d).
 
     Returns also which place that is, and which ones of those near to V follow: (n, count).
     """

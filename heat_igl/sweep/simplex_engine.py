@@ -61,7 +61,7 @@ class SimplexEngine(Engine):
         found = self._lower(sources.vertices.astype(np.int32), sources.vertex_offset, distance, label, *more)
         # In place of a value that is no number, a path along edges is found.
         distance[np.isnan(distance)] = np.inf
-        raise_to_lines(distance, self._simplices.least * self._simplices.place, None, sources)
+        raise_to_lines(distance, self._simplices.lines, None, sources)
         self._along_edges(distance, label)
         return distance, label, found
 

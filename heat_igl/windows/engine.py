@@ -43,6 +43,35 @@ class Engine(ABC):
         return *self.labelled(sources, cutoff, threads), None
 
 
+class ComponentEngine(Engine):
+    """Engines that measure on components of their own: that of each vertex by its number in `which` (n,)."""
+
+    def __init__(self, engines: list[Engine], which: IntArray) -> None:
+        self._engines, self._which = engines, which
+
+    def of(self, sources: SourceSet) -> Engine:
+        """The engine on the components of source vertices; this one if there are several."""
+        numbers = np.unique(self._which[sources.vertices])
+        return self._engines[numbers[0]] if len(numbers) == 1 else self
+
+    def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
+        """Distance (n,) and nearest source (n,)."""
+        return self.answer(sources, cutoff, threads)[:2]
+
+    def answer(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> Answer:
+        """Those of each engine on its components, and what they complain of."""
+        distance, labels = np.full(len(self._which), np.inf), np.full(len(self._which), -1)
+        complaints: list[str] = []
+        for number, engine in enumerate(self._engines):
+            own = sources.among(self._which == number)
+            if len(own.vertices):
+                found, nearest, complaint = engine.answer(own, cutoff, threads)
+                is_there = self._which == number
+                distance[is_there], labels[is_there] = found[is_there], nearest[is_there]
+                complaints += [complaint] if complaint else []
+        return distance, labels, "; ".join(complaints) or None
+
+
 class Triangles(ABC):
     """A surface of triangles, with its components."""
 

@@ -284,14 +284,14 @@ def _sum_products(
     X: cython.const[cython.double][:, ::1],
     W: cython.const[cython.double][:, ::1],
     group: cython.const[cython.int][::1],
-    level: cython.double[::1],
-    origin: cython.double[::1],
+    component: cython.const[cython.int][::1],
+    middle: cython.const[cython.double][:, ::1],
     at: cython.double[:, ::1],
 ) -> cython.void:
     """Add up over the simplices at each vertex, in a row of `at` (n, 36), or (n, 42) for triangles, the last one 0.
 
     These are the products of 1, x, y, z with 1, x, y, z and the velocity at the centre, each pair once; the square of
-    the velocity; and products of the unit normal. Positions are from the `origin` (3,), velocities from `level` (6,).
+    the velocity; and products of the unit normal. Positions and velocities are from the `middle` (9,) of the component.
     """
     size: cython.int = corners.shape[1]
     per: cython.double = 1.0 / size
@@ -302,11 +302,12 @@ def _sum_products(
     mean: cython.double[42]
     row[0] = 1.0
     for s in range(corners.shape[0]):
+        o: cython.int = component[corners[s, 0]]
         for k in range(9):
-            row[1 + k] = W[group[s], k - 3] - level[k - 3] if k > 2 else 0.0
+            row[1 + k] = W[group[s], k - 3] - middle[o, k] if k > 2 else 0.0
         for c in range(size):
             for k in range(3):
-                row[1 + k] += per * (X[corners[s, c], k] - origin[k])
+                row[1 + k] += per * (X[corners[s, c], k] - middle[o, k])
         if size == 3:
             for k in range(6):
                 side[k] = X[corners[s, 1 + k // 3], k % 3] - X[corners[s, 0], k % 3]
@@ -380,6 +381,8 @@ def fits_around(
     X: cython.const[cython.double][:, ::1],
     W: cython.const[cython.double][:, ::1],
     group: cython.const[cython.int][::1],
+    component: cython.const[cython.int][::1],
+    middle: cython.const[cython.double][:, ::1],
     first: cython.const[cython.int][::1],
     incident: cython.const[cython.int][::1],
 ):
@@ -388,6 +391,7 @@ def fits_around(
     Simplices (m,) have the velocity W (k, 6) of their `group` at their centres. Those that meet a simplex of the vertex
     count, once for each corner that they share with one. Functions hold, up to 1, by how much they explain more than
     3/4 of the variance there. Of triangles, what varies since projections on their normals do, counts as not explained.
+    Each component (n,) has a `middle` (k, 9), a position and a velocity, far from which digits of products are lost.
     """
     size: cython.int = corners.shape[1]
     n_columns: cython.int = 36 if size == 4 else 42
@@ -399,39 +403,37 @@ def fits_around(
     share: cython.double[::1] = shares
     met: cython.int[::1] = np.zeros(len(X), np.int32)
     near: cython.int[::1] = np.empty(len(X) + 1, np.int32)
-    level: cython.double[::1] = np.bincount(group) @ W / len(group)
-    # Far from the origin, digits of products of positions are lost.
-    origin: cython.double[::1] = np.mean(X, axis=0)
     mean: cython.double[42]
     spread: cython.double[9]
     away: cython.double[3]
     slope: cython.double[18]
     i: cython.int
     with cython.nogil:
-        _sum_products(corners, X, W, group, level, origin, at)
+        _sum_products(corners, X, W, group, component, middle, at)
         for v in range(X.shape[0]):
             others: cython.double = _sum_around(v, corners, first, incident, at, near, met, mean)
             total: cython.double = max(mean[0], 1.0)
+            about = cython.address(middle[component[v], 0])
             for k in range(n_columns):
                 mean[k] /= total
             i = 10
             for j in range(3):
-                away[j] = X[v, j] - origin[j] - mean[1 + j]
+                away[j] = X[v, j] - about[j] - mean[1 + j]
                 for k in range(j, 9):
-                    about: cython.double = mean[i] - mean[1 + j] * mean[1 + k]
+                    product: cython.double = mean[i] - mean[1 + j] * mean[1 + k]
                     if k > 2:
-                        slope[6 * j + k - 3] = about
+                        slope[6 * j + k - 3] = product
                     else:
-                        spread[3 * j + k] = spread[3 * k + j] = about
+                        spread[3 * j + k] = spread[3 * k + j] = product
                     i += 1
             variance: cython.double = mean[34]
             square: cython.double = mean[34]
             whole: cython.double = 0.0
             turned: cython.double = 1.0 if size == 3 else 0.0
             for k in range(6):
-                result[v, k] = level[k] + mean[4 + k]
+                result[v, k] = about[3 + k] + mean[4 + k]
                 variance -= _OFTEN[k] * mean[4 + k] * mean[4 + k]
-                square += _OFTEN[k] * level[k] * level[k]
+                square += _OFTEN[k] * about[3 + k] * about[3 + k]
                 whole += _OFTEN[k] * result[v, k] * result[v, k]
                 turned -= _OFTEN[k] * mean[35 + k] * mean[35 + k]
             explained: cython.double = -turned * whole
