@@ -6,7 +6,6 @@ import igl
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph as csgraph
-import scipy.spatial
 from conftest import perturbed
 
 from heat_igl import Mesh, PolygonMesh, SurfaceCurve, shapes
@@ -70,11 +69,6 @@ def square(n: int = 20) -> tuple[Mesh, np.ndarray]:
     """The unit square and the distance from its left side."""
     mesh = shapes.grid(n)
     return mesh, mesh.V[:, 0]
-
-
-def cube() -> Mesh:
-    V = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
-    return Mesh(V, scipy.spatial.ConvexHull(V).simplices)
 
 
 def skin(V: np.ndarray, T: np.ndarray) -> Mesh:

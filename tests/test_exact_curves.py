@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from conftest import flat_perturbed
-from surfaces import assert_connected, cube, to_polyline
+from surfaces import assert_connected, box_surface, to_polyline
 from test_exact import delaunay
 from test_exact_threads import counted
 from test_paths import MESHES
@@ -60,7 +60,7 @@ def test_curves_on_a_prism():
 
 
 def test_curves_on_a_cube():
-    mesh = cube()
+    mesh = box_surface(1)
     x, _, z = mesh.V.T
     (level,) = isolines(mesh, z, 0.3)[0]
     np.testing.assert_allclose(geodesic_distance(mesh, level, method="exact"), np.abs(z - 0.3), rtol=1e-14)

@@ -231,16 +231,6 @@ def test_grid_450_from_a_corner():
     assert at_the_papers_time[-1] == pytest.approx(449 * np.sqrt(2), rel=0.01)
 
 
-@pytest.mark.slow
-def test_icosphere_of_655362_vertices():
-    mesh = shapes.icosphere(8)
-    assert mesh.n_vertices == 655_362
-    exact = arcs(mesh.V, 0)
-    distance = HeatMethodSolver(mesh).distance(0)
-    assert (np.abs(distance - exact)[1:] / exact[1:]).mean() < 0.004
-    assert np.abs(distance - exact).max() < 0.01 * np.pi
-
-
 # --- The same numbers as libigl's own heat method, where both do the same
 
 
@@ -312,12 +302,11 @@ def test_order_and_bound(shape, sizes, magnitude, fastest):
     assert 0.5 < order < fastest
 
 
-@pytest.mark.parametrize(("n", "coarser"), [(64, 32)])
-def test_where_the_source_is_the_centre_of_symmetry(n, coarser):
+def test_where_the_source_is_the_centre_of_symmetry():
     """No cut locus and no preferred direction: order 1 from the centre of a disk, 2 from the apex of a cone."""
     for make, expected in ((shapes.disk, 1), (lambda k: shapes.cone(3 * k, k), 2)):
         errors = []
-        for size in (coarser, n):
+        for size in (32, 64):
             mesh = make(size)
             domain = operators(mesh)
             exact = np.linalg.norm(mesh.V, axis=1)

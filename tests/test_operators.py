@@ -5,28 +5,21 @@ import numpy as np
 import pytest
 from conftest import perturbed
 from scipy.spatial import Delaunay
-from surfaces import bent_pages
+from surfaces import bent_pages, pressed
 
 from heat_igl import Mesh, MeshError, PointCloud, shapes, speed_operators
 from heat_igl.intrinsic import intrinsic_delaunay, intrinsic_triangulation
 from heat_igl.operators import Operators, TriangleElements, intrinsic_operators, operators, point_cloud_operators
 from heat_igl.operators.triangles import cotangent_laplacian
 
-
-def bad_sphere() -> Mesh:
-    """A squashed, noisy sphere: many edges are not Delaunay."""
-    mesh = perturbed(shapes.icosphere(3), 0.3)
-    return Mesh(mesh.V * [1.0, 0.6, 0.2], mesh.F)
-
-
 DOMAINS = {
-    "own triangles": lambda: operators(bad_sphere(), "cotan"),
-    "intrinsic Delaunay": lambda: operators(bad_sphere()),
+    "own triangles": lambda: operators(pressed(0.2), "cotan"),
+    "intrinsic Delaunay": lambda: operators(pressed(0.2)),
     "with boundary": lambda: operators(perturbed(shapes.disk(8), 0.3)),
     "tetrahedra": lambda: operators(perturbed(shapes.box(4), 0.2)),
     "flat torus": lambda: intrinsic_operators(shapes.flat_torus(9)),
     "unreferenced vertices": lambda: operators(
-        Mesh(np.vstack([[[9, 9, 9]], bad_sphere().V, [[8, 8, 8]]]), bad_sphere().F + 1)
+        Mesh(np.vstack([[[9, 9, 9]], pressed(0.2).V, [[8, 8, 8]]]), pressed(0.2).F + 1)
     ),
     "edges of three faces": lambda: operators(bent_pages()),
     "points": lambda: point_cloud_operators(PointCloud(shapes.icosphere(2).V)),
@@ -78,7 +71,7 @@ def test_gradient_of_a_linear_function_in_space_is_exact():
     gradient = (operators(mesh).G @ (mesh.V @ slope)).reshape(3, -1)
     np.testing.assert_allclose(gradient, np.tile(slope[:, None], mesh.n_faces), rtol=0, atol=1e-12)
 
-    surface = bad_sphere()
+    surface = pressed(0.2)
     gradient = (operators(surface, "cotan").G @ (surface.V @ slope)).reshape(3, -1).T
     corner = surface.V[surface.F]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -121,7 +114,7 @@ def test_degenerate_triangles_are_mollified_and_stay_finite():
 
 @pytest.mark.parametrize("laplacian", ["cotan", "intrinsic-delaunay"])
 def test_laplacian_of_triangles_has_the_bits_of_libigls(laplacian):
-    mesh = bad_sphere()
+    mesh = pressed(0.2)
     domain = operators(mesh, laplacian)
     triangulation = domain.surface.triangulation
     expected = (
@@ -183,7 +176,7 @@ def test_flat_tetrahedron_is_refused():
 @pytest.mark.parametrize("laplacian", ["intrinsic-delaunay", "cotan"])
 @pytest.mark.parametrize(
     "mesh",
-    [shapes.icosphere(2), bad_sphere(), shapes.box(3), Mesh(shapes.disk(4).V, [*shapes.disk(4).F, [0, 1, 30]])],
+    [shapes.icosphere(2), pressed(0.2), shapes.box(3), Mesh(shapes.disk(4).V, [*shapes.disk(4).F, [0, 1, 30]])],
     ids=["Delaunay", "bad", "tetrahedra", "three faces at an edge"],
 )
 def test_laplacian_is_handed_out_early(mesh, laplacian):

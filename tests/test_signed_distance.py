@@ -399,19 +399,6 @@ def test_curves_that_contradict_each_other():
     np.testing.assert_array_equal(solver.distance(arcs)[away] < 0, truth[away] < 0)
 
 
-def test_regions_that_share_a_border():
-    mesh, _, _ = plane(34)
-    # Their loops run along each other, in opposite directions: both sides are inside.
-    x, y, _ = mesh.V[mesh.F].mean(axis=1).T
-    middle = np.maximum(np.abs(x - 0.5), np.abs(y - 0.5)) < 0.3
-    loops = [region_boundary(mesh, faces=middle & half) for half in (x < 0.45, x >= 0.45)]
-    distance = SignedHeatSolver(mesh).distance(loops)
-    from_rim = np.abs(mesh.V[:, :2] - 0.5).max(axis=1) - 0.3
-    far = (np.abs(from_rim) > 0.05) & (np.abs(mesh.V[:, 0] - 0.45) > 0.05)
-    assert far.sum() > 500
-    np.testing.assert_array_equal(distance[far] < 0, from_rim[far] < 0)
-
-
 def test_an_open_curve_has_a_left_and_a_right_beside_it():
     mesh, _, truth = plane(34)
     arc = ring(mesh, end=1.2 * np.pi)

@@ -5,12 +5,12 @@ import re
 import numpy as np
 import pytest
 from conftest import mean_error, zoo
+from surfaces import sheared
 
 import heat_igl
 from heat_igl import AccuracyWarning, HeatMethodSolver, Mesh, OffsetSources, SurfacePoints, geodesic_distance, shapes
 from heat_igl.errors import FactorizationError
 from heat_igl.heat.source_terms import SourceAssembler, drop_overtaken
-from heat_igl.intrinsic import mollify
 from heat_igl.sources import source_set
 from heat_igl.typing import FloatArray
 from heat_igl.validation.closed_forms import by_fermat
@@ -103,24 +103,12 @@ def test_where_heat_has_no_digits_a_face_is_named():
         heat_igl.VectorHeatSolver(Mesh(P * [0.1, 1e-3, 1], delaunay(P[:, :2])))
 
 
-def test_a_small_component_is_not_mollified():
-    small, flat = np.array([3.0, 4.0, 5.0]) * 1e-9, np.array([1.0, 1.0, 2.0])
-    added = mollify(np.stack([small, flat]), np.array([[0, 1, 2], [3, 4, 5]]))
-    assert not added[0].any()
-    assert ((added[1] > 0) & (added[1] < 1e-7)).all()
-
-
 # The check.
 
 
-def thin_rectangle() -> Mesh:
-    """Sheared so far that most edges have negative weights: the method of the paper is far off."""
-    flat = shapes.grid(20)
-    return Mesh(flat.V @ np.array([[1.0, 0, 0], [3, 1, 0], [0, 0, 1]]), flat.F)
-
-
 def test_a_wrong_answer_is_raised_to_straight_lines_or_warns():
-    mesh = thin_rectangle()
+    """Most edges have negative weights, and the method of the paper is far off."""
+    mesh = sheared(shapes.grid(20), 3)
     lines = np.linalg.norm(mesh.V - mesh.V[210], axis=1)
     solver = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
     assert mean_error(solver.distance(210), lines) < 0.02
@@ -157,7 +145,7 @@ def test_a_good_answer_is_left_alone():
 
 
 def test_the_check_measures_from_where_distance_begins():
-    solver = HeatMethodSolver(thin_rectangle(), laplacian="cotan")
+    solver = HeatMethodSolver(sheared(shapes.grid(20), 3), laplacian="cotan")
     with pytest.warns(AccuracyWarning, match="too short"):
         plain, late = (solver.distance(source) for source in (210, OffsetSources(210, 1e5)))
     assert np.abs(late - 1e5 - plain).max() < 1e-6
@@ -165,7 +153,7 @@ def test_the_check_measures_from_where_distance_begins():
 
 @pytest.mark.filterwarnings("ignore::heat_igl.AccuracyWarning")
 def test_many_sources_are_checked_too():
-    mesh = thin_rectangle()
+    mesh = sheared(shapes.grid(20), 3)
     sources = np.flatnonzero(mesh.V[:, 1] <= 0.05)
     assert len(sources) > 32
     solver = HeatMethodSolver(mesh, laplacian="intrinsic-delaunay")
