@@ -131,6 +131,14 @@ def test_noise_is_taken_away_and_clean_points_stay():
     assert without_noise(clean) is clean
 
 
+@pytest.mark.filterwarnings("ignore:the points are in several parts")
+def test_one_part_may_be_noisy():
+    P, clean = sphere(2000), 5 + sphere(6000)
+    cloud = PointCloud(np.concatenate([P + 0.02 * np.random.default_rng(1).standard_normal(P.shape), clean]))
+    assert mean_error(GeodesicSolver(cloud).distance(0)[:2000], arcs(P, 0)) < 0.02
+    np.testing.assert_array_equal(cloud.triangles.V[2000:], clean)
+
+
 @pytest.mark.parametrize("name", ["ridges", "folded paper", "sponge", "beams"])
 def test_detail_is_no_noise(name):
     """Ridges of a few spacings, which small quadrics fit better, and shapes on which nearest points move alike."""

@@ -41,7 +41,7 @@ class Groups(NamedTuple):
         return self.members[first[which] + within], which
 
 
-def group_by_label(labels: IntArray, n: int) -> Groups:
+def group_by_label(labels: AnyArray, n: int) -> Groups:
     """Elements 0 to k - 1 by their labels (k,) in ``range(n)``: linear time, equal ones in order."""
     found = incidence.corners_by_vertex(labels.astype(np.int32)[:, None], n)
     return Groups(*(part.astype(np.int64) for part in found))

@@ -12,6 +12,7 @@ import numpy as np
 from heat_igl.errors import AccuracyWarning
 from heat_igl.kernels.cloud.empty_balls import on_one_side, roomiest_normals
 from heat_igl.kernels.cloud.local_fits import onto_quadrics, tangent_planes
+from heat_igl.mesh.connectivity import connected_components, group_by_label
 from heat_igl.runtime import over_rows, warn_caller
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
@@ -78,6 +79,11 @@ class PointTree:
         """The `K` nearest other points (n, k + 1) int32 of each, after the point itself, and the distance (n,)."""
         index = self.neighbours_of(np.arange(len(self.P)), min(K, len(self.P) - 1))
         return index, np.linalg.norm(self.P[index[:, -1]] - self.P, axis=1)
+
+    @cached_property
+    def parts(self) -> IntArray:
+        """Which part (n,) each point is in: edges from points to their `neighbours` join a part."""
+        return connected_components(self.neighbours[0], len(self.P))
 
     def neighbours_of(self, points: IntArray, k: int, stride: int = 1) -> AnyArray:
         """The k nearest others (b, k + 1) int32 of some points, after the point itself: among every `stride`-th."""
@@ -201,9 +207,25 @@ def _directions(m: int) -> FloatArray:
 
 
 def without_noise(tree: PointTree) -> PointTree:
-    """The points, moved onto quadrics fitted to their neighbours if they are noisy; else `tree` itself.
+    """The points, moved onto quadrics fitted to their neighbours in the parts that are noisy; else `tree` itself.
 
-    Points are noisy if at half of them neighbours deviate from the quadric by more than 1 / 20 of the spacing, and not
+    Whether one part is noisy, and how much, does not depend on others.
+    """
+    if len(tree.P) <= 4 * K:
+        return tree
+    if not tree.parts.any():
+        return _part_without_noise(tree)
+    P, (first, members) = tree.P.copy(), group_by_label(tree.parts, tree.parts.max() + 1)
+    for at in np.split(members, first[1:-1]):
+        own = point_tree(tree.P[at])
+        P[at[own.order]] = _part_without_noise(own).P
+    return tree if (P == tree.P).all() else PointTree(P, tree.order)
+
+
+def _part_without_noise(tree: PointTree) -> PointTree:
+    """The points of one part, moved if they are noisy; else `tree` itself.
+
+    They are noisy if at half of them neighbours deviate from the quadric by more than 1 / 20 of the spacing, and not
     as detail does, see `_is_noisy`. All are then moved along their normals, twice with the same neighbours. Where noise
     is many spacings, neighbours are first found among some of the points, and then among more.
     """
@@ -216,7 +238,7 @@ def without_noise(tree: PointTree) -> PointTree:
     if not _is_noisy(tree, near):
         return tree
     for k, stride in _spreads(tree, near):
-        index = tree.neighbours_of(np.arange(n), k, stride)
+        index = tree.neighbours[0] if (k, stride) == (K, 1) else tree.neighbours_of(np.arange(n), k, stride)
         for _ in range(_PASSES):
             moved = by_rows(lambda rows, P=tree.P, index=index: onto_quadrics(P, index[rows]), n)[0]  # type: ignore[misc]
             tree = PointTree(moved, tree.order)

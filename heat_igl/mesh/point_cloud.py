@@ -150,9 +150,9 @@ class PointCloud:
         `Mesh.originals`.
 
         They are Delaunay in the tangent planes of their corners; an edge has at most two of them. The vertices
-        are `P`, unless the points are noisy: if at half of them the neighbours deviate from a quadric by more than
-        1 / 20 of their spacing, and that is not detail, all are moved onto such quadrics. Neighbours are oriented alike
-        as far as the surface allows it, and like the normals if there are any.
+        are `P`, unless the points of a part are noisy: if at half of them the neighbours deviate from a quadric by
+        more than 1 / 20 of their spacing, and that is not detail, all are moved onto such quadrics. Neighbours are
+        oriented alike as far as the surface allows it, and like the normals if there are any.
 
         Raises
         ------
@@ -196,7 +196,10 @@ class PointCloud:
         V[number] = tree.P
         found = Mesh(V[distinct[original]], number[F]).with_originals(distinct[original])
         if tree is not given:
-            _warn_of_noise(np.linalg.norm(tree.P - given.P, axis=1), normals is None, float(found.measures.sum()))
+            area = np.bincount(given.parts[F[:, 0]], found.measures, given.parts.max() + 1)
+            for part in np.unique(given.parts[(tree.P != given.P).any(axis=1)]):
+                way = np.linalg.norm(tree.P - given.P, axis=1)[given.parts == part]
+                _warn_of_noise(way, normals is None, float(area[part]))
         doubtful = number[np.union1d(between, beside)]
         is_wrong = is_far or along_one > _LONG_GAP * np.sqrt(len(self.P))
         if is_wrong or len(doubtful) > _MOST_DOUBTFUL * len(self.P) or tilted > _MOST_TILTED:
