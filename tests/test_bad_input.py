@@ -653,6 +653,7 @@ REFUSED_BY_ERROR: dict[str, tuple[tuple[Callable[[heat_igl.Mesh], Any], str], ..
         (lambda m: plots.plot(m, m.V[1:, 0]), r"distance must have shape \(42,\)"),
         (lambda m: plots.plot(m, np.where(np.arange(42) == 3, np.nan, 1)), r"distance\[3\] is NaN"),
         (lambda m: plots.plot(m, np.full(42, np.inf)), "infinite everywhere"),
+        (lambda m: plot_labels(m, np.full(42, -1)), "labels are negative everywhere.*from 0 on"),
         (lambda m: plot_labels(m, np.arange(42), distance=[1.0]), r"distance must have shape \(42,\), one per vertex"),
         (lambda m: plot_field(m, limits=(1, 0)), "limits must be two numbers, the lower one first"),
         (lambda m: plot_field(m, view=(30, 20, 10)), "view must be two angles in degrees"),

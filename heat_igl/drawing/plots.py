@@ -182,7 +182,7 @@ def plot_labels(
     Raises
     ------
     ValueError
-        If `labels` are not integers of shape (n,).
+        If `labels` are not integers of shape (n,), or all negative.
 
     Notes
     -----
@@ -196,6 +196,8 @@ def plot_labels(
     table = colours("tab10", is_trimmed=False)
     if given.shape != (mesh.n_vertices,):
         raise ValueError(f"labels must have shape ({mesh.n_vertices},), one per vertex, but they have {given.shape}")
+    if (given < 0).all():
+        raise ValueError("labels are negative everywhere, so no vertex has one: label what is to be drawn from 0 on")
     values = np.where(given < 0, np.inf, _colour_numbers(given, as_simplices(mesh).edges, _N_COLOURS) + 0.5)
     seen = scene(
         mesh, values, name="labels", sources=sources, limits=(0, _N_COLOURS), view=view, up=up, is_categorical=True
