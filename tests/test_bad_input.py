@@ -717,7 +717,6 @@ ACCEPTED: dict[str, Callable[[heat_igl.Mesh], Any]] = {
         np.testing.assert_allclose(geodesic_distance(POINTED, 0, cutoff=0.4)[RING], 0, atol=1e-9),
         np.testing.assert_allclose(karcher_mean(POINTED, [12, 12, 30], p=1).positions(POINTED), [BALL.V[0]], atol=1e-6),
         heat_igl.log_map(POINTED, 0),
-        GeodesicSolver(heat_igl.speed_operators(LINE, 4 + np.arange(80) % 2)).distance(0),
         validate(LINE, 0, methods=["sweep"]),
     ),
     "curve in small units": lambda m: SignedHeatSolver((1e-45 * m.V, m.F)).distance(CURVE, level="constant"),

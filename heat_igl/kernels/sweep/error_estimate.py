@@ -65,8 +65,7 @@ def _interpolation_error(h: HopfLax, v: cython.int) -> cython.double:
                 e: cython.double = h.update.V[b, k] - h.update.V[a, k]
                 at_a += one * h.update.slope[a, k] * e
                 at_b += two * h.update.slope[b, k] * e
-            # Both are 0 in flat simplices and without gradients.
-            gap: cython.double = fabs(two * two - one * one - at_a - at_b) if at_a != 0.0 or at_b != 0.0 else 0.0
+            gap: cython.double = fabs(two * two - one * one - at_a - at_b)
             gap += (1.0 - h.weight[v]) * fabs(at_b - at_a - (two - one) * (two - one))
             between: cython.double = h.update.mean[s, pair(h.update.side[i], h.update.side[j])]
             own += h.share(v, i) * h.share(v, j) * min(gap, between)
