@@ -108,30 +108,29 @@ class HopfLaxEngine(SimplexEngine):
         return np.asarray(mark / max(np.abs(mark).max(initial=0), np.finfo(float).tiny), np.float32)
 
     def _crossings(self, mark: AnyArray, adjacent: Any) -> tuple[AnyArray, ...]:
-        """Paths across facets between simplices of different marks, as `HopfLax` takes them."""
+        """Paths across facets at whose corners marks differ, as `HopfLax` takes them."""
         corners, size, n = self._corners, self._corners.shape[1], self._simplices.n
         others = np.array([[j for j in range(size) if j != c] for c in range(size)])
-        # Such a facet has only vertices at which marks differ.
         at_vertex, is_mixed, some = np.zeros(n, np.float32), np.zeros(n, bool), np.flatnonzero(mark)
         at_vertex[corners[some]] = mark[some, None]
         is_mixed[corners[some][at_vertex[corners[some]] != mark[some, None]]] = True
         some = some[np.count_nonzero(is_mixed[corners[some]], axis=1) >= size - 1]
-        rows = corners[some][:, others].reshape(-1, size - 1).T
+        rows = corners[some][:, others].reshape(-1, size - 1)
+        at = np.flatnonzero(is_mixed[rows].all(axis=1))
+        rows, at = rows[at].T, (size * some[at // size] + at % size).astype(np.int32)
         low, high = reduce(np.minimum, rows), reduce(np.maximum, rows)
         _, facet, counts = unique_rows(np.stack([low, sum(rows) - low - high, high], axis=1), n)
         _, order = group_by_label(facet, len(counts))
-        at, facet = (size * some[:, None] + np.arange(size)).astype(np.int32).ravel()[order], facet[order]
+        at, facet = at[order], facet[order]
         beside = [np.stack([at[k:], at[:-k]])[:, facet[k:] == facet[:-k]] for k in range(1, counts.max(initial=2))]
         pairs = np.concatenate(beside, axis=1).T
-        pairs = pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]]
         # From the corner opposite the facet beyond to all of a simplex; the other way, to those of the facet.
-        kind, k = divmod(np.arange((2 * size - 1) * len(pairs)), max(len(pairs), 1))
-        at, start = pairs[k, (kind >= size) * 1], pairs[k, (kind < size) * 1]
-        end = at // size * size + np.where(kind < size, kind, others[at % size, (kind - size) % (size - 1)])
-        paths = np.stack([at, start, end], axis=1).astype(np.int32)
+        at, start = (np.repeat(pairs[:, [k, 1 - k]].T, [size, size - 1], axis=0).ravel() for k in (0, 1))
+        turned = np.repeat(np.array([*range(size), *range(1, size)], np.int32), len(pairs))
+        paths: Any = np.stack([at, start, at - at % size + (at + turned) % size], axis=1)
         lengths = adjacent.crossings(paths)
-        paths, lengths = paths[np.isfinite(lengths)], lengths[np.isfinite(lengths)]
-        paths = np.concatenate([paths, paths[:, [1, 2, 1]]])
+        short = np.flatnonzero(np.isfinite(lengths))
+        paths, lengths = np.concatenate([paths[short], paths[short][:, [1, 2, 1]]]), lengths[short]
         begins, order = group_by_label(corners.ravel()[paths[:, 2]], n)
         paths[:, 2] = corners.ravel()[paths[:, 1]]
         return begins.astype(np.int32), paths[order], np.tile(lengths, 2)[order], mark
