@@ -11,8 +11,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     RIGHT_OF_APEX,
     ROUNDING,
     Apex,
-    List,
-    Search,
     Window,
     apart,
     at_corner,
@@ -21,6 +19,10 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     is_within,
     keep_root,
     lateral,
+    p_apex,
+    p_list,
+    p_search,
+    p_window,
     reach,
     twice_product,
 )
@@ -31,7 +33,7 @@ from cython.cimports.libc.string import memcpy
 
 @cython.cfunc
 @cython.nogil
-def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
+def _opposite(s: p_search, h: cython.int) -> Apex:
     """The corner opposite half-edge h."""
     apex: Apex
     apex.length = s.length[h]
@@ -50,12 +52,7 @@ def _opposite(s: cython.pointer(Search), h: cython.int) -> Apex:
 @cython.cfunc
 @cython.nogil
 def _arrive(
-    s: cython.pointer(Search),
-    h: cython.int,
-    w: cython.pointer(Window),
-    apex: cython.pointer(Apex),
-    distance: cython.double,
-    at: cython.double,
+    s: p_search, h: cython.int, w: p_window, apex: p_apex, distance: cython.double, at: cython.double
 ) -> cython.void:
     """Relax the apex of h by the path of window w through the point `at` of h."""
     # The path leaves towards the apex. The direction to the point of h would cancel if the root is close to h.
@@ -70,7 +67,7 @@ def _arrive(
 
 @cython.cfunc
 @cython.nogil
-def _straight(w: cython.pointer(Window), x: cython.double, y: cython.double) -> cython.double:
+def _straight(w: p_window, x: cython.double, y: cython.double) -> cython.double:
     """Length of the straight line from the root of a window to a point of the face, also outside of the window."""
     if w.is_plane:
         return w.offset + (w.x * x + w.depth * y)
@@ -79,9 +76,7 @@ def _straight(w: cython.pointer(Window), x: cython.double, y: cython.double) -> 
 
 @cython.cfunc
 @cython.nogil
-def _may_reach(
-    w: cython.pointer(Window), apex: cython.pointer(Apex), x: cython.double, m: cython.double, off: cython.double
-) -> cython.bint:
+def _may_reach(w: p_window, apex: p_apex, x: cython.double, m: cython.double, off: cython.double) -> cython.bint:
     """Whether the path to the apex over an end of the window may have the length of the straight line to rounding.
 
     The straight line passes the end at the distance d = `off` / |(x, m)|. The path over the end is longer by at least
@@ -95,9 +90,7 @@ def _may_reach(
 
 @cython.cfunc
 @cython.nogil
-def _reach_apex(
-    s: cython.pointer(Search), h: cython.int, windows: cython.pointer(Window), n: cython.int, apex: cython.pointer(Apex)
-) -> cython.void:
+def _reach_apex(s: p_search, h: cython.int, windows: p_window, n: cython.int, apex: p_apex) -> cython.void:
     """Relax the apex by all windows, and set on which side of it the lines of each window pass."""
     x: cython.double
     m: cython.double
@@ -105,7 +98,7 @@ def _reach_apex(
     b: cython.double
     at: cython.double
     distance: cython.double
-    w: cython.pointer(Window)
+    w: p_window
     for i in range(n):
         w = windows + i
         if w.is_plane:
@@ -151,7 +144,7 @@ def _reach_apex(
 
 @cython.cfunc
 @cython.nogil
-def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
+def _to_left(w: p_window, apex: p_apex, out: p_window) -> cython.bint:
     """Propagate a window to the side between the tail and the apex; false if it does not reach this side."""
     keep_root(w, out)
     if w.is_plane:
@@ -179,7 +172,7 @@ def _to_left(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.
 
 @cython.cfunc
 @cython.nogil
-def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython.pointer(Window)) -> cython.bint:
+def _to_right(w: p_window, apex: p_apex, out: p_window) -> cython.bint:
     """Propagate a window to the side between the apex and the head; false if it does not reach this side."""
     x: cython.double = apex.length - w.x
     keep_root(w, out)
@@ -211,13 +204,7 @@ def _to_right(w: cython.pointer(Window), apex: cython.pointer(Apex), out: cython
 
 @cython.cfunc
 @cython.nogil
-def _loses_nothing(
-    w: cython.pointer(Window),
-    apex: cython.pointer(Apex),
-    windows: cython.pointer(Window),
-    out: cython.pointer(Window),
-    to_left: cython.bint,
-) -> cython.bint:
+def _loses_nothing(w: p_window, apex: p_apex, windows: p_window, out: p_window, to_left: cython.bint) -> cython.bint:
     """Whether `out`, made of w, lies on its side, and its ends are on the first and the last line of w, or at the apex.
 
     Then straight lines through w reach all of `out`, and `out` covers all that they reach. If `out` is NULL, w was not
@@ -251,7 +238,7 @@ def _loses_nothing(
 
 @cython.cfunc
 @cython.nogil
-def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
+def _fetch(s: p_search, t: cython.int) -> cython.void:
     """Prefetch the data for windows over half-edge t."""
     prefetch(s.slot + t)
     prefetch(s.length + t)
@@ -261,14 +248,14 @@ def _fetch(s: cython.pointer(Search), t: cython.int) -> cython.void:
 def cross(s, h):
     """Propagate the windows that wait at half-edge h across its face."""
     place: cython.int = s.slot[h]
-    one: cython.pointer(List) = cython.address(s.lists[place])
-    windows: cython.pointer(Window) = one.windows
+    one: p_list = cython.address(s.lists[place])
+    windows: p_window = one.windows
     n: cython.int = one.count
     i: cython.int
     n_left: cython.int = 0
     n_right: cython.int = 0
     apex: Apex
-    w: cython.pointer(Window)
+    w: p_window
     is_best: cython.bint
     prefetch(s.upper + s.vertex[h])
     _fetch(s, s.twin[previous_half_edge(h)])
@@ -333,17 +320,12 @@ def cross(s, h):
 @cython.cfunc
 @cython.nogil
 def _measure(
-    s: cython.pointer(Search),
-    h: cython.int,
-    windows: cython.pointer(Window),
-    n: cython.int,
-    apex_x: cython.double,
-    apex_y: cython.double,
+    s: p_search, h: cython.int, windows: p_window, n: cython.int, apex_x: cython.double, apex_y: cython.double
 ) -> cython.void:
     """Update the distances of the targets in the face of h by its windows."""
     j: cython.int = s.first_target[h // 3]
     length: cython.double = s.length[h]
-    w: cython.pointer(Window)
+    w: p_window
     while j >= 0:
         x = s.target[3 * j + previous_half_edge(h) % 3] * length + s.target[3 * j + h % 3] * apex_x
         y = s.target[3 * j + h % 3] * apex_y

@@ -21,11 +21,12 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     ROUNDING,
     WIDEST,
     Direction,
-    Search,
     Window,
     apart,
     at_corner,
     nearest_on,
+    p_direction,
+    p_search,
     twice_product,
 )
 from cython.cimports.heat_igl.kernels.windows.surface import beyond, third, turn
@@ -101,7 +102,7 @@ def emit_segment(s, i):
 
 @cython.cfunc
 @cython.nogil
-def _segment_distance(s: cython.pointer(Search), i: cython.int, point: cython.p_double) -> cython.double:
+def _segment_distance(s: p_search, i: cython.int, point: cython.p_double) -> cython.double:
     """Distance of a point in the face of segment i from the segment."""
     found: cython.double[3]
     nearest_on(s.length + 3 * s.segment_face[i], s.segment + 6 * i, point, found)
@@ -111,7 +112,7 @@ def _segment_distance(s: cython.pointer(Search), i: cython.int, point: cython.p_
 @cython.cfunc
 @cython.nogil
 def _emit_parallel(
-    s: cython.pointer(Search), h: cython.int, ends: cython.p_double, root: cython.int, offset: cython.double
+    s: p_search, h: cython.int, ends: cython.p_double, root: cython.int, offset: cython.double
 ) -> cython.void:
     """Emit the window of a segment over half-edge h out of the face; its frame runs from the head of h to the tail."""
     c: cython.int = h % 3
@@ -148,12 +149,7 @@ def _emit_parallel(
 @cython.cfunc
 @cython.nogil
 def _emit_from_bend(
-    s: cython.pointer(Search),
-    k: cython.int,
-    start: cython.double,
-    stop: cython.double,
-    root: cython.int,
-    offset: cython.double,
+    s: p_search, k: cython.int, start: cython.double, stop: cython.double, root: cython.int, offset: cython.double
 ) -> cython.void:
     """Emit a window from a vertex over the opposite half-edge k; start and stop are measured from the tail of k."""
     one: Window
@@ -177,7 +173,7 @@ def _emit_from_bend(
 
 @cython.cfunc
 @cython.nogil
-def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
+def _reach_ends(s: p_search, k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
     """Distances along the two sides of corner k from its vertex v."""
     head: cython.int = next_half_edge(k)
     tail: cython.int = previous_half_edge(k)
@@ -190,9 +186,7 @@ def _reach_ends(s: cython.pointer(Search), k: cython.int, v: cython.int, offset:
 
 @cython.cfunc
 @cython.nogil
-def _straighten(
-    s: cython.pointer(Search), k: cython.int, side: cython.int, ray: cython.pointer(Direction), margin: cython.double
-) -> cython.bint:
+def _straighten(s: p_search, k: cython.int, side: cython.int, ray: p_direction, margin: cython.double) -> cython.bint:
     """Rotate around the vertex by pi minus a margin, starting over a side of corner k; true if the fan spans pi.
 
     `ray` takes the corner that contains the direction, the side over which the rotation entered this corner, and the
@@ -222,7 +216,7 @@ def _straighten(
 
 @cython.cfunc
 @cython.nogil
-def _reach(s: cython.pointer(Search), ray: cython.pointer(Direction)) -> cython.double:
+def _reach(s: p_search, ray: p_direction) -> cython.double:
     """Where the ray meets the half-edge opposite its corner: the distance from the end that lies on `ray.side`."""
     k: cython.int = ray.corner
     length: cython.double = s.length[k]
@@ -239,9 +233,7 @@ def _reach(s: cython.pointer(Search), ray: cython.pointer(Direction)) -> cython.
 
 @cython.cfunc
 @cython.nogil
-def _fill(
-    s: cython.pointer(Search), v: cython.int, first: cython.pointer(Direction), last: cython.pointer(Direction)
-) -> cython.void:
+def _fill(s: p_search, v: cython.int, first: p_direction, last: p_direction) -> cython.void:
     """Emit windows from v between two rays, or between the first ray and the boundary if `last` is NULL."""
     k: cython.int = first.corner
     side: cython.int = first.side

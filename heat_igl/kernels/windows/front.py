@@ -19,9 +19,12 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     UNKNOWN,
     Entry,
     List,
-    Search,
     Window,
     grown,
+    p_entry,
+    p_list,
+    p_search,
+    p_window,
     reach,
     straight,
 )
@@ -48,8 +51,8 @@ def allocate(s):
 def more_room(s, n):
     """Allocate room for n windows on each side of an apex."""
     room, failed = cython.address(s.n_out), cython.address(s.failed)
-    s.to_left = cython.cast(cython.pointer(Window), grown(s.to_left, room, n, cython.sizeof(Window), failed))
-    s.to_right = cython.cast(cython.pointer(Window), grown(s.to_right, room, n, cython.sizeof(Window), failed))
+    s.to_left = cython.cast(p_window, grown(s.to_left, room, n, cython.sizeof(Window), failed))
+    s.to_right = cython.cast(p_window, grown(s.to_right, room, n, cython.sizeof(Window), failed))
 
 
 def empty_front(s):
@@ -81,7 +84,7 @@ def push(s, key, what):
     """Add to the queue, a binary heap."""
     if s.n_heap == s.n_all_heap:
         more = grown(s.heap, cython.address(s.n_all_heap), s.n_heap + 1, cython.sizeof(Entry), cython.address(s.failed))
-        s.heap = cython.cast(cython.pointer(Entry), more)
+        s.heap = cython.cast(p_entry, more)
         if s.failed:
             return
     i: cython.int = s.n_heap
@@ -98,7 +101,7 @@ def push(s, key, what):
 
 def pop(s):
     """Take the entry with the smallest key."""
-    heap: cython.pointer(Entry) = s.heap
+    heap: p_entry = s.heap
     top: Entry = heap[0]
     i: cython.int = 0
     below: cython.int = 1
@@ -165,7 +168,7 @@ def towards_goal(s, e, run, n):
     from_tail: cython.double = straight(s, s.vertex[previous_half_edge(e)])
     from_head: cython.double = straight(s, s.vertex[next_half_edge(e)]) - s.length[e]
     for i in range(n):
-        w: cython.pointer(Window) = run + i
+        w: p_window = run + i
         if w.offset + reach(w, w.stop) + (from_tail - w.stop) > s.within:
             continue
         if w.offset + reach(w, w.start) + (from_head + w.start) > s.within:
@@ -228,7 +231,7 @@ def tell(s, v, distance):
     n: cython.int = s.n_news[s.parity]
     if n == s.n_all_news[s.parity]:
         more = grown(s.news[s.parity], s.n_all_news + s.parity, n + 1, cython.sizeof(Entry), cython.address(s.failed))
-        s.news[s.parity] = cython.cast(cython.pointer(Entry), more)
+        s.news[s.parity] = cython.cast(p_entry, more)
         if s.failed:
             return
     s.news[s.parity][n].key = distance
@@ -238,9 +241,7 @@ def tell(s, v, distance):
 
 @cython.cfunc
 @cython.nogil
-def _key(
-    s: cython.pointer(Search), w: cython.pointer(Window), length: cython.double, bulge: cython.double
-) -> cython.double:
+def _key(s: p_search, w: p_window, length: cython.double, bulge: cython.double) -> cython.double:
     """The key of a window, the same in both frames of its half-edge.
 
     For parallel lines, the root of the power is replaced by the distance of the circumcentre.
@@ -274,7 +275,7 @@ def _mirrored(w: Window, length: cython.double) -> Window:
 def append(s, t, run, n, turns, mirrored):
     """Add windows to those that wait at half-edge t."""
     place: cython.int = s.slot[t]
-    to: cython.pointer(Window)
+    to: p_window
     length: cython.double = s.length[t]
     bulge: cython.double = s.bulge[t]
     lowest: cython.double = INFINITY
@@ -288,11 +289,11 @@ def append(s, t, run, n, turns, mirrored):
         s.lists[place].count = 0
         s.lists[place].key = INFINITY
         s.lists[place].turns = turns
-    one: cython.pointer(List) = cython.address(s.lists[place])
+    one: p_list = cython.address(s.lists[place])
     if one.count + n > one.capacity:
         room: cython.p_int = cython.address(one.capacity)
         more = grown(one.windows, room, one.count + n, cython.sizeof(Window), cython.address(s.failed))
-        one.windows = cython.cast(cython.pointer(Window), more)
+        one.windows = cython.cast(p_window, more)
         if s.failed:
             return
     to = one.windows + one.count
@@ -323,7 +324,7 @@ def append(s, t, run, n, turns, mirrored):
 
 @cython.cfunc
 @cython.nogil
-def _free_list(s: cython.pointer(Search)) -> cython.int:
+def _free_list(s: p_search) -> cython.int:
     """An unused list, with the capacity that it has from earlier use; -1 if memory runs out."""
     place: cython.int = s.free_list
     if place >= 0:
@@ -332,7 +333,7 @@ def _free_list(s: cython.pointer(Search)) -> cython.int:
     place = s.n_lists
     if s.n_lists == s.n_all_lists:
         more = grown(s.lists, cython.address(s.n_all_lists), place + 1, cython.sizeof(List), cython.address(s.failed))
-        s.lists = cython.cast(cython.pointer(List), more)
+        s.lists = cython.cast(p_list, more)
         if s.failed:
             return -1
     s.n_lists += 1

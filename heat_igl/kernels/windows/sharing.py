@@ -21,7 +21,7 @@ from cython.cimports.cpython.pythread import (
 )
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.front import append, push, release
-from cython.cimports.heat_igl.kernels.windows.structures import FLAT, PASSED, PER_LIST, List, Search
+from cython.cimports.heat_igl.kernels.windows.structures import FLAT, PASSED, PER_LIST, p_list, p_search
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdlib import free, malloc
 
@@ -45,7 +45,7 @@ def meet(s, which):
 
 def balance(s):
     """Hand over windows if one thread has more work; true if one thread has all, because there is little work."""
-    o: cython.pointer(Search) = s.other
+    o: p_search = s.other
     mine: cython.longlong = s.load[s.parity]
     theirs: cython.longlong = o.load[s.parity]
     least: cython.longlong = (mine + theirs) // 8
@@ -67,7 +67,7 @@ def balance(s):
 
 @cython.cfunc
 @cython.nogil
-def _next_seed(s: cython.pointer(Search)) -> cython.int:
+def _next_seed(s: p_search) -> cython.int:
     """A half-edge with waiting windows, if possible next to the part of the other thread; -1 if there is none."""
     seed: cython.int = -1
     for i in range(s.n_lists):
@@ -83,10 +83,10 @@ def _next_seed(s: cython.pointer(Search)) -> cython.int:
 
 @cython.cfunc
 @cython.nogil
-def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.int) -> cython.longlong:
+def _give_list(s: p_search, o: p_search, h: cython.int) -> cython.longlong:
     """Hand over the windows that wait at half-edge h; returns the amount of work."""
     place: cython.int = s.slot[h]
-    one: cython.pointer(List) = cython.address(s.lists[place])
+    one: p_list = cython.address(s.lists[place])
     n: cython.int = one.count
     for i in range(n):
         root: cython.int = one.windows[i].root
@@ -103,7 +103,7 @@ def _give_list(s: cython.pointer(Search), o: cython.pointer(Search), h: cython.i
 
 @cython.cfunc
 @cython.nogil
-def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython.int) -> cython.longlong:
+def _give_vertex(s: p_search, o: p_search, v: cython.int) -> cython.longlong:
     """Hand over a vertex that has yet to emit windows; returns the amount of work."""
     if (
         s.kind[v] == PASSED
@@ -133,7 +133,7 @@ def _give_vertex(s: cython.pointer(Search), o: cython.pointer(Search), v: cython
 
 @cython.cfunc
 @cython.nogil
-def _hand_over(s: cython.pointer(Search), o: cython.pointer(Search), amount: cython.longlong) -> cython.void:
+def _hand_over(s: p_search, o: p_search, amount: cython.longlong) -> cython.void:
     """Hand over a connected piece of the front to the other search, which waits until this is done."""
     queue: cython.p_int = cython.cast(cython.p_int, malloc((s.n_lists + 1) * cython.sizeof(cython.int)))
     n: cython.int = 0

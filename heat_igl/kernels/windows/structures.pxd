@@ -146,6 +146,14 @@ cdef struct Search:
     bint is_shared       # whether windows were handed over
     void* arrived[4]     # locks: two for the news of alternate rounds, then before and after windows are handed over
 
+# Pointers to these, as `cython.p_int` is one to an int.
+ctypedef Window* p_window
+ctypedef Apex* p_apex
+ctypedef List* p_list
+ctypedef Entry* p_entry
+ctypedef Direction* p_direction
+ctypedef Search* p_search
+
 cdef enum Kind:
     UNKNOWN = 0
     PASSED = 1           # total angle below 2 pi: no shortest path runs through the vertex

@@ -19,10 +19,12 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     W_NEARER,
     W_THEN_U,
     List,
-    Search,
     Window,
     grown,
     is_within,
+    p_list,
+    p_search,
+    p_window,
     reach,
 )
 from cython.cimports.libc.math import INFINITY, fabs
@@ -32,16 +34,14 @@ from cython.cimports.libc.string import memmove
 
 @cython.cfunc
 @cython.nogil
-def _slope(w: cython.pointer(Window), at: cython.double, reached: cython.double) -> cython.double:
+def _slope(w: p_window, at: cython.double, reached: cython.double) -> cython.double:
     """Derivative along the half-edge of `reached`, the length that a window adds to its offset."""
     return w.x if w.is_plane else (at - w.x) / reached
 
 
 @cython.cfunc
 @cython.nogil
-def _change(
-    u: cython.pointer(Window), w: cython.pointer(Window), at: cython.double, a: cython.double, b: cython.double
-) -> cython.double:
+def _change(u: p_window, w: p_window, at: cython.double, a: cython.double, b: cython.double) -> cython.double:
     """Sign of the derivative of distance(u) - distance(w); a and b are their distances less the offsets."""
     if u.is_plane or w.is_plane:
         return _slope(u, at, a) - _slope(w, at, b)
@@ -51,8 +51,8 @@ def _change(
 @cython.cfunc
 @cython.nogil
 def _meeting(
-    u: cython.pointer(Window),
-    w: cython.pointer(Window),
+    u: p_window,
+    w: p_window,
     low: cython.double,
     high: cython.double,
     at_low: cython.double,
@@ -91,7 +91,7 @@ def _meeting(
 
 @cython.cfunc
 @cython.nogil
-def _is_farther(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+def _is_farther(u: p_window, w: p_window) -> cython.bint:
     """Whether u reaches the root of w no later than w begins there, so u is nearer everywhere."""
     a: cython.double = u.x - w.x
     b: cython.double = u.depth - w.depth
@@ -103,12 +103,7 @@ def _is_farther(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.
 @cython.cfunc
 @cython.nogil
 def _compare(
-    s: cython.pointer(Search),
-    u: cython.pointer(Window),
-    w: cython.pointer(Window),
-    low: cython.double,
-    high: cython.double,
-    until: cython.p_double,
+    s: p_search, u: p_window, w: p_window, low: cython.double, high: cython.double, until: cython.p_double
 ) -> cython.int:
     """Which of two windows to keep between two points of both: the nearer one, even if by less than rounding.
 
@@ -166,9 +161,7 @@ def _compare(
 
 @cython.cfunc
 @cython.nogil
-def _gives_way(
-    u: cython.pointer(Window), w: cython.pointer(Window), low: cython.double, high: cython.double
-) -> cython.int:
+def _gives_way(u: p_window, w: p_window, low: cython.double, high: cython.double) -> cython.int:
     """Remove from w the interval in which u is nearer. 2: nothing is left, 4: the rest precedes u, 0: it follows u."""
     if low <= w.start:
         if high >= w.stop:
@@ -183,7 +176,7 @@ def _gives_way(
 
 @cython.cfunc
 @cython.nogil
-def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+def _overlap_little(u: p_window, w: p_window) -> cython.bint:
     """Whether two windows overlap by too little of both to be worth a comparison, or not at all.
 
     Evaluated without branches, since the cases alternate unpredictably.
@@ -196,7 +189,7 @@ def _overlap_little(u: cython.pointer(Window), w: cython.pointer(Window)) -> cyt
 
 @cython.cfunc
 @cython.nogil
-def _settle(s: cython.pointer(Search), u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.int:
+def _settle(s: p_search, u: p_window, w: p_window) -> cython.int:
     """Trim two windows where the other is nearer. 1: nothing is left of u, 2: nothing of w, 4: w precedes u."""
     low: cython.double = u.start if u.start > w.start else w.start
     high: cython.double = u.stop if u.stop < w.stop else w.stop
@@ -229,7 +222,7 @@ def _settle(s: cython.pointer(Search), u: cython.pointer(Window), w: cython.poin
 
 @cython.cfunc
 @cython.nogil
-def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) -> cython.bint:
+def _cut_by_ends(w: p_window, a: cython.double, b: cython.double) -> cython.bint:
     """Trim a window where the path over an end of the half-edge is shorter; whether anything is left.
 
     At arc length s of the half-edge, the path over the tail is a + s longer than the offset of the window, and the path
@@ -275,9 +268,7 @@ def _cut_by_ends(w: cython.pointer(Window), a: cython.double, b: cython.double) 
 
 @cython.cfunc
 @cython.nogil
-def _goes_on(
-    u: cython.pointer(Window), w: cython.pointer(Window), length: cython.double, is_many: cython.bint
-) -> cython.bint:
+def _goes_on(u: p_window, w: p_window, length: cython.double, is_many: cython.bint) -> cython.bint:
     """Whether u and w are two halves of one window, split at a flat vertex, and can be merged.
 
     If the windows passed a vertex close to the root on its two sides, their roots may agree to rounding although their
@@ -299,7 +290,7 @@ def _goes_on(
 
 @cython.cfunc
 @cython.nogil
-def _is_next(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bint:
+def _is_next(u: p_window, w: p_window) -> cython.bint:
     """Whether w has another root, follows u and hardly overlaps it: then `_insert` would append it unchanged."""
     is_before: cython.bint = (w.start < u.start) & (w.stop < u.stop)
     is_other: cython.bint = fabs(u.x - w.x) > SAME * (fabs(w.x) + w.depth)
@@ -309,12 +300,7 @@ def _is_next(u: cython.pointer(Window), w: cython.pointer(Window)) -> cython.bin
 @cython.cfunc
 @cython.nogil
 def _insert(
-    s: cython.pointer(Search),
-    windows: cython.pointer(Window),
-    k: cython.int,
-    w: cython.pointer(Window),
-    length: cython.double,
-    is_many: cython.bint,
+    s: p_search, windows: p_window, k: cython.int, w: p_window, length: cython.double, is_many: cython.bint
 ) -> cython.int:
     """Trim a window w and k trimmed windows against each other, and insert w; returns the new number of windows.
 
@@ -323,7 +309,7 @@ def _insert(
     """
     j: cython.int = k
     moved: Window
-    u: cython.pointer(Window)
+    u: p_window
     s.n_ties = 0
     while j > 0:
         u = windows + (j - 1)
@@ -359,7 +345,7 @@ def _insert(
 
 @cython.cfunc
 @cython.nogil
-def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double) -> cython.double:
+def _bound_over(s: p_search, v: cython.int, length: cython.double) -> cython.double:
     """The distance at an end of a half-edge that paths over this end have: that of vertex v, with slack for rounding.
 
     The slack has a share of the edge length too, since a straight path past a vertex near the root may have the length
@@ -373,7 +359,7 @@ def _bound_over(s: cython.pointer(Search), v: cython.int, length: cython.double)
 def trim(s, windows, n, h):
     """Trim windows where a path over an end of h or through another window is shorter; returns how many are left."""
     k: cython.int = 0
-    w: cython.pointer(Window)
+    w: p_window
     length: cython.double = s.length[h]
     # Over an edge of more than two faces, windows are not sorted, and those of one root may come along several paths.
     is_many: cython.bint = s.twin[h] == -2
@@ -432,18 +418,18 @@ def trim_by_kept(s, windows, n, h, turns):
     """
     j: cython.int
     k: cython.int = 0
-    u: cython.pointer(Window)
-    w: cython.pointer(Window)
+    u: p_window
+    w: p_window
     if s.kept == cython.NULL:
-        s.kept = cython.cast(cython.pointer(List), calloc(s.n_half_edges, cython.sizeof(List)))
+        s.kept = cython.cast(p_list, calloc(s.n_half_edges, cython.sizeof(List)))
         if s.kept == cython.NULL:
             s.failed = True
             return 0
-    kept: cython.pointer(List) = s.kept + h
+    kept: p_list = s.kept + h
     if kept.count + n > kept.capacity:
         room: cython.p_int = cython.address(kept.capacity)
         more = grown(kept.windows, room, kept.count + n, cython.sizeof(Window), cython.address(s.failed))
-        kept.windows = cython.cast(cython.pointer(Window), more)
+        kept.windows = cython.cast(p_window, more)
         if s.failed:
             return 0
     for i in range(n):

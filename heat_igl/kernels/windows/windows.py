@@ -26,7 +26,7 @@ from cython.cimports.heat_igl.kernels.windows.front import (
     start_at,
 )
 from cython.cimports.heat_igl.kernels.windows.sharing import balance, load, meet
-from cython.cimports.heat_igl.kernels.windows.structures import MARGIN, Entry, Search
+from cython.cimports.heat_igl.kernels.windows.structures import MARGIN, Entry, Search, p_search
 from cython.cimports.libc.math import INFINITY
 from cython.cimports.libc.stdlib import free
 
@@ -57,7 +57,7 @@ class Front:
     def __init__(
         self, tables, found, tolerance: cython.double, leaving=None, position: cython.const[cython.double][::1] = None
     ) -> None:
-        s: cython.pointer(Search) = cython.address(self.state)
+        s: p_search = cython.address(self.state)
         emitted, ranked, touched = np.full(tables.n, np.inf), np.empty(tables.n), np.empty(tables.n, np.int32)
         slot = np.full(len(tables.edges.vertex), -1, np.int32)
         # The pointers hold as long as the arrays do.
@@ -118,7 +118,7 @@ def search(
     Distances up to the cutoff are exact, larger ones may be too large. `statistics` (3,) takes the numbers of
     comparisons with kept windows (-1 if the search would not end), of windows, and of lists that crossed a face.
     """
-    s: cython.pointer(Search) = cython.address(front.state)
+    s: p_search = cython.address(front.state)
     source: cython.int[::1] = starts.vertices
     offset: cython.double[::1] = starts.offset
     # Sources inside faces.
@@ -166,7 +166,7 @@ def search(
 @cython.cfunc
 @cython.nogil
 def _write_within(
-    s: cython.pointer(Search),
+    s: p_search,
     name: cython.p_longlong,
     to: cython.p_int,
     value: cython.p_double,
@@ -197,9 +197,7 @@ def _write_within(
 
 @cython.cfunc
 @cython.nogil
-def _write_nearest(
-    s: cython.pointer(Search), name: cython.p_longlong, to: cython.p_int, value: cython.p_double
-) -> cython.int:
+def _write_nearest(s: p_search, name: cython.p_longlong, to: cython.p_int, value: cython.p_double) -> cython.int:
     """Store the nearest vertices by ascending distance, ties by ascending name; returns their number."""
     n: cython.int = 0
     for i in range(s.n_touched):
@@ -250,7 +248,7 @@ def search_each(
     the first source whose results do not fit. If `way` and `line` (r, 3) are not empty, on a front with `leaving`, they
     take the path to each vertex within the cutoff, see `_write_within`, in the numbering of the tables.
     """
-    s: cython.pointer(Search) = cython.address(front.state)
+    s: p_search = cython.address(front.state)
     n_done: cython.int = 0
     at: cython.longlong = 0
     room: cython.longlong = value.shape[0]
@@ -334,7 +332,7 @@ def bound(front: Front, upper: cython.double[::1]) -> None:
 
 @cython.cfunc
 def _join(one: Front, other: Front) -> None:
-    s: cython.pointer(Search) = cython.address(one.state)
+    s: p_search = cython.address(one.state)
     s.other = cython.address(other.state)
     s.parity = 0
     for i in range(2):
@@ -351,7 +349,7 @@ def part(first: Front, second: Front) -> bool:
     """Free what `pair` allocated; false if bits may differ from those of one thread, which must then search again."""
     one: Front
     for one in (first, second):
-        s: cython.pointer(Search) = cython.address(one.state)
+        s: p_search = cython.address(one.state)
         s.other = cython.NULL
         for i in range(2):
             free(s.news[i])
@@ -362,7 +360,7 @@ def part(first: Front, second: Front) -> bool:
 
 @cython.cfunc
 @cython.nogil
-def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
+def _all_found(s: p_search, key: cython.double) -> cython.bint:
     """Whether all requested distances are final: entries with this key or a larger one cannot change them."""
     while s.n_found < s.n_goals:
         if s.distance[s.goal[s.n_found]] > key:
@@ -380,7 +378,7 @@ def _all_found(s: cython.pointer(Search), key: cython.double) -> cython.bint:
 
 @cython.cfunc
 @cython.nogil
-def _carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
+def _carry(s: p_search, entry: Entry) -> cython.void:
     """Process a queue entry unless it is outdated: a list crosses its face, or a vertex or source emits windows."""
     if entry.what < s.n_half_edges:
         place = s.slot[entry.what]
@@ -404,7 +402,7 @@ def _carry(s: cython.pointer(Search), entry: Entry) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-def _first(s: cython.pointer(Search)) -> Entry:
+def _first(s: p_search) -> Entry:
     """Pop the first entry of the queue, and prefetch the data of the next one."""
     first: Entry = pop(s)
     h: cython.int = s.heap[0].what
@@ -429,7 +427,7 @@ def _first(s: cython.pointer(Search)) -> Entry:
 
 @cython.cfunc
 @cython.nogil
-def _run(s: cython.pointer(Search)) -> cython.void:
+def _run(s: p_search) -> cython.void:
     """Process queue entries in ascending order of their keys until the requested distances are final."""
     entry: Entry
     s.last_key = s.cutoff * (1.0 + MARGIN) + s.slack
@@ -452,7 +450,7 @@ def _run(s: cython.pointer(Search)) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-def _narrow(s: cython.pointer(Search)) -> cython.void:
+def _narrow(s: p_search) -> cython.void:
     """Lower the cutoff to a distance within which the requested number of vertices are known to lie."""
     i: cython.int
     j: cython.int
@@ -487,7 +485,7 @@ def _narrow(s: cython.pointer(Search)) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-def _forget(s: cython.pointer(Search)) -> cython.void:
+def _forget(s: p_search) -> cython.void:
     """Reset the entries that a search wrote, for the next search on the same front."""
     empty_front(s)
     s.before = s.n_windows + s.n_compared
@@ -502,7 +500,7 @@ def _forget(s: cython.pointer(Search)) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
+def _advance(s: p_search, until: cython.double) -> cython.void:
     """Process entries with keys below `until`; if that is infinite, until there is enough work for two threads."""
     entry: Entry
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
@@ -514,9 +512,9 @@ def _advance(s: cython.pointer(Search), until: cython.double) -> cython.void:
 
 @cython.cfunc
 @cython.nogil
-def _run_beside(s: cython.pointer(Search)) -> cython.void:
+def _run_beside(s: p_search) -> cython.void:
     """`_run` for one of two searches on two threads; both return after the same round."""
-    o: cython.pointer(Search) = s.other
+    o: p_search = s.other
     s.last_key = s.cutoff * (1.0 + MARGIN)
     while True:
         p = s.parity
