@@ -111,35 +111,12 @@ class _Gaps:
     fans. Edges are in linked lists from `head` (n,) on, each at the end with the lower index.
     """
 
-    P: cython.const[cython.double][:, ::1]
-    F: cython.const[cython.int][:, ::1]
-    twin: cython.const[cython.int][::1]
-    is_gap: cython.const[cython.uchar][::1]
-    largest: cython.const[cython.double][::1]
-    most_bent: cython.double
-    most_folded: cython.double
-    triangles: cython.int[:, ::1]
-    is_whole: cython.uchar[::1]
-    count: cython.Py_ssize_t
-    partner: cython.int[::1]
-    joints: cython.int[::1]
-    seen: cython.uchar[::1]
-    ring: cython.int[:, ::1]
-    fans: cython.int[:, ::1]
-    cost: cython.double[::1]
-    head: cython.int[::1]
-    link: cython.int[:, ::1]
-
-    @cython.cfunc
-    @cython.nogil
-    def at_end(self, end: cython.Py_ssize_t) -> cython.int:
+    def at_end(self, end):
         """The point at end 2 h + d of side h."""
         h: cython.Py_ssize_t = end // 2
         return self.F[h // 3, (h % 3 + 1 + end % 2) % 3]
 
-    @cython.cfunc
-    @cython.nogil
-    def find_loops(self) -> cython.void:
+    def find_loops(self):
         """Find the partner of each end of a boundary side: in the same fan, or in the next if its point has several.
 
         `joints` takes the number of further fans. `head` is restored.
@@ -172,9 +149,7 @@ class _Gaps:
             if k > 1:
                 self.in_one_round(k)
 
-    @cython.cfunc
-    @cython.nogil
-    def in_one_round(self, k: cython.Py_ssize_t) -> cython.void:
+    def in_one_round(self, k):
         """Join k fans of a point into one cycle by setting `partner`, the nearest ends first.
 
         Rows of `fans` are the two ends of each fan and the chain to which the fan belongs.
@@ -200,18 +175,14 @@ class _Gaps:
                 if self.fans[2, i] == chain:
                     self.fans[2, i] = self.fans[2, first]
 
-    @cython.cfunc
-    @cython.nogil
-    def square(self, a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.double:
+    def square(self, a, b):
         """Squared distance of two points."""
         x: cython.double = self.P[b, 0] - self.P[a, 0]
         y: cython.double = self.P[b, 1] - self.P[a, 1]
         z: cython.double = self.P[b, 2] - self.P[a, 2]
         return x * x + y * y + z * z
 
-    @cython.cfunc
-    @cython.nogil
-    def loop(self, start: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    def loop(self, start):
         """Collect the points of the loop from a boundary side on, and the opposite corners; how many, 0 if not closed.
 
         The loop runs against the orientation of the first side's triangle, so new triangles are oriented like those
@@ -227,9 +198,7 @@ class _Gaps:
             at = self.partner[at ^ 1]
         return size if at == 2 * start + 1 else 0
 
-    @cython.cfunc
-    @cython.nogil
-    def fill(self, size: cython.Py_ssize_t) -> cython.void:
+    def fill(self, size):
         """Clip admissible ears from a ring of points. The third side of each is added as an edge."""
         flat: cython.Py_ssize_t = -1
         for i in range(size):
@@ -277,9 +246,7 @@ class _Gaps:
             if size == 3:  # one triangle is left
                 self.cost[0] = self.cost[1] = self.cost[2] = self.ear(size, 0, flat)
 
-    @cython.cfunc
-    @cython.nogil
-    def ear(self, size: cython.Py_ssize_t, i: cython.Py_ssize_t, flat: cython.Py_ssize_t) -> cython.double:
+    def ear(self, size, i, flat):
         """Circumradius of the ear at point i of a ring; infinite if the ear is not admissible.
 
         Negative if the ear joins two fans: minus the inverse square of the third side, so shorter sides come first. As
@@ -310,27 +277,19 @@ class _Gaps:
             folded = max(folded, self.fold(c, a, b, self.ring[BEYOND, after]))
         return INFINITY if folded > (self.most_bent if flat < 0 else self.most_folded) else radius
 
-    @cython.cfunc
-    @cython.nogil
-    def enter(self, e: cython.Py_ssize_t, a: cython.int, b: cython.int) -> cython.void:
+    def enter(self, e, a, b):
         """Add edge e to the lists."""
         self.link[e, 0], self.link[e, 1] = max(a, b), self.head[min(a, b)]
         self.head[min(a, b)] = cython.cast(cython.int, e)
 
-    @cython.cfunc
-    @cython.nogil
-    def is_edge(self, a: cython.int, b: cython.int) -> cython.bint:
+    def is_edge(self, a, b):
         """Whether two points are the ends of an edge."""
         e: cython.int = self.head[min(a, b)]
         while e >= 0 and self.link[e, 0] != max(a, b):
             e = self.link[e, 1]
         return e >= 0
 
-    @cython.cfunc
-    @cython.nogil
-    def fold(
-        self, a: cython.Py_ssize_t, b: cython.Py_ssize_t, c: cython.Py_ssize_t, d: cython.Py_ssize_t
-    ) -> cython.double:
+    def fold(self, a, b, c, d):
         """Cosine of the angle at edge ab between the triangles with corners c and d: 1 if folded onto each other."""
         P = self.P
         square: cython.double = self.square(a, b)
@@ -353,11 +312,7 @@ class _Gaps:
         return alike / size if size > 0.0 else -1.0
 
 
-@cython.cfunc
-@cython.nogil
-def _circumradius(
-    P: cython.const[cython.double][:, ::1], a: cython.Py_ssize_t, b: cython.Py_ssize_t, c: cython.Py_ssize_t
-) -> cython.double:
+def _circumradius(P, a, b, c):
     """Radius of the circle through three points: the same number in whatever order they are given."""
     first: cython.Py_ssize_t = min(a, min(b, c))
     last: cython.Py_ssize_t = max(a, max(b, c))
