@@ -48,7 +48,7 @@ class AdjacentUpdate:
         raise_caught()
         return found
 
-    def crossing(self, at: cython.int, start: cython.int, v: cython.int) -> cython.double:
+    def crossing(self, at, start, v):
         """The least |u - x| + |x - v| over the facet opposite the corner `at` of a simplex; sets `share`.
 
         v is a vertex of the simplex, u the corner `start` of the adjacent one. If one of them is on the facet, the path
@@ -101,9 +101,7 @@ class AdjacentUpdate:
         self.update.q = q
         return length if length < along * (1.0 - EQUAL) else INFINITY
 
-    def joins(
-        self, at: cython.int, place: cython.pointer[cython.const[cython.double]], value: cython.double
-    ) -> cython.bint:
+    def joins(self, at, place, value):
         """Whether T is too small at a place on the side opposite corner `at` of a triangle, which then becomes joint.
 
         That is so if all paths to the place, through both triangles, make the `value` there longer by TOO_SHORT.
@@ -131,7 +129,7 @@ class AdjacentUpdate:
         self.n_joint += 1
         return True
 
-    def through(self, at: cython.int) -> cython.double:
+    def through(self, at):
         """The least T(y) + |y - x| + |x - v| for v = `at` opposite a joint side; sets `share`, `far` and `away`.
 
         Where there is no triangle beyond, x is a corner.
@@ -153,9 +151,7 @@ class AdjacentUpdate:
         self.update.share[1] = 1.0 - self.update.share[0]
         return best
 
-    def over_side(
-        self, at: cython.int, i: cython.int, low: cython.double, high: cython.double, best: cython.double
-    ) -> cython.double:
+    def over_side(self, at, i, low, high, best):
         """The least T(y) + |y - x| + |x - v| over y opposite corner i of the triangle beyond, inf if not below `best`.
 
         The place x opposite the corner v = `at` has a share from `low` to `high` of the corner that it has in common
@@ -213,7 +209,7 @@ class AdjacentUpdate:
                 low = t
         return found
 
-    def corner_over(self, at: cython.int) -> cython.int:
+    def corner_over(self, at):
         """The corner beyond the side opposite corner `at` of a triangle, after `face`; `at` itself on the boundary.
 
         It is -1 if the metric varies within one of the two triangles, or if more than two share the side.

@@ -23,7 +23,7 @@ class Facet:
     `share`. For p = 2 the third of each is 0.
     """
 
-    def along_edges(self) -> cython.double:
+    def along_edges(self):
         """The least value along an edge to v; sets `share`."""
         at: cython.int = 0
         best: cython.double = INFINITY
@@ -38,7 +38,7 @@ class Facet:
         self.share[at] = 1.0
         return best
 
-    def length(self, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+    def length(self, x):
         """|v - x| for shares x, with its derivatives `g` by these.
 
         Velocity W, the inverse root of the metric, is linear between the corners. With W in the middle, a straight line
@@ -93,7 +93,7 @@ class Facet:
         # Of small arguments asinh has no digits.
         return self.even * (asinh(half) / half if half > 1e-4 else 1.0 - half * half / 6.0)
 
-    def lean(self, i: cython.int) -> cython.double:
+    def lean(self, i):
         """What the last `length` gains by moving v towards corner i."""
         if self.q == 1:
             return -self.own[i]
@@ -107,7 +107,7 @@ class Facet:
             gain -= self.u[k] * (self.E[i][k] + e[k])
         return self.factor * gain - self.near * self.factor_1 * self.sx / self.s[0] * (self.s[i + 1] - self.s[0])
 
-    def value(self, x: cython.pointer[cython.const[cython.double]], L: cython.double) -> cython.double:
+    def value(self, x, L):
         """T(x) + |v - x| for shares x of the corners, with `length` L, inf if there is none; adds to `g` those of T."""
         mean: cython.double = x[0] * self.D[0] + x[1] * self.D[1] + x[2] * self.D[2]
         square: cython.double = mean * mean
@@ -123,7 +123,7 @@ class Facet:
             self.g[i] += self.rise[i]
         return self.start + self.T + L
 
-    def curve(self) -> cython.void:
+    def curve(self):
         """Set the second derivatives `H` of the last `value`, once."""
         e: cython.double[3]
         # The velocity at each corner times u.
@@ -159,7 +159,7 @@ class Facet:
                     found -= turn * (self.g[i] - self.rise[i]) * (self.g[j] - self.rise[j])
                 self.H[i][j] = self.H[j][i] = found
 
-    def newton(self, L: cython.double, limit: cython.double) -> cython.double:
+    def newton(self, L, limit):
         """The least value over the facet, by Newton's method from `share`, which is changed; inf if not below `limit`.
 
         It begins after `length` L there. Values are convex, so that none is below a tangent plane.
@@ -212,7 +212,7 @@ class Facet:
                 x[i] = self.share[i] = y[i]
         return best
 
-    def on_triangle(self, x: cython.pointer[cython.const[cython.double]]) -> tuple[cython.double, cython.double]:
+    def on_triangle(self, x):
         """The step, in shares of the last two corners, to the least value of the quadratic model on the triangle."""
         gb: cython.double = self.g[1] - self.g[0]
         ge: cython.double = self.g[2] - self.g[0]

@@ -38,7 +38,6 @@ cdef class SimplexUpdate(Facet):
     cdef bint across(self, int s, int c, double* least) noexcept nogil
     cdef double through(self, int s, int c, double best, int far) noexcept nogil
     cdef void lay(self, int s, int c) noexcept nogil
-    cdef double curved(self, int s, int c, double limit, double least) noexcept nogil
     cdef double sagging(self, int s, double weight, double limit, double least) noexcept nogil
     cdef double sag_between(self, int s, int i, int j, double more, double trusted) noexcept nogil
     cdef double trust(self, int s, int i) noexcept nogil

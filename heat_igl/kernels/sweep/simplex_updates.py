@@ -49,7 +49,7 @@ class SimplexUpdate(Facet):
                         lengths[s, pair(i, j)] = edge_length(self, s, i, j)
         return found
 
-    def face(self, s: cython.int, c: cython.int) -> cython.double:
+    def face(self, s, c):
         """Look at the facet opposite corner c of s: sets `side`, `at` and `level`, returns the least distance."""
         nearest: cython.double = INFINITY
         of = cython.address(self.corners[s, 0])
@@ -60,7 +60,7 @@ class SimplexUpdate(Facet):
             nearest = min(nearest, self.level[k])
         return nearest
 
-    def linear(self, s: cython.int, c: cython.int, limit: cython.double) -> cython.double:
+    def linear(self, s, c, limit):
         """The least value at corner c of simplex s with T linear, inf if it is not below `limit`; sets `share`."""
         self.share[0] = self.share[1] = self.share[2] = 0.0
         least: cython.double = limit
@@ -78,9 +78,7 @@ class SimplexUpdate(Facet):
                     least = self.over_edge(s, c, i, j, least)
         return least if least < limit else INFINITY
 
-    def over_edge(
-        self, s: cython.int, c: cython.int, i: cython.int, j: cython.int, least: cython.double
-    ) -> cython.double:
+    def over_edge(self, s, c, i, j, least):
         """The smaller of `least` and the least value over the edge between two corners of `side`; then sets `share`."""
         sq = cython.address(self.mean[s, 0])
         base: cython.double = sq[pair(self.side[j], self.side[i])]
@@ -113,7 +111,7 @@ class SimplexUpdate(Facet):
         self.share[i], self.share[j] = 1.0 - along, along
         return value
 
-    def across(self, s: cython.int, c: cython.int, least: cython.p_double) -> cython.bint:
+    def across(self, s, c, least):
         """Whether no value over an edge of the triangle of `side` is below `least`; sets `share`.
 
         That is so if the value over the whole plane is not, or lies inside the triangle and is `least` then. Else
@@ -156,7 +154,7 @@ class SimplexUpdate(Facet):
         least[0] = value
         return True
 
-    def through(self, s: cython.int, c: cython.int, best: cython.double, far: cython.int) -> cython.double:
+    def through(self, s, c, best, far):
         """The value at corner c of second order through simplex s, inf if it cannot be below `best`; sets `share`.
 
         Its lower bound is what T linear and the nearest corner say, with some margin. It is also inf if corner `far`,
@@ -191,9 +189,12 @@ class SimplexUpdate(Facet):
             FETCH(cython.address(self.velocity[self.rows[s, i], 0]))
             FETCH(cython.address(self.inverses[self.rows[s, i], 0]))
         least: cython.double = self.linear(s, c, nearest + room)
-        return self.curved(s, c, best, nearest + self.slack[s] * (least - nearest)) if least < INFINITY else INFINITY
+        if least == INFINITY:
+            return INFINITY
+        self.lay(s, c)
+        return self.sagging(s, self.weight[self.corners[s, c]], best, nearest + self.slack[s] * (least - nearest))
 
-    def lay(self, s: cython.int, c: cython.int) -> cython.void:
+    def lay(self, s, c):
         """What `Facet` knows of s and its metric, after `face`."""
         near = cython.address(self.V[self.corners[s, c], 0])
         for i in range(self.p):
@@ -215,18 +216,11 @@ class SimplexUpdate(Facet):
             self.W[i] = cython.address(self.velocity[self.rows[s, at], 0])
             self.s[i] = mean_velocity(self.W[i])
 
-    def curved(self, s: cython.int, c: cython.int, limit: cython.double, least: cython.double) -> cython.double:
-        """The least value at corner c of simplex s with T of second order, after `linear`; sets `share`.
+    def sagging(self, s, weight, limit, least):
+        """The least value with T of second order, times `weight`, after `lay` and from `share`, which it sets.
 
         It may be inf if it is not below `limit`; with T linear it is `least` or more.
         """
-        self.lay(s, c)
-        return self.sagging(s, self.weight[self.corners[s, c]], limit, least)
-
-    def sagging(
-        self, s: cython.int, weight: cython.double, limit: cython.double, least: cython.double
-    ) -> cython.double:
-        """`curved` after `lay`, with a weight of the second order."""
         near: cython.double = INFINITY
         deep: cython.double = 0.0
         x: cython.double[3]
@@ -260,9 +254,7 @@ class SimplexUpdate(Facet):
                 self.share[i] = x[i]
         return best
 
-    def sag_between(
-        self, s: cython.int, i: cython.int, j: cython.int, more: cython.double, trusted: cython.double
-    ) -> cython.double:
+    def sag_between(self, s, i, j, more, trusted):
         """By how much the squared distance between two corners sags below that of T linear, over their shares.
 
         The squared distance from one point in one metric is a quadratic function, found from the slopes at both ends.
@@ -318,7 +310,7 @@ class SimplexUpdate(Facet):
         least: cython.double = max(rise - Di * one, -Dj * two - rise) - level
         return max(min(sag, most), least)
 
-    def trust(self, s: cython.int, i: cython.int) -> cython.double:
+    def trust(self, s, i):
         """How far the slope at a corner i of `side` has length 1 in simplex s, as unless metrics jump: from 0 to 1.
 
         With the square of the logarithm, distances have a derivative where metrics begin to differ.
@@ -348,7 +340,7 @@ class SimplexUpdate(Facet):
             self.trusted[v], self.trusted_in[v] = max(1.0 - square * square, 0.0), row
         return self.trusted[v]
 
-    def find_slope(self, s: cython.int, c: cython.int) -> cython.void:
+    def find_slope(self, s, c):
         """The derivative of the length of v - x by the position of v, at the best place x, after `face`."""
         v: cython.int = self.corners[s, c]
         lean: cython.double[3]

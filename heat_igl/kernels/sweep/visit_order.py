@@ -34,7 +34,7 @@ class VisitOrder:
             if self.d[v] < INFINITY:
                 self.put(v, self.d[v])
 
-    def advance(self, i: cython.Py_ssize_t, count: cython.Py_ssize_t) -> cython.Py_ssize_t:
+    def advance(self, i, count):
         """Go on until it is known which `count` vertices come from rank i on, or all are met; returns `n_ordered`."""
         while self.n_passed + 1 < i:
             self.reach_neighbours()
@@ -50,7 +50,7 @@ class VisitOrder:
                 self.n_ordered += 1
         return self.n_ordered
 
-    def reach_neighbours(self) -> cython.void:
+    def reach_neighbours(self):
         """Put the neighbours of the next vertex that was passed into the ring."""
         v: cython.int = self.order[self.n_passed]
         self.n_passed += 1
@@ -60,7 +60,7 @@ class VisitOrder:
             if key < self.key[s.neighbour]:
                 self.put(s.neighbour, key)
 
-    def put(self, v: cython.int, key: cython.double) -> cython.void:
+    def put(self, v, key):
         """Let a vertex wait at a distance."""
         self.key[v] = key
         self.place[self.n_places].vertex = v
@@ -68,7 +68,7 @@ class VisitOrder:
         self.n_places += 1
         self.n_waiting += 1
 
-    def take(self) -> cython.int:
+    def take(self):
         """Take a vertex of the nearest band; -1 if none is left."""
         n_passed: cython.int = 0
         while self.n_waiting > 0:
@@ -89,7 +89,7 @@ class VisitOrder:
             return self.place[place].vertex
         return -1
 
-    def leap(self) -> cython.void:
+    def leap(self):
         """Go on to the nearest band in which a vertex waits: all of them are far ahead."""
         left: cython.int = -1
         nearest: cython.double = INFINITY
@@ -108,7 +108,7 @@ class VisitOrder:
             self.append(left)
             left = following
 
-    def append(self, place: cython.int) -> cython.void:
+    def append(self, place):
         """Add a place to the queue of its band, or of the last one of the ring."""
         key: cython.double = self.key[self.place[place].vertex]
         band: cython.double = min(max(key * self.per_length, self.band), self.band + (BANDS - 1))
