@@ -12,6 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from heat_igl.errors import MeshError, is_number, require_choice, shown
+from heat_igl.typing import AnyArray, BoolArray
 
 Engine = Literal["windows", "sweep", "lines", "hopf-lax", "heat"]
 Method = Literal["auto", "windows", "exact", "sweep"]
@@ -129,15 +130,15 @@ def distance_plan(kind: DomainKind, method: Method, tolerance: float) -> Plan:
     return Plan("windows", float(tolerance), "windows are exact, which holds every tolerance, and need no factor")
 
 
-def hopf_lax_is_nearer(variation: float, curvature: float) -> bool:
-    """Whether the Hopf-Lax formula is nearer than windows on triangles with one length for each edge.
+def hopf_lax_is_nearer(variation: AnyArray, curvature: AnyArray) -> BoolArray:
+    """Whether in components (k,) the Hopf-Lax formula is nearer than windows on triangles with one length an edge.
 
     The error of windows, to which the metric of a triangle is the same everywhere, grows with its variation: the mean
     square of how far lengths differ from corner to corner, as a share. That of the Hopf-Lax formula, to which fronts
     are those of the plane, grows with the mean curvature at vertices, in radians (docs/metrics_theory.md). A metric of
     single precision varies by rounding; at its unit both have errors of 0.002 % on flat grids.
     """
-    return bool(variation > curvature + np.finfo(np.float32).eps)
+    return np.asarray(variation > curvature + np.finfo(np.float32).eps)
 
 
 def sweep_plan(measures: SurfaceMeasures, plan: Plan) -> Plan:

@@ -59,7 +59,7 @@ from heat_igl import GeodesicSolver, Mesh, metric_operators, read_polygon_mesh, 
 from heat_igl.intrinsic import intrinsic_triangulation
 from heat_igl.mesh import PolygonFans
 from heat_igl.operators import MetricSimplices, Operators
-from heat_igl.operators.suitability import mean_angle_defect
+from heat_igl.operators.suitability import mean_angle_defects
 from heat_igl.runtime.memory import PeakMemory
 from heat_igl.sources import source_set
 from heat_igl.sweep import HopfLaxEngine, LineEngine
@@ -712,7 +712,8 @@ def on_choice(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
             other = HopfLaxEngine(simplices).distance(source_set(source, mesh.n_vertices, None))
             off = [np.abs(excess(d, exact(source))).mean() for d in (one, other)]
             row: Row = {"field": f"{name}, per {where}", "n": mesh.n_vertices, "windows": off[0], "hopf": off[1]}
-            row |= {"variation": simplices.measured[-1], "curvature": mean_angle_defect(intrinsic_triangulation(mesh))}
+            row |= {"variation": simplices.measured[-1].mean()}
+            row |= {"curvature": mean_angle_defects(intrinsic_triangulation(mesh), mesh.components)[0]}
             yield row | {"chosen": "windows" if domain.simplices is None else "Hopf-Lax"}
 
 

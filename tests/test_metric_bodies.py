@@ -71,6 +71,22 @@ def test_speeds_in_a_plane_are_the_same_however_it_lies_in_space():
 
 
 @pytest.mark.filterwarnings("ignore:the metric changes farther")
+@pytest.mark.parametrize("where", ["smooth", "jump", "vertices", "turned"])
+def test_a_surface_does_not_know_those_beside_it(where):
+    """In one metric, paths are straight, whether those beside it are unfolded (smooth), or not."""
+    one, other = flat_perturbed(shapes.grid(6)), shapes.grid(12)
+    places, n = (other.V if where in ("vertices", "turned") else other.V[other.F].mean(axis=1)), one.n_vertices
+    x = places[:, 0]
+    metric = fibre_metric(np.stack([np.cos(9 * x), np.sin(9 * x), 0 * x], axis=1), 1, 9 if where == "turned" else 1)
+    metric /= np.where(x > 0.5, 3.0, 1.0)[:, None, None] if where == "jump" else (1 + 0.4 * x)[:, None, None]
+    same = np.tile(np.diag([4.0, 1.0, 1.0]), (n if where in ("vertices", "turned") else one.n_faces, 1, 1))
+    both = solver(joined(one, other), np.concatenate([same, metric]))
+    assert both.distance([7, n + 7])[:n] == pytest.approx(straight(one.V * [2, 1, 1], 7), rel=1e-9)
+    for found in (both.distance(n + 7), both.distance([7, n + 7])):
+        assert found[n:] == pytest.approx(solver(other, metric).distance(7), rel=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 def test_a_body_does_not_know_those_beside_it():
     """In one metric it is exact; with tensors without order, or smooth ones that are 1e10 times as large, as alone."""
     n, rng = (60, 300, 90), np.random.default_rng(0)

@@ -13,6 +13,7 @@ import numpy as np
 from heat_igl.errors import MeshError, checked_cutoff, names_guessed, require_choice
 from heat_igl.heat.batches import BatchedSolver, LabelledDistance, warn_of
 from heat_igl.mesh import Mesh, MeshLike, MeshPart, PointCloud, PolygonMesh, SurfacePoints, as_mesh
+from heat_igl.mesh.connectivity import mask_of
 from heat_igl.mesh.objects import as_simplices, tangent_surface
 from heat_igl.mesh.surface_points import unchecked_points
 from heat_igl.operators import Operators
@@ -234,6 +235,8 @@ class GeodesicSolver(BatchedSolver):
             check_measures(domain)
             return distance_plan("tetrahedra", method, tolerance), LineEngine(MetricSimplices.in_space(domain))
         if isinstance(domain, Operators):
+            if domain.parts:
+                return self._of_parts(domain)
             if domain.simplices is not None:
                 from heat_igl.sweep import engine_through
 
@@ -246,6 +249,11 @@ class GeodesicSolver(BatchedSolver):
                     chosen = replace(chosen, reason=f"{chosen.reason}; in a component with one metric, paths are lines")
                 if chosen.engine == "hopf-lax":
                     self._triangles = OperatorTriangles(domain) if fits else None
+                    if fits and len(domain.simplices.corners) < len(cast(Triangles, self._triangles).given_faces):
+                        chosen = replace(chosen, reason=f"{chosen.reason}, and in components where it varies less")
+                        engine = ComponentEngine(
+                            [self._unfolded, engine], mask_of(domain.simplices.corners, domain.simplices.n)
+                        )
                     return chosen, engine
             if not domain.has_surface:
                 raise MeshError("distance is measured along simplices, and these operators know none: give the mesh")
@@ -256,6 +264,16 @@ class GeodesicSolver(BatchedSolver):
             # For a sweep, as for heat, slivers between points are lengthened a little.
             return self._on_triangles(MeshTriangles(domain.triangles, None, orients=False), chosen)
         return self._on_triangles(MeshTriangles(domain), chosen)
+
+    def _of_parts(self, domain: Operators) -> tuple[Plan, Engine]:
+        """The plan and the engine where components have different ones."""
+        solvers = [GeodesicSolver(part, method=self._method, tolerance=self._tolerance) for part in domain.parts]
+        which = np.zeros(domain.n, np.int64)
+        for number, part in enumerate(domain.parts):
+            which[getattr(part, "mesh", part).referenced[: len(which)]] = number
+        last = max((solver.plan for solver in solvers), key=lambda plan: plan.engine == "hopf-lax")
+        reason = f"{last.reason}; components whose triangles fit together have the engine that they have alone"
+        return replace(last, reason=reason), ComponentEngine([solver._engine for solver in solvers], which)
 
     def _on_triangles(self, triangles: Triangles, chosen: Plan) -> tuple[Plan, Engine]:
         self._triangles = triangles

@@ -228,7 +228,7 @@ class Comparisons:
         if surface is not None and domain.n > domain.n_given and (surface.unfolding.twin > -2).all():
             # On the added vertices a sweep is accurate, and windows would multiply on fans of many narrow triangles.
             # Where more than two faces meet, the cover that has these vertices is another surface.
-            return SweepEngine(OperatorTriangles(replace(domain, surface=replace(surface, uncovered=None, V=None))))
+            return SweepEngine(OperatorTriangles(domain, replace(surface, uncovered=None, V=None)))
         return WindowEngine(triangles)
 
     def _components(self, sources: SourceSet) -> IntArray:

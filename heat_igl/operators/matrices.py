@@ -190,6 +190,8 @@ class Operators:
         Of polygons, the triangles of `surface` before any flip, to which points and curves are carried.
     originals : (n_given,) int64 or None
         The vertex whose distance each takes, see `Mesh.originals`; None if it is its own.
+    parts : tuple of Operators
+        Of components that distance without heat is measured on by different engines, those for each, on all vertices.
 
     Examples
     --------
@@ -224,6 +226,7 @@ class Operators:
     drawn_on: Surface | None = None
     fans: PolygonFans | None = None
     originals: IntArray | None = None
+    parts: tuple[Operators, ...] = ()
 
     def __repr__(self) -> str:
         return f"Operators({self.n} vertices, {len(self.weights)} faces)"

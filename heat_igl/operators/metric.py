@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property, partial
 from operator import attrgetter
@@ -18,10 +18,10 @@ from heat_igl.mesh import Mesh, MeshLike, as_simplices, connectivity
 from heat_igl.operators.matrices import Laplacian, Operators, check_laplacian, laplacian_of_gradient
 from heat_igl.operators.metric_derivatives import MetricSides, plane_axes
 from heat_igl.operators.metric_simplices import MetricSimplices, equal_runs, inverse_root, least_of_components
-from heat_igl.operators.suitability import mean_angle_defect
+from heat_igl.operators.suitability import mean_angle_defects
 from heat_igl.operators.triangles import check_measures, edge_length_operators, intrinsic_operators, longest_sides
 from heat_igl.plan import hopf_lax_is_nearer
-from heat_igl.typing import AnyArray, ArrayLike, FloatArray
+from heat_igl.typing import AnyArray, ArrayLike, BoolArray, FloatArray
 
 # Share of the longer by which two faces may see the length of an edge differ, for which the mean is taken then.
 _ONE_LENGTH = 0.1
@@ -64,9 +64,9 @@ def metric_operators(mesh: MeshLike, metric: ArrayLike, *, laplacian: Laplacian 
         Edges are flipped, and every method works. Distance from vertices is that of windows, or of the Hopf-Lax
         formula where the metric varies within triangles by more than the surface is curved.
 
-        Where faces differ by more anywhere, as at a jump of the speed, or the metric changes too far along an edge, no
-        unfolding is straight: there is no `surface`, flips end at such edges, sources are vertices, and distance is
-        that of the Hopf-Lax formula, per face on the triangles after flips if most edges have one length.
+        Where faces of a component differ by more, as at a jump of the speed, or the metric changes too far along an
+        edge, no unfolding is straight: there is no `surface`, flips end at such edges, sources are vertices, and there
+        distance is that of the Hopf-Lax formula, per face on the triangles after flips if most edges have one length.
 
         Tetrahedra: in components with one metric, distance is exact as in space, else that of the Hopf-Lax formula.
 
@@ -272,7 +272,7 @@ def operators_in_metric(
     least: float | FloatArray,
     root: Any,
     group: Any,
-    given: FloatArray,
+    given: FloatArray | None,
     laplacian: Laplacian = "auto",
 ) -> Operators:
     """`metric_operators` of checked triangles and metrics g (k, 3, 3) of each `group` (m,), or of each triangle.
@@ -284,15 +284,22 @@ def operators_in_metric(
     squares = MetricSimplices(mesh.F, mesh.n_vertices, mesh.V, tensors=g, group=group).measured[1]
     own = np.sqrt(squares, out=squares)[:, ::-1]
     triangulation = intrinsic_triangulation(mesh)
-    if not _fit_together(mesh, own, triangulation.twin):
+    fits = _at_all_faces(mesh, _fit_together(mesh, own, triangulation.twin))
+    if not fits.all():
         in_metric = partial(MetricSimplices.in_metric, mesh, g, least, False, root, group)
-        return _refracting(mesh, triangulation, own, least, in_metric, laplacian)
+        domain, is_even = _refracting(mesh, triangulation, own, least, in_metric, laplacian)
+        root = inverse_root(g, mesh) if root is None else root
+        parts = (
+            operators_in_metric(own, g, least, root, group[faces], None if given is None else given[faces], laplacian)
+            for own, faces in _of_kinds(mesh, np.where(fits, 2, is_even))
+        )
+        return replace(domain, parts=tuple(parts))
     del own, squares
     given = g[group] if given is None else given
     # Triangles without area know no metric in their plane.
     if not (mesh.measures > 0).all():
         return _of_triangles(mesh, None, laplacian, given)
-    defect = mean_angle_defect(triangulation)
+    defect = mean_angle_defects(triangulation, mesh.components)
     del triangulation
     root = inverse_root(g, mesh) if root is None else root
     del g
@@ -301,11 +308,31 @@ def operators_in_metric(
     return _unfolded(defect, mesh, simplices, laplacian, given)
 
 
-def _unfolded(defect: float, mesh: Mesh, simplices: MetricSimplices, *of: Any) -> Operators:
-    """The operators of triangles whose edges have one length each, and with `simplices` where these are nearer."""
-    if hopf_lax_is_nearer(simplices.measured[-1], defect):
-        return _LaterOperators(mesh, simplices, _of_triangles, mesh, simplices, *of)
+def _unfolded(defect: FloatArray, mesh: Mesh, simplices: MetricSimplices, *of: Any) -> Operators:
+    """The operators of triangles whose edges have one length each, and with `simplices` where these are nearer.
+
+    Components (k,) have these mean angle defects.
+    """
+    component = mesh.components[mesh.F[:, 0]]
+    total = np.bincount(component, simplices.measured[-1], len(defect))
+    variation = total / np.maximum(np.bincount(component, minlength=len(defect)), 1)
+    is_nearer = hopf_lax_is_nearer(variation, defect)
+    if is_nearer[component].any():
+        nearer = simplices if is_nearer[component].all() else simplices.part(is_nearer[mesh.components])
+        return _LaterOperators(mesh, nearer, _of_triangles, mesh, simplices, *of)
     return replace(_of_triangles(mesh, simplices, *of), simplices=None)
+
+
+def _at_all_faces(mesh: Mesh, is_so: BoolArray) -> BoolArray:
+    """Whether something is so at all faces (m,) of a component (k,)."""
+    return ~connectivity.mask_of(mesh.components[mesh.F[~is_so, 0]], mesh.components.max() + 1)
+
+
+def _of_kinds(mesh: Mesh, kind: AnyArray) -> Iterator[tuple[Mesh, BoolArray]]:
+    """Where components (k,) are of several kinds, the mesh of each, with all vertices, and which faces (m,) it has."""
+    of = kind[mesh.components[mesh.F[:, 0]]]
+    for number in np.unique(of) if (of != of[0]).any() else ():
+        yield Mesh(mesh.V, mesh.F[of == number]).with_originals(mesh.originals), of == number
 
 
 def _of_triangles(mesh: Mesh, simplices: Any, laplacian: Laplacian, given: FloatArray | None) -> Operators:
@@ -322,9 +349,10 @@ def _of_smooth_metric(mesh: Mesh, g: Any, least: Any, root: Any, laplacian: Lapl
     if mesh.is_tetrahedral:
         return _of_groups(mesh, g, least, root)
     # Before the simplices, as both take much memory.
-    defect = mean_angle_defect(intrinsic_triangulation(mesh))
+    defect = mean_angle_defects(intrinsic_triangulation(mesh), mesh.components)
     simplices = MetricSimplices.in_metric(mesh, g, least, True, root)
-    if _keeps_shape(simplices.edges[1].reshape(-1, 3), np.sqrt(simplices.measured[1])):
+    keep = _at_all_faces(mesh, _keep_shape(simplices.edges[1].reshape(-1, 3), np.sqrt(simplices.measured[1])))
+    if keep.all():
         return _unfolded(defect, mesh, simplices, laplacian, None)
     # For heat: what each face says alone. Without a surface, no vertices can be told from those that were added.
     at_corners = (simplices.metric(np.arange(mesh.n_faces), corner) for corner in range(3))
@@ -332,36 +360,45 @@ def _of_smooth_metric(mesh: Mesh, g: Any, least: Any, root: Any, laplacian: Lapl
     fitted: Laplacian = "cotan" if laplacian == "cotan" else "intrinsic-delaunay"
     domain = operators_in_metric(mesh, each, least, None, None, each, fitted)
     made = domain._made if isinstance(domain, _LaterOperators) else domain
-    return replace(made, surface=None, simplices=simplices, metric=None)
+    velocity, rows, sizes = root
+    parts = (
+        _of_smooth_metric(own, None, least, (velocity, rows[faces], sizes), laplacian)
+        for own, faces in _of_kinds(mesh, keep)
+    )
+    return replace(made, surface=None, simplices=simplices, metric=None, parts=tuple(parts))
 
 
-def _fit_together(mesh: Mesh, own: FloatArray, twin: AnyArray) -> bool:
-    """Whether edges, which faces see at lengths `own` (m, 3), may have the mean of these: they nearly agree."""
+def _fit_together(mesh: Mesh, own: FloatArray, twin: AnyArray) -> BoolArray:
+    """Whether edges of faces (m,), which these see at lengths `own` (m, 3), may have the mean: they nearly agree."""
     if (twin == -2).any():  # edges of more than two faces
         of_side = mesh.facets.of_face
         shortest, longest = np.full(len(mesh.edges), np.inf), np.zeros(len(mesh.edges))
         np.minimum.at(shortest, of_side, own)
         np.maximum.at(longest, of_side, own)
         mean = (np.bincount(of_side.ravel(), own.ravel()) / np.bincount(of_side.ravel()))[of_side]
-        differ = longest - shortest > _ONE_LENGTH * longest
+        differ = (longest - shortest > _ONE_LENGTH * longest)[of_side]
     else:
         other, is_outer = own.ravel()[twin].reshape(-1, 3), (twin < 0).reshape(-1, 3)
         other[is_outer] = own[is_outer]
         differ = np.abs(own - other) > _ONE_LENGTH * np.maximum(own, other)
         mean = np.multiply(np.add(own, other, out=other), 0.5, out=other)
-    return not differ.any() and _keeps_shape(mean, own)
+    a, b, c = differ.T
+    return np.asarray(~(a | b | c) & _keep_shape(mean, own))
 
 
-def _keeps_shape(sides: FloatArray, was: FloatArray) -> bool:
-    """Whether of triangles with sides `was` (m, 3), those with these sides keep a share of the slack."""
+def _keep_shape(sides: FloatArray, was: FloatArray) -> BoolArray:
+    """Whether triangles (m,) of sides `was` (m, 3) keep a share of the slack with these sides."""
     slack, was_slack = (a.sum(axis=1) - 2 * longest_sides(a) for a in (sides, was))
-    return bool((slack >= _SLACK * was_slack).all())
+    return np.asarray(slack >= _SLACK * was_slack)
 
 
 def _refracting(
     mesh: Mesh, apart: IntrinsicTriangulation, sides: FloatArray, least: Any, in_metric: Any, laplacian: Laplacian
-) -> Operators:
-    """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone."""
+) -> tuple[Operators, BoolArray]:
+    """The operators of triangles that see some edge at two lengths: L is the sum of what each says alone.
+
+    Also whether simplices are, in each component (k,), those after flips.
+    """
     # Cut apart at the edges that are seen at two lengths.
     sides = sides + mollify(sides, mesh.F)
     twin = apart.twin.copy()
@@ -375,14 +412,17 @@ def _refracting(
     domain = _with_shortest_edges(domain, mesh, pairs, triangulation.l.ravel(order="F"))
     # Where most triangles fit together, they are those after flips: even ones, however thin the given ones are in the
     # metric. Triangles without area know no metric in their plane, but have lengths.
-    if 2 * np.count_nonzero(twin[inner] >= 0) > len(inner) or not (mesh.measures > 0).all():
+    of_side, k = mesh.components[mesh.F[inner // 3, 0]], mesh.components.max() + 1
+    is_even = 2 * np.bincount(of_side[twin[inner] >= 0], minlength=k) > np.bincount(of_side, minlength=k)
+    is_even |= ~_at_all_faces(mesh, mesh.measures > 0)
+    if is_even.any():
         # A flip may join a vertex with itself, or two that an edge joins already: no triangles in space.
         ends = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
         used = triangulation if len(ends) == len(mesh.edges) else glued
         simplices = MetricSimplices.of_sides(mesh.V, used.F, used.l, least)
     else:
         simplices = in_metric()
-    return replace(domain, simplices=simplices)
+    return replace(domain, simplices=simplices), is_even
 
 
 def _of_groups(mesh: Mesh, g: FloatArray, least: Any, root: Any, group: Any = None) -> Operators:

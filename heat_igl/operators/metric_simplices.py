@@ -148,9 +148,9 @@ class MetricSimplices:
 
     def _with_kinds(self, kind: IntArray, *found: MetricSimplices) -> MetricSimplices:
         """The simplices of the one `kind` (k,) of the components, or the last of them with those of each as `parts`."""
-        of = kind[self.components[self.corners[:, 0]]] if len(kind) > 1 else np.full(len(self.corners), kind[0])
-        kinds = np.flatnonzero(np.bincount(of)).tolist()
-        parts = (found[i].part(np.flatnonzero(of == i)) for i in kinds)
+        of = kind[self.components if len(kind) > 1 else 0 * self.components]
+        kinds = np.flatnonzero(np.bincount(of[self.corners[:, 0]])).tolist()
+        parts = (found[i].part(of == i) for i in kinds)
         whole: MetricSimplices = found[kinds[-1]]
         return replace(whole, parts=tuple(parts)) if len(kinds) > 1 else whole
 
@@ -180,7 +180,7 @@ class MetricSimplices:
                 by = e if self.tensors is None or self.group is None else e @ self.tensors[self.group[some]]
                 lengths[some] = np.sqrt((by * e).sum(axis=2))
         mean, one_each = np.ascontiguousarray(lengths**2), np.ones(len(lengths))
-        return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0.0
+        return None, mean, mean.max(axis=1), one_each, 0 * one_each, 0 * one_each
 
     @cached_property
     def components(self) -> IntArray:
@@ -224,10 +224,15 @@ class MetricSimplices:
             found[at] = part.place[at]
         return found
 
-    def part(self, chosen: IntArray) -> MetricSimplices:
-        """Some of the simplices, with all vertices."""
+    def part(self, is_there: BoolArray) -> MetricSimplices:
+        """The simplices at some of the vertices (n,), which are those of components, with all vertices."""
+        chosen = np.flatnonzero(is_there[self.corners[:, 0]])
+        parts = [part for each in self.parts if len((part := each.part(is_there)).corners)]
+        if len(parts) == 1:
+            return parts[0]
         lengths, group, rows = (None if of is None else of[chosen] for of in (self.lengths, self.group, self.rows))
-        return replace(self, corners=self.corners[chosen], lengths=lengths, group=group, rows=rows, incident=None)
+        own: Any = {"lengths": lengths, "group": group, "rows": rows, "incident": None, "parts": tuple(parts)}
+        return replace(self, corners=self.corners[chosen], **own)
 
     def halved(self) -> MetricSimplices:
         """The simplices in their metric with all edges halved; the vertices keep their numbers."""

@@ -144,11 +144,16 @@ def is_rough_or_narrow(domain: Operators) -> BoolArray:
     return np.asarray(is_narrow | (defect * n_used > plan.ROUGH_FOR_HEAT * n))
 
 
-def mean_angle_defect(triangulation: IntrinsicTriangulation) -> float:
-    """Mean of |2 pi - sum of angles| over vertices; on the boundary the excess over pi, since ways bend there."""
-    vertices = np.unique(triangulation.F)
+def mean_angle_defects(triangulation: IntrinsicTriangulation, component: IntArray) -> FloatArray:
+    """Mean of |2 pi - sum of angles| in components (k,); on the boundary the excess over pi, since ways bend there.
+
+    Of the vertices that faces use, by their components (n,).
+    """
+    vertices, k = np.unique(triangulation.F), component.max() + 1
     total, at_boundary = _angle_sums(triangulation, vertices), _is_outer(triangulation)[vertices]
-    return float(np.where(at_boundary, np.maximum(total - np.pi, 0.0), np.abs(2 * np.pi - total)).mean())
+    defect = np.where(at_boundary, np.maximum(total - np.pi, 0.0), np.abs(2 * np.pi - total))
+    of = component[vertices]
+    return np.bincount(of, defect, k) / np.maximum(np.bincount(of, minlength=k), 1)
 
 
 def _is_outer(triangulation: IntrinsicTriangulation) -> BoolArray:

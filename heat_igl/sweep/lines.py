@@ -55,7 +55,7 @@ class LineEngine(SimplexEngine):
         # A further coordinate, by which no body is near another one.
         component = simplices.components[self._order, None]
         self._apart = np.hstack([self._V, 2 * np.ptp(self._V, axis=0).sum() * component])
-        self._small = simplices.part(np.flatnonzero(self._is_small[simplices.corners[:, 0]]))
+        self._small = simplices.part(self._is_small)
         is_refined = len(self._small.corners) > 0 and not is_halved and self._is_small[self.reflex_edges[0]].any()
         self._finer = LineEngine(self._small.halved(), is_halved=True) if is_refined else None
 

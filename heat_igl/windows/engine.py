@@ -11,7 +11,7 @@ import numpy as np
 
 from heat_igl.mesh import Mesh, SurfacePoints
 from heat_igl.sources import SourceSet
-from heat_igl.typing import FloatArray, IntArray
+from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.exact import ExactSurface
 from heat_igl.windows.tables import MARGIN, Tables, from_mesh, from_triangulation
 
@@ -46,13 +46,14 @@ class Engine(ABC):
 class ComponentEngine(Engine):
     """Engines that measure on components of their own: that of each vertex by its number in `which` (n,)."""
 
-    def __init__(self, engines: list[Engine], which: IntArray) -> None:
-        self._engines, self._which = engines, which
+    def __init__(self, engines: list[Engine], which: AnyArray) -> None:
+        self._engines, self._which = engines, which.astype(np.int64)
 
     def of(self, sources: SourceSet) -> Engine:
         """The engine on the components of source vertices; this one if there are several."""
         numbers = np.unique(self._which[sources.vertices])
-        return self._engines[numbers[0]] if len(numbers) == 1 else self
+        engine = self._engines[numbers[0]] if len(numbers) == 1 else self
+        return engine.of(sources) if isinstance(engine, ComponentEngine) and engine is not self else engine
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,) and nearest source (n,)."""
@@ -132,12 +133,12 @@ class MeshTriangles(Triangles):
 
 
 class OperatorTriangles(Triangles):
-    """The triangles of a domain that has operators; a ValueError if they have no surface."""
+    """The triangles of a domain that has operators, or another `surface` of it; a ValueError if they have none."""
 
-    def __init__(self, domain: Operators) -> None:
+    def __init__(self, domain: Operators, surface: Surface | None = None) -> None:
         if not domain.has_surface:
             raise ValueError("distance is unfolded along triangles, and this domain has none")
-        self._domain = domain
+        self._domain, self._surface = domain, surface
 
     @cached_property
     def components(self) -> IntArray:  # type: ignore[override]
@@ -147,7 +148,7 @@ class OperatorTriangles(Triangles):
     @cached_property
     def surface(self) -> Surface:
         """The triangles with their history."""
-        surface = cast("Surface", self._domain.surface)
+        surface = cast("Surface", self._surface or self._domain.surface)
         # The margin of the heat method would lengthen paths. Lengths without positions are those of another metric.
         if surface.V is not None and surface.faces.lengthening != 0:
             from heat_igl.operators import unfolding_surface

@@ -36,20 +36,20 @@ def lengths_in_velocity(
     -------
     inverse, mean, widest, slack, growth
         As `SimplexUpdate` takes them, with `mean` in the metric of the centre.
-    variation : float
+    variation : (m,) float64
         How far the lengths of edges of triangles differ between the metrics of the corners, mean square of the share.
     """
     size: cython.int = corners.shape[1]
     per: cython.double = 1.0 / size
     n_pairs: cython.int = size * (size - 1) // 2
     m = corners.shape[0]
-    found = np.empty_like(velocity), np.empty((m, n_pairs)), np.zeros(m), np.zeros(m), np.zeros(m)
+    found = np.empty_like(velocity), np.empty((m, n_pairs)), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
     inverse: cython.double[:, ::1] = found[0]
     mean: cython.double[:, ::1] = found[1]
     widest: cython.double[::1] = found[2]
     slack: cython.double[::1] = found[3]
     growth: cython.double[::1] = found[4]
-    variation: cython.double = 0.0
+    variation: cython.double[::1] = found[5]
     squares: cython.double[24]
     here: cython.double[6]
     e: cython.double[18]
@@ -100,12 +100,12 @@ def lengths_in_velocity(
                 faster = max(faster, 0.5 * (mean[s, k] / one + mean[s, k] / next_one))
                 longest, widest[s] = max(longest, mean[s, k]), max(widest[s], two)
                 if size == 3:
-                    variation += (one + two - 2.0 * sqrt(one * two)) / mean[s, k]
+                    variation[s] += (one + two - 2.0 * sqrt(one * two)) / (3.0 * mean[s, k])
             slack[s] = 1.0 / sqrt(faster)
             # In a flat simplex, the arc over a long edge would leave it, for velocities far above those at the corners.
             fastest *= per_speed
             growth[s] = min(steep, 4.0 * sqrt(max(fastest * fastest - 1.0, 0.0) / longest))
-    return *found, variation / (n_pairs * max(m, 1))
+    return found
 
 
 def velocities_at_corners(
