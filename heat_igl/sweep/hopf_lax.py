@@ -108,15 +108,15 @@ class HopfLaxEngine(SimplexEngine):
         return np.asarray(mark / max(np.abs(mark).max(initial=0), np.finfo(float).tiny), np.float32)
 
     def _crossings(self, mark: AnyArray, adjacent: Any) -> tuple[AnyArray, ...]:
-        """Paths across facets at whose corners marks differ, as `HopfLax` takes them."""
+        """Paths across facets at some of whose corners marks differ, as `HopfLax` takes them."""
         corners, size, n = self._corners, self._corners.shape[1], self._simplices.n
         others = np.array([[j for j in range(size) if j != c] for c in range(size)])
         at_vertex, is_mixed, some = np.zeros(n, np.float32), np.zeros(n, bool), np.flatnonzero(mark)
         at_vertex[corners[some]] = mark[some, None]
         is_mixed[corners[some][at_vertex[corners[some]] != mark[some, None]]] = True
-        some = some[np.count_nonzero(is_mixed[corners[some]], axis=1) >= size - 1]
+        some = some[is_mixed[corners[some]].any(axis=1)]
         rows = corners[some][:, others].reshape(-1, size - 1)
-        at = np.flatnonzero(is_mixed[rows].all(axis=1))
+        at = np.flatnonzero(is_mixed[rows].any(axis=1))
         rows, at = rows[at].T, (size * some[at // size] + at % size).astype(np.int32)
         low, high = reduce(np.minimum, rows), reduce(np.maximum, rows)
         _, facet, counts = unique_rows(np.stack([low, sum(rows) - low - high, high], axis=1), n)
@@ -124,9 +124,11 @@ class HopfLaxEngine(SimplexEngine):
         at, facet = at[order], facet[order]
         beside = [np.stack([at[k:], at[:-k]])[:, facet[k:] == facet[:-k]] for k in range(1, counts.max(initial=2))]
         pairs = np.concatenate(beside, axis=1).T
-        # From the corner opposite the facet beyond to all of a simplex; the other way, to those of the facet.
-        at, start = (np.repeat(pairs[:, [k, 1 - k]].T, [size, size - 1], axis=0).ravel() for k in (0, 1))
-        turned = np.repeat(np.array([*range(size), *range(1, size)], np.int32), len(pairs))
+        # From the corner opposite a facet to the other one; between two metrics also to those of the facet, both ways.
+        between = pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]]
+        between = np.concatenate([between, between[:, ::-1]])
+        at, start = np.concatenate([pairs] + [between] * (size - 1)).T
+        turned = np.repeat(np.arange(size, dtype=np.int32), [len(pairs)] + [len(between)] * (size - 1))
         paths: Any = np.stack([at, start, at - at % size + (at + turned) % size], axis=1)
         lengths = adjacent.crossings(paths)
         short = np.flatnonzero(np.isfinite(lengths))
