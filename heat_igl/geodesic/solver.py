@@ -21,15 +21,8 @@ from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod, Method, Plan, Surfa
 from heat_igl.runtime import n_threads
 from heat_igl.sources import OffsetSources, Sources, SourceSet, named_vertices, require_resolved, source_set
 from heat_igl.typing import ArrayLike, BoolArray, FloatArray
-from heat_igl.windows import (
-    ComponentEngine,
-    Engine,
-    GuardedEngine,
-    MeshTriangles,
-    OperatorTriangles,
-    Triangles,
-    guarded_windows,
-)
+from heat_igl.windows import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
+from heat_igl.windows.engine import ComponentEngine
 
 if TYPE_CHECKING:
     from heat_igl.geodesic.derivatives import DistanceDerivative
@@ -251,9 +244,8 @@ class GeodesicSolver(BatchedSolver):
                     self._triangles = OperatorTriangles(domain) if fits else None
                     if fits and len(domain.simplices.corners) < len(cast(Triangles, self._triangles).given_faces):
                         chosen = replace(chosen, reason=f"{chosen.reason}, and in components where it varies less")
-                        engine = ComponentEngine(
-                            [self._unfolded, engine], mask_of(domain.simplices.corners, domain.simplices.n)
-                        )
+                        which = mask_of(domain.simplices.corners, domain.simplices.n)
+                        engine = ComponentEngine([self._unfolded, engine], which)
                     return chosen, engine
             if not domain.has_surface:
                 raise MeshError("distance is measured along simplices, and these operators know none: give the mesh")

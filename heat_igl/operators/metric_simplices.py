@@ -123,10 +123,9 @@ class MetricSimplices:
         return space._with_kinds(np.where(is_same, 0, 1 + is_smooth), unfolded, apart, smooth)
 
     def _in_one_metric(self, g: FloatArray, rows: Any) -> tuple[MetricSimplices, BoolArray]:
-        """The simplices after a linear map for each component, and whether it has one metric (k,).
+        """The simplices after a linear map of each component, and whether that has one metric (k,).
 
-        `rows` (m,) or (m, p + 1) are those of the metrics g of each simplex, or at its corners; they are 0, 1, ... if
-        they are None.
+        `rows` (m,) or (m, p + 1) are those of the metrics g of simplices, or at their corners; None if all in order.
         """
         component, corners = self.components, self.corners
         k = int(component.max()) + 1
@@ -262,14 +261,11 @@ class MetricSimplices:
 def _middles(component: IntArray, corners: AnyArray, V: FloatArray, W: FloatArray, group: AnyArray) -> FloatArray:
     """The mean position and velocity (k, 9) in each component (n,), of vertices at V and velocities W by `group`."""
     k = component.max() + 1
-    if k == 1:
-        return np.concatenate([V.mean(axis=0), np.bincount(group) @ W / len(group)])[None]
-    middle, vertices = np.zeros((k, 9)), group_by_label(component, k)
-    simplices = group_by_label(component[corners[:, 0]], k)
-    for i in np.flatnonzero(np.diff(simplices.first)).tolist():
-        at, rows = vertices.of(np.array([i]))[0], group[simplices.of(np.array([i]))[0]]
-        used = slice(rows.min(), rows.max() + 1)
-        middle[i] = _middles(0 * at, np.empty((0, 0)), V[at], W[used], rows - used.start)
+    middle, members = np.zeros((k, 9)), (group_by_label(of, k) for of in (component, component[corners[:, 0]]))
+    for value, at, some in zip(middle, *(np.split(each.members, each.first[1:-1]) for each in members), strict=True):
+        if len(some):
+            count = np.bincount(group[some] - group[some].min())
+            value[:] = *V[at].mean(axis=0), *(count @ W[group[some].min() :][: len(count)] / len(some))
     return middle
 
 

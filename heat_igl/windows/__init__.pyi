@@ -2,7 +2,6 @@ from heat_igl.windows.directions import PathAngles as PathAngles
 from heat_igl.windows.directions import PathDirections as PathDirections
 from heat_igl.windows.directions import in_circle as in_circle
 from heat_igl.windows.directions import vectors_from as vectors_from
-from heat_igl.windows.engine import ComponentEngine as ComponentEngine
 from heat_igl.windows.engine import Engine as Engine
 from heat_igl.windows.engine import MeshTriangles as MeshTriangles
 from heat_igl.windows.engine import OperatorTriangles as OperatorTriangles
