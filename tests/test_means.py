@@ -94,6 +94,9 @@ def test_a_median_at_a_point_is_no_worse_than_a_vertex():
     points = np.random.default_rng(77).choice(mesh.n_vertices, 4, replace=False)
     least = heat_igl.GeodesicSolver(mesh).distances(points.tolist()).sum(axis=0).min()
     assert geodesic_distance(mesh, karcher_mean(mesh, points, p=1))[points].sum() <= (1 + 1e-9) * least
+    # The tip of a triangle a thousand times as long as the others weighs more than the rest.
+    mesh = Mesh([*shapes.grid(20).V, [1000, 0.5, 0]], [*shapes.grid(20).F, [230, 441, 251]])
+    assert karcher_mean(mesh, [441, 0, 20], weights=[5, 1, 1], p=1).barycentric.tolist() == [[0, 1, 0]]
 
 
 def test_single_points_are_their_means(sphere):

@@ -34,7 +34,9 @@ _LARGEST_GAP = 0.9
 # -0.6, -0.4 and -0.1, errors on twelve clouds with normals are 14 and 5 % larger, and 4 % smaller.
 _OTHER_SHEET = -0.25
 # The same above which a triangle is put into a gap only if it closes it, a right angle whatever the rounding, as of a
-# notch that belongs to stairs; and above which it never is, since both lie on each other, as within a flat border.
+# notch that belongs to stairs; and above which it never is, since both lie on each other, as within a flat border. On
+# 82 random clouds without noise and with two amounts, errors are the same to .2 % in the mean with -0.2 and 0, and with
+# 0.9 and 0.999; single ones are .67 to 1.24 times as large.
 _RIGHT_ANGLE, _MOST_FOLDED = -0.1, 0.99
 # Triangles of a part for each one that fills its gaps: with fewer, it is the border of the part that was filled, as
 # of a cap of 70, which 18 fill. With 4 errors are the same, and with 30 gaps of small parts stay.
@@ -46,7 +48,8 @@ _NEAREST, _EDGES_AWAY = 12, 4
 # wrong by more than 5 % are silent, and 47 of 310 that are right within 2 % are said; with 1.75 28 and 32.
 _LARGE = 1.75
 # Corners of triangles that join sheets are farther apart on the others, in edges and roots of the number of points: 1
-# to 1.3 in 12 of 200 random clouds, wrong by 4 to 40 %, and up to .26 in those that are right without a warning.
+# to 1.3 in 12 of 200 random clouds, wrong by 4 to 40 %, and up to .26 in those that are right without a warning. On 82
+# others, with and without noise, a quarter says 24 times more that sheets are joined, and 1 once less.
 _OTHER_TURN = 0.5
 
 

@@ -30,6 +30,10 @@ _SEVERAL_SHEETS = 0.1
 # stays on the other of two sheets 1.5 spacings apart; with 120 and 160 errors at thin parts are no smaller.
 _DIRECTIONS = 100
 
+# Parts of no more points stay as they are. With half as many, errors on 193 random clouds of 62 to 238 points,
+# clean and with noise of 1 to 6 %, are 3 % larger in the mean, up to 4.9 times; with twice as many 1 % smaller, and up
+# to 42 times as large.
+_FEWEST = 4 * K
 # Noise in shares of the spacing. Heights that vary by a share e of the spacing lengthen edges by the share e^2, so
 # below this one noise costs less than the heat method.
 _NOISE = 0.05
@@ -55,7 +59,9 @@ _SAMPLE = 250
 _NOISE_NOT_DETAIL, _THICK_NOISE_NOT_DETAIL = 0.8, 0.63
 # Mean of 2 a b / (a^2 + b^2), for the displacements a and b of nearest points: of noise at most 0.12, in balls; of two
 # scans of one surface up to 0.46, in flatter neighbourhoods; of five shapes that are detail 0.29 to 0.86.
-_ALIKE, _SHEETS_ALIKE = 0.12, 0.5
+# Half and twice of both, and of the four standard errors by which a mean has to be larger, change nothing on 82 random
+# clouds, clean and with noise of 1 and 3 %, and on 24 with noise that is many spacings.
+_ALIKE, _SHEETS_ALIKE, _SURE = 0.12, 0.5, 4
 _TINY = np.finfo(float).tiny
 
 
@@ -211,8 +217,6 @@ def without_noise(tree: PointTree) -> PointTree:
 
     Whether one part is noisy, and how much, does not depend on others.
     """
-    if len(tree.P) <= 4 * K:
-        return tree
     if not tree.parts.any():
         return _part_without_noise(tree)
     P, (first, members) = tree.P.copy(), group_by_label(tree.parts, tree.parts.max() + 1)
@@ -230,7 +234,7 @@ def _part_without_noise(tree: PointTree) -> PointTree:
     is many spacings, neighbours are first found among some of the points, and then among more.
     """
     n = len(tree.P)
-    if n <= 4 * K:
+    if n <= _FEWEST:
         return tree
     # Evenly over the points, the first and the last among them.
     sample = np.arange(min(n, _SAMPLE)) * (n - 1) // (min(n, _SAMPLE) - 1)
@@ -262,7 +266,7 @@ def _is_noisy(tree: PointTree, near: AnyArray) -> bool:
         return False
     other = _deviations(tree, tree.neighbours_of(near[:, 1], K // 2))[0]
     alike = 2 * (way * other).sum(axis=1) / np.maximum((way**2 + other**2).sum(axis=1), _TINY)
-    least = alike.mean() - 4 * alike.std() / np.sqrt(len(near))
+    least = alike.mean() - _SURE * alike.std() / np.sqrt(len(near))
     is_ball = least > _ALIKE and _thickness(tree, near) > _NO_SURFACE
     return bool(least <= _SHEETS_ALIKE and not is_ball)
 
@@ -298,6 +302,9 @@ def _spreads(tree: PointTree, near: AnyArray) -> list[tuple[int, int]]:
                 AccuracyWarning,
             )
         return [(flattest, 1)]
+    # Twice as flat as where a surface begins to show: with all of that, or half, two of 24 clouds with noise of many
+    # spacings are .57 and 1.04 times as wrong, the others as before. At least four neighbourhoods of points are left:
+    # with eight, they and 22 random clouds are as before or .53 to 1.09 times as wrong, with sixteen .62 to 1.36.
     while found[k] > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
         stride *= 4
         found[k] = _thickness(tree, tree.neighbours_of(near[:, 0], k, stride))
