@@ -114,10 +114,10 @@ class HopfLaxEngine(SimplexEngine):
         at_vertex, is_mixed, some = np.zeros(n, np.float32), np.zeros(n, bool), np.flatnonzero(mark)
         at_vertex[corners[some]] = mark[some, None]
         is_mixed[corners[some][at_vertex[corners[some]] != mark[some, None]]] = True
-        some = some[is_mixed[corners[some]].any(axis=1)]
-        rows = corners[some][:, others].reshape(-1, size - 1)
-        at = np.flatnonzero(is_mixed[rows].any(axis=1))
-        rows, at = rows[at].T, (size * some[at // size] + at % size).astype(np.int32)
+        mixed = is_mixed[corners[some]]
+        at = np.flatnonzero(np.count_nonzero(mixed, axis=1)[:, None] > mixed)
+        rows = corners[some][:, others].reshape(-1, size - 1)[at].T
+        at = (size * some[at // size] + at % size).astype(np.int32)
         low, high = reduce(np.minimum, rows), reduce(np.maximum, rows)
         _, facet, counts = unique_rows(np.stack([low, sum(rows) - low - high, high], axis=1), n)
         _, order = group_by_label(facet, len(counts))
@@ -127,12 +127,13 @@ class HopfLaxEngine(SimplexEngine):
         # From the corner opposite a facet to the other one; between two metrics also to those of the facet, both ways.
         between = pairs[mark[pairs[:, 0] // size] != mark[pairs[:, 1] // size]]
         between = np.concatenate([between, between[:, ::-1]])
-        at, start = np.concatenate([pairs] + [between] * (size - 1)).T
-        turned = np.repeat(np.arange(size, dtype=np.int32), [len(pairs)] + [len(between)] * (size - 1))
+        at, start = np.concatenate([pairs, np.repeat(between, size - 1, axis=0)]).T
+        turned = np.append(np.zeros(len(pairs), np.int32), np.tile(np.arange(1, size, dtype=np.int32), len(between)))
         paths: Any = np.stack([at, start, at - at % size + (at + turned) % size], axis=1)
         lengths = adjacent.crossings(paths)
         short = np.flatnonzero(np.isfinite(lengths))
-        paths, lengths = np.concatenate([paths[short], paths[short][:, [1, 2, 1]]]), lengths[short]
+        paths, lengths = paths[short], lengths[short]
+        paths = np.concatenate([paths, paths[:, [1, 2, 1]]])
         begins, order = group_by_label(corners.ravel()[paths[:, 2]], n)
         paths[:, 2] = corners.ravel()[paths[:, 1]]
         return begins.astype(np.int32), paths[order], np.tile(lengths, 2)[order], mark
