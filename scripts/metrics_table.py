@@ -62,7 +62,8 @@ from heat_igl.operators import MetricSimplices, Operators
 from heat_igl.operators.suitability import mean_angle_defects
 from heat_igl.runtime.memory import PeakMemory
 from heat_igl.sources import source_set
-from heat_igl.sweep import HopfLaxEngine, LineEngine
+from heat_igl.sweep import HopfLaxEngine
+from heat_igl.sweep.bodies import OrderedBody
 from heat_igl.typing import BoolArray, FloatArray, IntArray
 from heat_igl.validation.closed_forms import around_the_edge, by_fermat, straight
 from heat_igl.validation.construction import carved, compact, dual, tetrahedra
@@ -296,7 +297,7 @@ def in_walls(options: argparse.Namespace, rng: Random) -> Iterator[Row]:
     for name, make in (given or WALLS).items():
         mesh = make(rng)
         sources = rng.choice(np.unique(mesh.F), options.sources, replace=False).tolist()
-        edges = LineEngine(MetricSimplices.in_space(mesh)).reflex_edges[0]
+        edges = OrderedBody(MetricSimplices.in_space(mesh)).reflex_edges[0]
         row: Row = {"body": name, "n": mesh.n_vertices, "edges": len(edges)}
         ours, heat = (METHODS[method](mesh) for method in ("default", "heat"))
         found = [(ours(i), heat(i))[0] for i in sources]  # the first prepares

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any
-
 import numpy as np
 import scipy.sparse as sp
 
 from heat_igl.intrinsic.frames import unit_vectors
 from heat_igl.kernels.bodies.bends import bend_around
-from heat_igl.kernels.bodies.rays import Body
 from heat_igl.kernels.bodies.sight import look_around
-from heat_igl.mesh.connectivity import group_by_label, unique_rows
 from heat_igl.operators import MetricSimplices
 from heat_igl.plan import SMALL_BODY
 from heat_igl.sources import SourceSet
+from heat_igl.sweep.bodies import OrderedBody, with_long_edges_cut
 from heat_igl.sweep.simplex_derivative import SimplexDerivative
 from heat_igl.sweep.simplex_engine import SimplexEngine
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -27,8 +23,6 @@ _MOST_NEAR, _ROWS = 64, 16384
 _MOST_FIRST = 8
 # What the kernel of bends knows of the way to a vertex.
 _STRAIGHT, _UNKNOWN = -1, -2
-# Sine of the angle by which a body must exceed half a turn at an edge.
-_FLAT = 1e-6
 # The most edges that a way is followed around, sweeps over their places, and steps of Newton's method after these.
 _MOST_BENDS, _SWEEPS, _STEPS = 16, 30, 6
 # A distance that differs from the length of the way by more than this share of it is not that length.
@@ -41,94 +35,41 @@ class LineEngine(SimplexEngine):
     A body bends lines at edges with more than half a turn inside: once its ends know their distances, such an edge is a
     source itself. Tetrahedra that `is_halved` says were halved are not halved again.
 
-    Inside, vertices are in an `_order` (n,) in which neighbours are near each other in memory as well.
+    Long ones of these edges are cut first: distance along an edge is known at five points, and what comes to a long one
+    may come from many others. The vertices of the given simplices come first.
     """
 
     def __init__(self, simplices: MetricSimplices, is_halved: bool = False) -> None:
+        body, is_small = OrderedBody(simplices), simplices.sizes <= SMALL_BODY
+        self._given, self._small, self._weights = simplices, simplices.part(is_small), None
+        cut = with_long_edges_cut(simplices, body.reflex_edges[0])
+        if cut is not None:
+            simplices, self._weights = cut
+            body, is_small = OrderedBody(simplices), self._weights @ is_small > 0
         super().__init__(simplices)
-        # A query takes .89 to .97 of the time on 13 bodies of 10 000 vertices, .70 to .86 on three of 50 000 to 70 000.
-        self._order = along_curve(simplices.place, simplices.components)
-        self._number = np.argsort(self._order).astype(np.int32)
-        self._V, corners = simplices.place[self._order], self._number[self._corners]
-        self._corners = corners[np.argsort(corners.min(axis=1), kind="stable")]
-        self._is_small = simplices.sizes <= SMALL_BODY
-        # A further coordinate, by which no body is near another one.
-        component = simplices.components[self._order, None]
-        self._apart = np.hstack([self._V, 2 * np.ptp(self._V, axis=0).sum() * component])
-        self._small = simplices.part(self._is_small)
-        is_refined = len(self._small.corners) > 0 and not is_halved and self._is_small[self.reflex_edges[0]].any()
+        self._body, self._is_small = body, is_small
+        is_refined = len(self._small.corners) > 0 and not is_halved and self._is_small[body.reflex_edges[0]].any()
         self._finer = LineEngine(self._small.halved(), is_halved=True) if is_refined else None
-
-    @cached_property
-    def reflex_edges(self) -> tuple[AnyArray, FloatArray, FloatArray]:
-        """Boundary edges at which the inside takes more than half a turn, and edges where more than two walls meet.
-
-        A vertex at which parts of the body touch, or only one of these edges ends, is an edge from itself to itself:
-        where the place at which a way would bend is hidden, its end may be seen. Returns the edges (e, 2) int32; unit
-        vectors (e, 3) out of the body, halfway between the two walls, zero where more than two meet; and cosines (e,)
-        of the angles between these vectors and the walls.
-        """
-        from scipy.sparse import csgraph
-
-        V, corners = self._V, self._corners
-        tetrahedron, corner = np.nonzero(self._body.sides_behind() < 0)
-        walls = np.sort(corners[tetrahedron[:, None], (corner[:, None] + [1, 2, 3]) % 4].astype(np.int64), axis=1)
-        inner = V[corners[tetrahedron, corner]]
-        # The sides of all walls, each with the wall's third corner and its normal that points inside.
-        normal = np.cross(V[walls[:, 1]] - V[walls[:, 0]], V[walls[:, 2]] - V[walls[:, 0]])
-        normal *= np.sign(np.einsum("ij,ij->i", normal, inner - V[walls[:, 0]]))[:, None]
-        sides = np.concatenate([walls[:, [0, 1]], walls[:, [0, 2]], walls[:, [1, 2]]])
-        third = np.concatenate([walls[:, 2], walls[:, 1], walls[:, 0]])
-        wall = np.tile(np.arange(len(walls)), 3)
-        first, of_side, counts = unique_rows(sides, len(V))
-        edges = sides[first]
-        tangent = unit_vectors(V[edges[:, 1]] - V[edges[:, 0]])[of_side]
-        along_wall = V[third] - V[sides[:, 0]]
-        along_wall = unit_vectors(along_wall - np.einsum("ij,ij->i", along_wall, tangent)[:, None] * tangent)
-        order = np.argsort(of_side, kind="stable")
-        begins = np.concatenate([[0], np.cumsum(counts)[:-1]])
-        one, other = order[begins], order[begins + np.minimum(counts - 1, 1)]
-        sine = np.einsum("ij,ij->i", unit_vectors(normal[wall[one]]), along_wall[other])
-        outward = unit_vectors(along_wall[one] + along_wall[other])
-        outward[counts != 2] = 0
-        # The sides of a slit coincide, at a whole turn.
-        cosine = np.einsum("ij,ij->i", along_wall[one], along_wall[other])
-        bends = (counts > 2) | ((counts == 2) & ((sine < -_FLAT) | ((sine < _FLAT) & (cosine > 0))))
-        # The walls around a vertex, from edge to edge; at edges where more than two meet, ways bend anyway.
-        corner = 3 * wall[:, None] + np.repeat([[0, 1], [0, 2], [1, 2]], len(walls), axis=0)
-        pairs = np.stack([corner[one[counts == 2]], corner[other[counts == 2]]]).reshape(2, -1)
-        fan = csgraph.connected_components(sp.coo_array((np.ones(pairs.shape[1]), pairs), shape=2 * (walls.size,)))[1]
-        n_fans = np.bincount(walls.ravel()[np.unique(fan, return_index=True)[1]])
-        touching = np.setdiff1d(np.flatnonzero(n_fans > 1), edges[counts > 2])
-        # Without them, ways were up to 12 % too long on rough walls.
-        lone = np.flatnonzero(np.bincount(edges[bends].ravel(), minlength=len(V)) == 1)
-        touching = np.union1d(touching, lone)
-        found = self._order[np.concatenate([edges[bends], np.stack([touching, touching], axis=1)])].astype(np.int32)
-        cosine = np.einsum("ij,ij->i", along_wall[one], outward)[bends]
-        return found, np.pad(outward[bends], ((0, len(touching)), (0, 0))), np.pad(cosine, (0, len(touching)))
-
-    @cached_property
-    def _body(self) -> Any:
-        body: Any = Body
-        return body(self._corners, *self._incident, self._V)
 
     def _from_near(self, vertices: AnyArray, offset: FloatArray) -> tuple[AnyArray, AnyArray]:
         """All vertices from near to far in space, and the sources (n, k) that each looks for first, or -1."""
         if len(vertices) == 1:
-            far = np.sqrt(sum((x - x[vertices[0]]) ** 2 for x in self._V.T))
-            nearest = np.where(self._is_small[self._order, None], 0, -1)
+            far = np.sqrt(sum((x - x[vertices[0]]) ** 2 for x in self._body.V.T))
+            nearest = np.where(self._is_small[self._body.order, None], 0, -1)
         else:
+            apart = self._body.apart
             # Where another arrives before a source begins, no line comes from the source.
-            first = np.unique(nearest_in_value(self._apart[vertices], self._apart[vertices], offset)[1])
+            first = np.unique(nearest_in_value(apart[vertices], apart[vertices], offset)[1])
             # A wall may hide the nearest one, and the next one be seen between vertices that belong to others.
-            count = min(_MOST_FIRST if len(self.reflex_edges[0]) else 1, len(first))
-            far, which = nearest_in_value(self._apart, self._apart[vertices[first]], offset[first], count)
+            count = min(_MOST_FIRST if len(self._body.reflex_edges[0]) else 1, len(first))
+            far, which = nearest_in_value(apart, apart[vertices[first]], offset[first], count)
             nearest = first[which]
         return np.argsort(far, kind="stable").astype(np.int32), nearest.astype(np.int32)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
         """Distance (n,), and the source (n,) that it is measured from; on small bodies also by halved tetrahedra."""
         distance, labels = super().labelled(sources, cutoff, threads)
+        distance, labels = distance[: self._given.n], labels[: self._given.n]
         if self._finer is not None and self._is_small[sources.vertices].any():
             found, other = (values[: len(distance)] for values in self._finer.labelled(sources))
             # Longer by rounding alone, a distance stays as it is.
@@ -140,7 +81,7 @@ class LineEngine(SimplexEngine):
     def derivative(self, sources: SourceSet) -> LineDerivative:
         """The distance from source vertices with its derivative."""
         distance, label, length, slopes = self._differentiated(sources)
-        return LineDerivative(self._simplices, sources, distance, label, length, slopes)
+        return LineDerivative(self._given, sources, distance, label, length, slopes)
 
     def _differentiated(self, sources: SourceSet) -> tuple[FloatArray, IntArray, FloatArray, sp.csr_array]:
         """Distances and source vertices (n,) by number, lengths of ways (n,), and their slopes (n, 3 n)."""
@@ -148,8 +89,11 @@ class LineEngine(SimplexEngine):
         ends = np.where(label >= 0, sources.vertices[label], np.arange(len(label)))
         length, slopes = line_slopes(self._simplices.place, ends, edges, way, distance)
         length += np.append(sources.vertex_offset, 0)[label]
+        n = self._given.n
+        distance, label, length, slopes = distance[:n], label[:n], length[:n], slopes[:n]
+        if self._weights is not None:
+            slopes @= sp.kron(self._weights, sp.eye_array(3), format="csr")
         if self._finer is not None and self._is_small[sources.vertices].any():
-            n = len(distance)
             found, other, finer_length, finer_slopes = self._finer._differentiated(sources)
             finer_slopes = finer_slopes[:n] @ sp.kron(self._small.halfway(), sp.eye_array(3), format="csr")
             is_shorter = found[:n] < distance * (1 - _SAME)
@@ -169,34 +113,25 @@ class LineEngine(SimplexEngine):
         """
         # Values are compared by shares of them.
         least = offset.min()
-        vertices, offset = self._number[vertices], offset - least
-        d, labels = distance[self._order] - least, label[self._order]
+        vertices, offset = self._body.number[vertices], offset - least
+        d, labels = distance[self._body.order] - least, label[self._body.order]
         order, nearest = self._from_near(vertices, offset)
-        edges, outward, wall = self.reflex_edges
+        edges, outward, wall = self._body.reflex_edges
+        edges = np.concatenate([edges, self._body.later_edges])
         way: AnyArray = np.full(len(order), _UNKNOWN, np.int32)
         way[vertices] = _STRAIGHT
-        before, numbered = d.copy(), self._number[edges]
-        look_around(order, self._body, vertices, offset, numbered, nearest, d, labels)
+        before, numbered = d.copy(), self._body.number[edges]
+        look_around(order, self._body.body, vertices, offset, numbered, nearest, d, labels)
         way[d < before] = _STRAIGHT
-        bend_around(numbered, outward, wall, self._body, vertices, offset, d, labels, way)
-        distance[self._order], label[self._order] = d + least, labels
-        return edges, way[self._number]
+        bend_around(numbered, outward, wall, self._body.body, vertices, offset, d, labels, way)
+        distance[self._body.order], label[self._body.order] = d + least, labels
+        return edges, way[self._body.number]
 
     def _along_edges(self, distance: FloatArray, label: AnyArray) -> None:
         """As of all engines, without a list of edges: voxels have seven times as many as vertices."""
-        d, labels = distance[self._order], label[self._order]
-        self._body.along_edges(d, labels)
-        distance[self._order], label[self._order] = d, labels
-
-
-def along_curve(places: FloatArray, component: IntArray) -> IntArray:
-    """The order (n,) of places (n, 3) along a curve through the space (Morton 1966) of one component after another."""
-    begins, order = group_by_label(component, component.max() + 1)
-    low, high = (extreme.reduceat(places[order], begins[:-1]) for extreme in (np.minimum, np.maximum))
-    size = np.maximum((high - low).max(axis=1), 1e-300)[component, None]
-    cell = ((places - low[component]) / size * (2**20 - 1)).astype(np.int64)
-    order = np.argsort(sum((cell >> b & 1) @ [4 << 3 * b, 2 << 3 * b, 1 << 3 * b] for b in range(20)), kind="stable")
-    return order[np.argsort(component[order], kind="stable")]
+        d, labels = distance[self._body.order], label[self._body.order]
+        self._body.body.along_edges(d, labels)
+        distance[self._body.order], label[self._body.order] = d, labels
 
 
 def nearest_in_value(

@@ -42,16 +42,17 @@ def bend_around(
     distance is that from a point beside it, turned into one plane; behind the edge, the plane is turned again. So an
     edge whose ends know their distances is a source. It is a candidate for the vertices around it, and for the
     neighbours of those to which the way around it is the shortest, unless a neighbour leads to them on a shorter way.
-    If vertices are left without a way, an edge with one end that knows its distance is a source as well.
+    Where vertices are left without a way, the ends of edges next to them become sources as well: an edge from a vertex
+    to itself, as the end may be seen where the place at which a way would bend is hidden.
 
     Vertices wait in the order of their first candidates. When the line to the first edge has been followed, edges that
     share an end with it become candidates, and if it is hidden, those at the triangle that hides it.
 
-    The edges (e, 2) int32 are those of the `body` around which ways bend. `outward` (e, 3) is the direction out of the
-    body at each, halfway between the two walls, zero where more than two meet, and `wall` (e,) the cosine of the angle
-    between that direction and the walls. `way` (n,) int32 is the edge around which the way to each vertex bends last,
-    -1 on straight ways, -2 where it is not known. The other arguments are those of `sight.look_around`; `d`, `label`
-    and `way` are changed.
+    The edges (e, 2) int32 are those of the `body` around which ways bend, and then those ends. `outward` (k, 3) is the
+    direction out of the body at each of the former, halfway between the two walls, zero where more than two meet, and
+    `wall` (k,) the cosine of the angle between that direction and the walls. `way` (n,) int32 is the edge around which
+    the way to each vertex bends last, -1 on straight ways, -2 where it is not known. The other arguments are those of
+    `sight.look_around`; `d`, `label` and `way` are changed.
     """
     n, e = body.positions.shape[0], edges.shape[0]
     one = _Bends(body, sources, offset, d, label, edges, outward, wall, way)
@@ -64,7 +65,8 @@ def bend_around(
     while True:
         with cython.nogil:
             for i in range(e):
-                one.begin_around(order[i])
+                if one.is_source(order[i]):
+                    one.begin_around(order[i])
             while one.waiting.count > 0 and not one.failed:
                 n_asked += 1
                 if n_asked % ASK == 0 and is_interrupted():
@@ -74,12 +76,16 @@ def bend_around(
         if one.failed:
             raise MemoryError("no memory for the ways around edges of the body")
         before = np.array(d)
-        if one.is_lone:
+        if np.isfinite(before).all():
+            break
+        with cython.nogil:
+            for v in range(n):
+                one.wake_at(v)
+        if one.waiting.count == 0:
             body.along_edges(d, label)
             np.asarray(way)[np.asarray(d) < before] = -2
-        if np.isfinite(before).all() or (one.is_lone and (np.asarray(d) == before).all()):
-            break
-        one.is_lone = True
+            if (np.asarray(d) == before).all():
+                break
 
 
 @cython.final
@@ -91,8 +97,7 @@ class _Bends(EdgeDistances):
     that are candidates for a vertex are a list of `offers` whose first one is the `newest` (n,). Each has `fit_of` its
     edge when it was made, the value of the way, `INFINITY` once the line has been followed, and whether it is a guess:
     it shares an end with an edge that was hidden. All edges that were offered to a vertex are in `lists` that begin at
-    `met` (n,); there is room for `most_offers` and `most_lists`. No way to a vertex is longer than its `bound`. Edges
-    begin from one end if it `is_lone`.
+    `met` (n,); there is room for `most_offers` and `most_lists`. No way to a vertex is longer than its `bound`.
     """
 
     fit_of: cython.int[::1]
@@ -105,7 +110,6 @@ class _Bends(EdgeDistances):
     most_offers: cython.size_t
     most_lists: cython.size_t
     failed: cython.bint
-    is_lone: cython.bint
     is_guess: cython.bint
     waiting: PriorityQueue
     bound: cython.double[::1]
@@ -117,13 +121,42 @@ class _Bends(EdgeDistances):
     @cython.cfunc
     @cython.nogil
     def begin_around(self, i: cython.int) -> cython.void:
-        """Make an edge whose ends, or one if it `is_lone`, have shorter distances a candidate for those around them."""
+        """Make an edge whose ends have shorter distances a candidate for those around them."""
         to_a: cython.double = self.d[self.edges[i, 0]]
         to_b: cython.double = self.d[self.edges[i, 1]]
         is_new: cython.bint = self.edge[i].at[0] > to_a * (1 + GAIN) or self.edge[i].at[4] > to_b * (1 + GAIN)
-        is_known: cython.bint = (min(to_a, to_b) if self.is_lone else max(to_a, to_b)) < INFINITY
-        if is_new and is_known:
+        if is_new and max(to_a, to_b) < INFINITY:
             self.begin(i, False)
+
+    @cython.cfunc
+    @cython.nogil
+    def is_source(self, i: cython.int) -> cython.bint:
+        """Whether an edge is one from the beginning, or has been woken."""
+        u: cython.int = self.edges[i, 0]
+        return u != self.edges[i, 1] or self.last_at_end[u] == self.first_at_end[u + 1]
+
+    @cython.cfunc
+    @cython.nogil
+    def wake_at(self, v: cython.int) -> cython.void:
+        """Let v and the ends of the edge of its way be candidates for neighbours that are left without a way."""
+        way: cython.int = self.way[v]
+        if self.d[v] < INFINITY:
+            for m in range(self.body.first_neighbour[v], self.body.first_neighbour[v + 1]):
+                if self.d[self.body.neighbours[m]] == INFINITY:
+                    self.wake(v, self.body.neighbours[m])
+                    for c in range(2 if way >= 0 else 0):
+                        self.wake(self.edges[way, c], self.body.neighbours[m])
+
+    @cython.cfunc
+    @cython.nogil
+    def wake(self, u: cython.int, v: cython.int) -> cython.void:
+        """Make the edge from an end of edges to itself, if u is one, a candidate for v."""
+        k: cython.int = self.first_at_end[u + 1]
+        if k > self.first_at_end[u] and self.edges[self.at_end[k - 1], 0] == self.edges[self.at_end[k - 1], 1]:
+            if self.last_at_end[u] < k:
+                self.last_at_end[u] = k
+                self.begin(self.at_end[k - 1], False)
+            self.offer(self.at_end[k - 1], v, 0.0)
 
     @cython.cfunc
     @cython.nogil
@@ -148,11 +181,11 @@ class _Bends(EdgeDistances):
         last: cython.double = -1.0
         while last < INFINITY:
             nearest: cython.double = INFINITY
-            for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
+            for k in range(self.first_at_end[v], self.last_at_end[v]):
                 other: cython.double = self.d[self.edges[self.at_end[k], 0] + self.edges[self.at_end[k], 1] - v]
                 if last < other < nearest:
                     nearest = other
-            for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
+            for k in range(self.first_at_end[v], self.last_at_end[v]):
                 if self.d[self.edges[self.at_end[k], 0] + self.edges[self.at_end[k], 1] - v] == nearest:
                     self.begin_around(self.at_end[k])
             last = nearest
@@ -171,7 +204,7 @@ class _Bends(EdgeDistances):
     @cython.nogil
     def offer_at(self, a: cython.int, v: cython.int, least: cython.double) -> cython.void:
         """Make the edges that end at a candidates for v."""
-        for k in range(self.first_at_end[a], self.first_at_end[a + 1]):
+        for k in range(self.first_at_end[a], self.last_at_end[a]):
             self.offer(self.at_end[k], v, least)
 
     @cython.cfunc

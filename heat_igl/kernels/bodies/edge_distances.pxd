@@ -32,7 +32,7 @@ cdef class EdgeDistances(Ray):
     cdef int[::1] way
     cdef double bend[3]
     cdef double place, whole, share, slope
-    cdef int[::1] at_end, first_at_end, point_of
+    cdef int[::1] at_end, first_at_end, last_at_end, point_of
     cdef unsigned char[::1] followed
     cdef int refuted, front, origin, point, n_near
     cdef Line line

@@ -36,8 +36,9 @@ class EdgeDistances(Ray):
 
     A way comes from a front: the number of an edge, or with `n_edges` added that of a source. Of the last point of an
     edge, `front` is that of its way, `slope` that of distance along the edge, and `origin` the source. The edges that
-    end at vertex v are at ``first_at_end[v]`` to ``first_at_end[v + 1]`` of `at_end`; `point_of` (e,) is the number of
-    the last `point` of an edge for which an edge was a candidate; `n_near` are `near`, on ways of `near_value`.
+    end at vertex v are at ``first_at_end[v]`` to ``last_at_end[v]`` of `at_end`, followed by those that are no sources
+    yet; `point_of` (e,) is the number of the last `point` of an edge for which an edge was a candidate; `n_near` are
+    `near`, on ways of `near_value`.
 
     `edges`, `outward`, `wall` and `way` are those of `bends.bend_around`, the others those of `Ray`.
     """
@@ -45,13 +46,15 @@ class EdgeDistances(Ray):
     def __init__(self, body, sources, offset, d, label, edges, outward, wall, way):
         super().__init__(body, sources, offset, d, label)
         n, e = len(d), len(edges)
+        n_first = len(outward)
+        outward, wall = np.pad(outward, ((0, e - n_first), (0, 0))), np.pad(wall, (0, e - n_first))
         ends = np.asarray(self.body.positions)[np.asarray(edges)]
         # A vertex as an edge has a length that divides.
         lengths = np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1, keepdims=True), 1e-300)
         tangent = (ends[:, 1] - ends[:, 0]) / lengths
         beyond, across = np.full((e, 1), np.inf), np.cross(tangent, outward)
         known = [ends[:, 0], tangent, beyond, np.zeros((e, 1)), outward, across, np.zeros((e, 2))]
-        known += [np.asarray(wall)[:, None], lengths, np.zeros((e, 3)), beyond.repeat(5, axis=1)]
+        known += [wall[:, None], lengths, np.zeros((e, 3)), beyond.repeat(5, axis=1)]
         size: cython.int = cython.sizeof(Edge) // cython.sizeof(cython.double)
         self.table = np.zeros((e + 1) * size)
         # From the next beginning of a line of the cache on.
@@ -62,6 +65,8 @@ class EdgeDistances(Ray):
         self.edges, self.n_edges, self.way = edges, e, way
         self.at_end = (np.argsort(np.ravel(edges), kind="stable") // 2).astype(np.int32)
         self.first_at_end = np.append(0, np.cumsum(np.bincount(np.ravel(edges), minlength=n))).astype(np.int32)
+        self.last_at_end = np.array(self.first_at_end[1:])
+        np.asarray(self.last_at_end)[np.asarray(edges)[n_first:, 0]] -= 2
         self.followed, self.refuted, self.point_of = np.zeros(e, np.uint8), -1, np.zeros(e, np.int32)
 
     def fit(self, i: cython.int, follows: cython.bint) -> cython.void:
@@ -324,7 +329,7 @@ class EdgeDistances(Ray):
         self, e: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
     ) -> cython.void:
         """Make the edges that end at v candidates for the `point` x of edge e."""
-        for k in range(self.first_at_end[v], self.first_at_end[v + 1]):
+        for k in range(self.first_at_end[v], self.last_at_end[v]):
             self.add(e, self.at_end[k], x, most)
 
     def add(
