@@ -229,6 +229,25 @@ def test_a_finer_mesh_is_not_worse():
 
 
 @pytest.mark.filterwarnings("ignore:the metric changes farther")
+@pytest.mark.parametrize(("seed", "source", "mean", "largest"), [(3, 2432, 0.006, 0.08), (4, 2188, 0.012, 0.12)])
+def test_vertices_keep_their_second_order_while_others_have_not_settled(seed, source, mean, largest):
+    """Fibres up to 1:20 in a block: 20 and 42 % too long where some lost it early, 1.2 and 1.3 % in the mean."""
+    block = shapes.box(13)
+    V = block.V - [0.5, 0.5, 0]
+    is_inside = ((block.V > 1e-9) & (block.V < 1 - 1e-9)).all(axis=1)
+    V[is_inside] += np.random.default_rng(seed).uniform(-0.25, 0.25, (is_inside.sum(), 3)) / 13
+    # A turn by 6 z; lengths do not change if its derivative is turned back.
+    z = (V[:, 0] + 1j * V[:, 1]) * np.exp(6j * V[:, 2])
+    J = np.tile(np.eye(3), (len(V), 1, 1))
+    J[:, 0, 2], J[:, 1, 2] = -6 * V[:, 1], 6 * V[:, 0]
+    exact = straight(np.stack([z.real, z.imag, V[:, 2]], axis=1), source)
+    found = solver(Mesh(V, block.F), np.swapaxes(J, 1, 2) @ J).distance(source)
+    error = np.abs(np.delete(found, source) / np.delete(exact, source) - 1)
+    assert error.mean() < mean
+    assert error.max() < largest
+
+
+@pytest.mark.filterwarnings("ignore:the metric changes farther")
 @pytest.mark.parametrize("seed", [3, 4, 5])
 def test_vertices_do_not_lower_each_other_for_ever(seed):
     """Fibres 1:30 that no mesh resolves, against triangles cut into 16: .45 to .54 while circles kept their slopes."""

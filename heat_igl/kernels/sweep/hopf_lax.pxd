@@ -59,6 +59,7 @@ cdef class HopfLax:
     cdef void lead_on(self, int v) noexcept nogil
     cdef void reach(self, int v) noexcept nogil
     cdef void wait(self, int v) noexcept nogil
+    cdef void ask_again(self, int v) noexcept nogil
     cdef void sharpen(self) noexcept nogil
     cdef void renew(self, int v) noexcept nogil
     cdef void hand_on(self, int v, double old, double change) noexcept nogil

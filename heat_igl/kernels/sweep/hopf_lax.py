@@ -104,7 +104,7 @@ class HopfLax:
         """
         # In strongly anisotropic metrics, distances depend on larger ones: so these updates are limited.
         # With 1/2 to 2/3 of the vertices, few errors differ, those of coarse discs by up to 3 %. With 1/2, the largest
-        # one in fibres 1 : 18 is 2.3 in place of 1.4 %; with 2/3, 10 % at a vertex of fibres that make triangles thin.
+        # one in fibres 1 : 18 is 2.3 in place of 1.4 %.
         left: cython.Py_ssize_t = 4 * n // 7
         # Changes add up along a path.
         self.settled = SETTLED * n ** (-1.0 / self.update.p)
@@ -262,9 +262,16 @@ class HopfLax:
         """Queue v by its distance."""
         self.waiting.set_key(v, 1.0 / (self.d[v] - self.low))
 
+    def ask_again(self, v: cython.int) -> cython.void:
+        """Queue v for another update if any are left, unless it oscillates: then it waits for the sweeps."""
+        if self.left > 0 and self.risen[v] <= RISEN * (self.d[v] - self.low):
+            self.wait(v)
+
     def sharpen(self) -> cython.void:
         """Gauss-Seidel sweeps in topological order, until no change exceeds its threshold."""
         is_settled: cython.bint = False
+        for at in range(self.n_reached):
+            self.risen[self.reached[at]] = 0.0
         while not is_settled and not is_interrupted():
             is_settled = True
             self.arrange()
@@ -321,8 +328,7 @@ class HopfLax:
             if over >= 0 and self.adjacent.joint[over] and over != self.incident[k]:
                 u = self.corners[over // 3, over % 3]
                 self.pending[u], self.changed[over] = max(most, self.pending[u]), True
-                if self.left > 0:
-                    self.wait(u)
+                self.ask_again(u)
             for i in range(size - 1 if most > 0.0 else 0):
                 c: cython.int = i + (i >= own)
                 u = of[c]
@@ -343,8 +349,7 @@ class HopfLax:
                     )
                 ):
                     self.pending[u], self.changed[s * size + c] = max(most, self.pending[u]), True
-                    if self.left > 0:
-                        self.wait(u)
+                    self.ask_again(u)
         for k in range(self.begin[v], self.begin[v + 1]):
             u = self.ends[k, 2]
             matters = self.d[v] + self.lengths[k] < self.d[u] * (1 - EQUAL)
@@ -352,8 +357,7 @@ class HopfLax:
                 matters |= self.support(u, i) == v
             if self.facet[u] >= 0 and change > self.settled and matters:
                 self.pending[u] = max(change, self.pending[u])
-                if self.left > 0:
-                    self.wait(u)
+                self.ask_again(u)
 
     def through(self, s: cython.int, c: cython.int, best: cython.double, far: cython.int) -> cython.double:
         """`SimplexUpdate.through`, or `AdjacentUpdate.through` if the facet is joint."""
@@ -367,6 +371,7 @@ class HopfLax:
 
         With linear T, the value increases only if distances at the last minimizer do. With second order it may also
         increase because gradients have changed, repeatedly; if this adds up, the weight of the second order is halved.
+        Small oscillations before the sweeps may be due to vertices that have not settled: see `ask_again`.
         """
         size: cython.int = self.corners.shape[1]
         rise: cython.double = -INFINITY
@@ -425,7 +430,9 @@ class HopfLax:
         if best_at < 0:
             return
         self.risen[v] += max(rise + best, 0.0)
-        if self.risen[v] > RISEN * (best - self.low):
+        most: cython.double = RISEN * (best - self.low)
+        is_small: cython.bint = self.weight[v] == 1.0 and max(rise + best, fabs(best - self.d[v])) <= most
+        if self.risen[v] > most and not (is_small and self.left > 0):
             self.risen[v] = 0.0
             self.weight[v] *= 0.5
             self.changed[best_at] = True
@@ -501,11 +508,11 @@ class HopfLax:
                     n_done += 1
 
     def open_circle(self, u: cython.int, n_open: cython.int) -> cython.void:
-        """Halve the weight of the second order in a cycle through u: at the open vertices down to u on the stack."""
+        """Halve the weight of the second order at negative steps in a cycle: open vertices down to u on the stack."""
         w: cython.int = -1
         while w != u:
             n_open -= 1
             w = self.stack[n_open]
-            if self.state[w] == 1:
+            if self.state[w] == 1 and self.step[w] < 0.0:
                 self.weight[w] *= 0.5
                 self.pending[w], self.changed[self.facet[w]] = INFINITY, True
