@@ -304,7 +304,7 @@ def _spreads(tree: PointTree, near: AnyArray) -> list[tuple[int, int]]:
         return [(flattest, 1)]
     # Twice as flat as where a surface begins to show: with all of that, or half, two of 24 clouds with noise of many
     # spacings are .57 and 1.04 times as wrong, the others as before. At least four neighbourhoods of points are left:
-    # with eight, they and 22 random clouds are as before or .53 to 1.09 times as wrong, with sixteen .62 to 1.36.
+    # with eight, they and 27 random clouds are as before or .53 to 1.09 times as wrong, with sixteen .62 to 1.36.
     while found[k] > _NO_SURFACE / 2 and n // (4 * stride) >= 4 * k:
         stride *= 4
         found[k] = _thickness(tree, tree.neighbours_of(near[:, 0], k, stride))

@@ -25,8 +25,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     apart,
     at_corner,
     nearest_on,
-    p_direction,
-    p_search,
     twice_product,
 )
 from cython.cimports.heat_igl.kernels.windows.surface import beyond, third, turn
@@ -100,20 +98,14 @@ def emit_segment(s, i):
         j = s.next_target[j]
 
 
-@cython.cfunc
-@cython.nogil
-def _segment_distance(s: p_search, i: cython.int, point: cython.p_double) -> cython.double:
+def _segment_distance(s, i, point):
     """Distance of a point in the face of segment i from the segment."""
     found: cython.double[3]
     nearest_on(s.length + 3 * s.segment_face[i], s.segment + 6 * i, point, found)
     return s.segment_offset[i] + apart(s.length + 3 * s.segment_face[i], point, found)
 
 
-@cython.cfunc
-@cython.nogil
-def _emit_parallel(
-    s: p_search, h: cython.int, ends: cython.p_double, root: cython.int, offset: cython.double
-) -> cython.void:
+def _emit_parallel(s, h, ends, root, offset):
     """Emit the window of a segment over half-edge h out of the face; its frame runs from the head of h to the tail."""
     c: cython.int = h % 3
     head: cython.int = previous_half_edge(h) % 3
@@ -146,11 +138,7 @@ def _emit_parallel(
         add(s, h, cython.address(one), 1, 0)
 
 
-@cython.cfunc
-@cython.nogil
-def _emit_from_bend(
-    s: p_search, k: cython.int, start: cython.double, stop: cython.double, root: cython.int, offset: cython.double
-) -> cython.void:
+def _emit_from_bend(s, k, start, stop, root, offset):
     """Emit a window from a vertex over the opposite half-edge k; start and stop are measured from the tail of k."""
     one: Window
     length: cython.double = s.length[k]
@@ -171,9 +159,7 @@ def _emit_from_bend(
         add(s, k, cython.address(one), 1, 0)
 
 
-@cython.cfunc
-@cython.nogil
-def _reach_ends(s: p_search, k: cython.int, v: cython.int, offset: cython.double) -> cython.void:
+def _reach_ends(s, k, v, offset):
     """Distances along the two sides of corner k from its vertex v."""
     head: cython.int = next_half_edge(k)
     tail: cython.int = previous_half_edge(k)
@@ -184,9 +170,7 @@ def _reach_ends(s: p_search, k: cython.int, v: cython.int, offset: cython.double
     relax(s, s.vertex[tail], offset + b, v, tail, 0.0, k, x, s.double_area[k // 3] / a)
 
 
-@cython.cfunc
-@cython.nogil
-def _straighten(s: p_search, k: cython.int, side: cython.int, ray: p_direction, margin: cython.double) -> cython.bint:
+def _straighten(s, k, side, ray, margin):
     """Rotate around the vertex by pi minus a margin, starting over a side of corner k; true if the fan spans pi.
 
     `ray` takes the corner that contains the direction, the side over which the rotation entered this corner, and the
@@ -214,9 +198,7 @@ def _straighten(s: p_search, k: cython.int, side: cython.int, ray: p_direction, 
         side = third(k, side)
 
 
-@cython.cfunc
-@cython.nogil
-def _reach(s: p_search, ray: p_direction) -> cython.double:
+def _reach(s, ray):
     """Where the ray meets the half-edge opposite its corner: the distance from the end that lies on `ray.side`."""
     k: cython.int = ray.corner
     length: cython.double = s.length[k]
@@ -231,9 +213,7 @@ def _reach(s: p_search, ray: p_direction) -> cython.double:
     return x if x < length else length
 
 
-@cython.cfunc
-@cython.nogil
-def _fill(s: p_search, v: cython.int, first: p_direction, last: p_direction) -> cython.void:
+def _fill(s, v, first, last):
     """Emit windows from v between two rays, or between the first ray and the boundary if `last` is NULL."""
     k: cython.int = first.corner
     side: cython.int = first.side

@@ -1,4 +1,4 @@
-from heat_igl.kernels.windows.structures cimport Entry, List, Search, Window
+from heat_igl.kernels.windows.structures cimport Entry, Search, Window, p_search, p_window
 
 cdef void allocate(Search* s) noexcept nogil
 cdef void more_room(Search* s, int n) noexcept nogil
@@ -28,3 +28,7 @@ cdef inline void release(Search* s, int place) noexcept nogil:
     s.lists[place].count = s.free_list
     s.lists[place].half_edge = -1
     s.free_list = place
+
+cdef inline double _key(p_search s, p_window w, double length, double bulge) noexcept nogil
+cdef inline Window _mirrored(Window w, double length) noexcept nogil
+cdef inline int _free_list(p_search s) noexcept nogil

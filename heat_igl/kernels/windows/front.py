@@ -23,7 +23,6 @@ from cython.cimports.heat_igl.kernels.windows.structures import (
     grown,
     p_entry,
     p_list,
-    p_search,
     p_window,
     reach,
     straight,
@@ -239,9 +238,7 @@ def tell(s, v, distance):
     s.n_news[s.parity] = n + 1
 
 
-@cython.cfunc
-@cython.nogil
-def _key(s: p_search, w: p_window, length: cython.double, bulge: cython.double) -> cython.double:
+def _key(s, w, length, bulge):
     """The key of a window, the same in both frames of its half-edge.
 
     For parallel lines, the root of the power is replaced by the distance of the circumcentre.
@@ -257,9 +254,7 @@ def _key(s: p_search, w: p_window, length: cython.double, bulge: cython.double) 
     return w.offset + sqrt(max(square, 0.0))
 
 
-@cython.cfunc
-@cython.nogil
-def _mirrored(w: Window, length: cython.double) -> Window:
+def _mirrored(w, length):
     """A window in the frame whose origin is the other end of its half-edge."""
     start: cython.double = w.start
     if w.is_plane:
@@ -322,9 +317,7 @@ def append(s, t, run, n, turns, mirrored):
         push(s, lowest, t)
 
 
-@cython.cfunc
-@cython.nogil
-def _free_list(s: p_search) -> cython.int:
+def _free_list(s):
     """An unused list, with the capacity that it has from earlier use; -1 if memory runs out."""
     place: cython.int = s.free_list
     if place >= 0:

@@ -65,9 +65,7 @@ def balance(s):
     return is_small
 
 
-@cython.cfunc
-@cython.nogil
-def _next_seed(s: p_search) -> cython.int:
+def _next_seed(s):
     """A half-edge with waiting windows, if possible next to the part of the other thread; -1 if there is none."""
     seed: cython.int = -1
     for i in range(s.n_lists):
@@ -81,9 +79,7 @@ def _next_seed(s: p_search) -> cython.int:
     return seed
 
 
-@cython.cfunc
-@cython.nogil
-def _give_list(s: p_search, o: p_search, h: cython.int) -> cython.longlong:
+def _give_list(s, o, h):
     """Hand over the windows that wait at half-edge h; returns the amount of work."""
     place: cython.int = s.slot[h]
     one: p_list = cython.address(s.lists[place])
@@ -101,9 +97,7 @@ def _give_list(s: p_search, o: p_search, h: cython.int) -> cython.longlong:
     return n + PER_LIST
 
 
-@cython.cfunc
-@cython.nogil
-def _give_vertex(s: p_search, o: p_search, v: cython.int) -> cython.longlong:
+def _give_vertex(s, o, v):
     """Hand over a vertex that has yet to emit windows; returns the amount of work."""
     if (
         s.kind[v] == PASSED
@@ -131,9 +125,7 @@ def _give_vertex(s: p_search, o: p_search, v: cython.int) -> cython.longlong:
     return PER_LIST
 
 
-@cython.cfunc
-@cython.nogil
-def _hand_over(s: p_search, o: p_search, amount: cython.longlong) -> cython.void:
+def _hand_over(s, o, amount):
     """Hand over a connected piece of the front to the other search, which waits until this is done."""
     queue: cython.p_int = cython.cast(cython.p_int, malloc((s.n_lists + 1) * cython.sizeof(cython.int)))
     n: cython.int = 0
