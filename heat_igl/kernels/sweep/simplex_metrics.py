@@ -239,17 +239,7 @@ def _turn(W: cython.p_double, U: cython.p_double, a: cython.int, b: cython.int) 
             W[entry(i, x)] = U[b * i] * V[x] + U[a + b * i] * V[3 + x] + U[2 * a + b * i] * V[6 + x]
 
 
-@cython.cfunc
-@cython.nogil
-def _add_misses(
-    corners: cython.const[cython.int][:, ::1],
-    W: cython.const[cython.double][:, ::1],
-    group: cython.const[cython.int][::1],
-    first: cython.const[cython.int][::1],
-    share: cython.double[::1],
-    result: cython.double[:, ::1],
-    at: cython.double[:, ::1],
-) -> cython.void:
+def _add_misses(corners, W, group, first, share, result, at):
     """Add to the velocities `result` (n, 6) at vertices by how much their mean over each simplex misses the given one.
 
     A vertex gets the mean over its simplices, each times the least `share` at its corners; `at` (n, 6) is overwritten.
@@ -277,17 +267,7 @@ def _add_misses(
             result[v, k] += at[v, k] / max(first[v + 1] - first[v], 1)
 
 
-@cython.cfunc
-@cython.nogil
-def _sum_products(
-    corners: cython.const[cython.int][:, ::1],
-    X: cython.const[cython.double][:, ::1],
-    W: cython.const[cython.double][:, ::1],
-    group: cython.const[cython.int][::1],
-    component: cython.const[cython.int][::1],
-    middle: cython.const[cython.double][:, ::1],
-    at: cython.double[:, ::1],
-) -> cython.void:
+def _sum_products(corners, X, W, group, component, middle, at):
     """Add up over the simplices at each vertex, in a row of `at` (n, 36), or (n, 42) for triangles, the last one 0.
 
     These are the products of 1, x, y, z with 1, x, y, z and the velocity at the centre, each pair once; the square of
@@ -335,18 +315,7 @@ def _sum_products(
                     to[j + k] += mean[j + k]
 
 
-@cython.cfunc
-@cython.nogil
-def _sum_around(
-    v: cython.int,
-    corners: cython.const[cython.int][:, ::1],
-    first: cython.const[cython.int][::1],
-    incident: cython.const[cython.int][::1],
-    at: cython.const[cython.double][:, ::1],
-    near: cython.int[::1],
-    met: cython.int[::1],
-    mean: cython.pointer[cython.double],
-) -> cython.double:
+def _sum_around(v, corners, first, incident, at, near, met, mean):
     """Set `mean` (42,) to the sum of `at` (n, c) over the corners of simplices at v; returns how many others they meet.
 
     `near` and `met` (n,) are room to work in, the latter 0 before and after.
