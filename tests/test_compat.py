@@ -68,13 +68,11 @@ def test_exact_geodesic_agrees_with_libigl(torus, VS, FS, VT, FT):
 
 def test_heat_geodesics_take_data_in_three_ways(ball):
     expected = heat_igl.HeatMethodSolver(ball, t=0.01).distance([4, 9])
-    for arguments, named in (((0.01,), {}), ((), {"t": 0.01})):
+    for is_named in (False, True):
         data = drop_in.HeatGeodesicsData()
         data.use_intrinsic_delaunay = True
-        if named:
-            drop_in.heat_geodesics_precompute(ball.V, ball.F, data=data, **named)
-        else:
-            drop_in.heat_geodesics_precompute(ball.V, ball.F, *arguments, data)
+        arguments, named = ((), {"t": 0.01, "data": data}) if is_named else ((0.01, data), {})
+        drop_in.heat_geodesics_precompute(ball.V, ball.F, *arguments, **named)
         assert np.array_equal(drop_in.heat_geodesics_solve(data, np.array([4, 9])), expected)
     assert np.array_equal(drop_in.heat_geodesic(ball.V, ball.F, 0.01, np.array([4, 9])), expected)
     data = drop_in.HeatGeodesicsData()

@@ -96,19 +96,18 @@ def test_time_step_is_a_multiple_of_the_squared_mean_edge_length(sphere):
     assert not HeatMethodSolver(sphere).diagnostics.t_raised
 
 
+STRIP = shapes.strip(3000, 1)
+
+
 def test_time_step_is_raised_when_heat_would_not_cross():
-    mesh = shapes.strip(3000, 1)
-    solver = HeatMethodSolver(mesh)
+    solver = HeatMethodSolver(STRIP)
     assert solver.diagnostics.t_raised
     assert solver.t > solver.diagnostics.t_requested
     with pytest.warns(AccuracyWarning, match=r"t = 0.5 is too small for heat to cross the mesh.* using"):
-        explicit = HeatMethodSolver(mesh, t=0.5)
+        explicit = HeatMethodSolver(STRIP, t=0.5)
     assert explicit.t == solver.t
     solution = solver.solve(0)
     assert (np.linalg.norm(solution.direction, axis=1) > 0).all()
-
-
-STRIP = shapes.strip(3000, 1)
 
 
 @pytest.mark.parametrize(

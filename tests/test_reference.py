@@ -173,15 +173,6 @@ def test_exact_tends_to_the_smooth_surface_with_the_square_of_the_edge(build, cl
     assert errors[-1] < 2e-3
 
 
-@pytest.mark.slow
-def test_exact_on_a_fine_sphere():
-    mesh = shapes.icosphere(7)
-    found = reference.measured("pygeodesic", mesh, 5)
-    # Inscribed with edges of h = 0.0094, the polyhedron is shorter by a fraction of h^2 = 9e-5.
-    assert relative_error(found.distance, closed_forms.sphere(mesh, 5)).mean() < 2e-5
-    assert found.peak_memory is None or 1e9 < found.peak_memory < 4e9
-
-
 def test_convex_solid_is_the_straight_line():
     points = np.random.default_rng(2).uniform(size=(60, 3))
     mesh = Mesh(points, Delaunay(points).simplices)

@@ -162,22 +162,20 @@ def test_no_reference_brings_the_process_down(name):
 
 
 def test_warnings_about_accuracy_are_notes_and_others_pass():
-    class Doubtful(HeatMethodSolver):
-        def distance(self, sources: Any) -> Any:
-            warnings.warn("not so sure", AccuracyWarning, stacklevel=1)
-            return super().distance(sources)
+    def that_says(words: str, category: type[Warning]) -> type[HeatMethodSolver]:
+        class Saying(HeatMethodSolver):
+            def distance(self, sources: Any) -> Any:
+                warnings.warn(words, category, stacklevel=1)
+                return super().distance(sources)
 
-    class Old(HeatMethodSolver):
-        def distance(self, sources: Any) -> Any:
-            warnings.warn("ask for less", DeprecationWarning, stacklevel=1)
-            return super().distance(sources)
+        return Saying
 
     mesh = shapes.grid(5)
-    report = validate(mesh, [[0], [7]], [("doubtful", Doubtful), "heat"])
+    report = validate(mesh, [[0], [7]], [("doubtful", that_says("not so sure", AccuracyWarning)), "heat"])
     assert [row.notes for row in report.rows] == [("not so sure",), ()]
     assert report.to_markdown().endswith("\n\n- doubtful: not so sure\n")
     with pytest.warns(DeprecationWarning, match="ask for less"):
-        validate(mesh, 0, [("old", Old)])
+        validate(mesh, 0, [("old", that_says("ask for less", DeprecationWarning))])
 
 
 TOUCHING = Mesh(  # two tetrahedra's surfaces, with one vertex in common

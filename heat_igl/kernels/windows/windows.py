@@ -86,18 +86,15 @@ class Front:
         s.first_target = cython.NULL
 
 
-@cython.cfunc
-def _ints(array: cython.int[::1]) -> cython.p_int:
+def _ints(array):
     return cython.NULL if array.shape[0] == 0 else cython.address(array[0])
 
 
-@cython.cfunc
-def _doubles(array: cython.double[::1]) -> cython.p_double:
+def _doubles(array):
     return cython.NULL if array.shape[0] == 0 else cython.address(array[0])
 
 
-@cython.cfunc
-def _bytes(array: cython.uchar[::1]) -> cython.p_uchar:
+def _bytes(array):
     return cython.NULL if array.shape[0] == 0 else cython.address(array[0])
 
 
@@ -163,16 +160,7 @@ def search(
     return not s.failed
 
 
-@cython.cfunc
-@cython.nogil
-def _write_within(
-    s: p_search,
-    name: cython.p_longlong,
-    to: cython.p_int,
-    value: cython.p_double,
-    way: cython.p_int,
-    line: cython.p_double,
-) -> cython.int:
+def _write_within(s, name, to, value, way, line):
     """Store the vertices within the cutoff, their distances and, unless `way` is NULL, their paths; returns the number.
 
     `way` takes the root of a path, the corner through which it leaves the root, and the half-edge by which it enters
@@ -195,9 +183,7 @@ def _write_within(
     return n
 
 
-@cython.cfunc
-@cython.nogil
-def _write_nearest(s: p_search, name: cython.p_longlong, to: cython.p_int, value: cython.p_double) -> cython.int:
+def _write_nearest(s, name, to, value):
     """Store the nearest vertices by ascending distance, ties by ascending name; returns their number."""
     n: cython.int = 0
     for i in range(s.n_touched):
@@ -358,9 +344,7 @@ def part(first: Front, second: Front) -> bool:
     return not (first.state.is_shared and (first.state.meets_ties or second.state.meets_ties))
 
 
-@cython.cfunc
-@cython.nogil
-def _all_found(s: p_search, key: cython.double) -> cython.bint:
+def _all_found(s, key):
     """Whether all requested distances are final: entries with this key or a larger one cannot change them."""
     while s.n_found < s.n_goals:
         if s.distance[s.goal[s.n_found]] > key:
@@ -376,9 +360,7 @@ def _all_found(s: p_search, key: cython.double) -> cython.bint:
     return True
 
 
-@cython.cfunc
-@cython.nogil
-def _carry(s: p_search, entry: Entry) -> cython.void:
+def _carry(s, entry):
     """Process a queue entry unless it is outdated: a list crosses its face, or a vertex or source emits windows."""
     if entry.what < s.n_half_edges:
         place = s.slot[entry.what]
@@ -400,9 +382,7 @@ def _carry(s: p_search, entry: Entry) -> cython.void:
         emit_vertex(s, v)
 
 
-@cython.cfunc
-@cython.nogil
-def _first(s: p_search) -> Entry:
+def _first(s):
     """Pop the first entry of the queue, and prefetch the data of the next one."""
     first: Entry = pop(s)
     h: cython.int = s.heap[0].what
@@ -425,9 +405,7 @@ def _first(s: p_search) -> Entry:
     return first
 
 
-@cython.cfunc
-@cython.nogil
-def _run(s: p_search) -> cython.void:
+def _run(s):
     """Process queue entries in ascending order of their keys until the requested distances are final."""
     entry: Entry
     s.last_key = s.cutoff * (1.0 + MARGIN) + s.slack
@@ -448,9 +426,7 @@ def _run(s: p_search) -> cython.void:
         over_corners(s, j)
 
 
-@cython.cfunc
-@cython.nogil
-def _narrow(s: p_search) -> cython.void:
+def _narrow(s):
     """Lower the cutoff to a distance within which the requested number of vertices are known to lie."""
     i: cython.int
     j: cython.int
@@ -483,9 +459,7 @@ def _narrow(s: p_search) -> cython.void:
     s.n_next = s.n_touched + s.n_nearest // 4 + 1
 
 
-@cython.cfunc
-@cython.nogil
-def _forget(s: p_search) -> cython.void:
+def _forget(s):
     """Reset the entries that a search wrote, for the next search on the same front."""
     empty_front(s)
     s.before = s.n_windows + s.n_compared
@@ -498,9 +472,7 @@ def _forget(s: p_search) -> cython.void:
     s.n_touched = s.n_found = 0
 
 
-@cython.cfunc
-@cython.nogil
-def _advance(s: p_search, until: cython.double) -> cython.void:
+def _advance(s, until):
     """Process entries with keys below `until`; if that is infinite, until there is enough work for two threads."""
     entry: Entry
     while s.n_heap > 0 and s.heap[0].key < until and s.heap[0].key <= s.last_key and not s.failed:
@@ -510,9 +482,7 @@ def _advance(s: p_search, until: cython.double) -> cython.void:
         _carry(s, entry)
 
 
-@cython.cfunc
-@cython.nogil
-def _run_beside(s: p_search) -> cython.void:
+def _run_beside(s):
     """`_run` for one of two searches on two threads; both return after the same round."""
     o: p_search = s.other
     s.last_key = s.cutoff * (1.0 + MARGIN)
