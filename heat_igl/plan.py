@@ -229,7 +229,7 @@ FARTHEST_SPREAD = 1e5
 # Below, SuperLU takes less time for both factors and ten queries (scripts/benchmark.py with both).
 SMALLEST_MULTIFRONTAL = 1000
 # With more entries of a factor than this many times n log2 n, SuperLU takes less time. Nested dissection by sweeps
-# leaves at most 4.3 times as many on the zoo and scans, but 5.4, 11.8 and 10.9 times on capped cylinders of two rings
+# leaves at most 4.3 times as many on the zoo and scans, but 5.4, 10.4 and 10.8 times on capped cylinders of two rings
 # of 4000, 6000 and 8000 vertices: their triangles grow away from the rings, so that most vertices are about as far from
 # either end. Preparation for heat takes .4 to .5 of the time there.
 MOST_FILL = 5.0
