@@ -75,17 +75,16 @@ def bend_around(
         raise_caught()
         if one.failed:
             raise MemoryError("no memory for the ways around edges of the body")
-        before = np.array(d)
-        if np.isfinite(before).all():
-            break
+        n_left: cython.Py_ssize_t = 0
         with cython.nogil:
             for v in range(n):
-                one.wake_at(v)
+                n_left += one.wake_at(v)
+        if n_left == 0:
+            break
         if one.waiting.count == 0:
+            before = np.array(d)
             body.along_edges(d, label)
             np.asarray(way)[np.asarray(d) < before] = -2
-            if (np.asarray(d) == before).all():
-                break
 
 
 @cython.final
@@ -137,15 +136,18 @@ class _Bends(EdgeDistances):
 
     @cython.cfunc
     @cython.nogil
-    def wake_at(self, v: cython.int) -> cython.void:
-        """Let v and the ends of the edge of its way be candidates for neighbours that are left without a way."""
+    def wake_at(self, v: cython.int) -> cython.int:
+        """Let v and the ends of its way's edge be candidates for neighbours left without a way; returns how many."""
         way: cython.int = self.way[v]
+        n_left: cython.int = 0
         if self.d[v] < INFINITY:
             for m in range(self.body.first_neighbour[v], self.body.first_neighbour[v + 1]):
                 if self.d[self.body.neighbours[m]] == INFINITY:
+                    n_left += 1
                     self.wake(v, self.body.neighbours[m])
                     for c in range(2 if way >= 0 else 0):
                         self.wake(self.edges[way, c], self.body.neighbours[m])
+        return n_left
 
     @cython.cfunc
     @cython.nogil
