@@ -2,6 +2,7 @@
 
 import cython
 import numpy as np
+from cython.cimports.heat_igl.kernels.bodies.bends import Met, Offer
 from cython.cimports.heat_igl.kernels.bodies.edge_distances import EdgeDistances
 from cython.cimports.heat_igl.kernels.bodies.rays import GAIN, Body, Line
 from cython.cimports.heat_igl.kernels.priority_queue import PriorityQueue
@@ -19,10 +20,6 @@ _MOST_FITS = cython.declare(cython.int, 63)
 _FIT_BITS = cython.declare(cython.int, 6)
 # No edge.
 _NONE = cython.declare(cython.int, -3)
-
-_Offer = cython.struct(fit=cython.int, next=cython.int, is_guess=cython.int, value=cython.double)
-# As large as what a processor reads at once.
-_Met = cython.struct(fits=cython.int[14], count=cython.int, next=cython.int)
 
 
 def bend_around(
@@ -55,7 +52,7 @@ def bend_around(
     `sight.look_around`; `d`, `label` and `way` are changed.
     """
     n, e = body.positions.shape[0], edges.shape[0]
-    one = _Bends(body, sources, offset, d, label, edges, outward, wall, way)
+    one = Bends(body, sources, offset, d, label, edges, outward, wall, way)
     one.fit_of = np.arange(e, dtype=np.int32) << _FIT_BITS
     one.newest, one.met = np.full((2, n), _NONE, np.int32)
     one.waiting, one.bound = PriorityQueue(n), np.array(d)
@@ -89,7 +86,7 @@ def bend_around(
 
 @cython.final
 @cython.cclass
-class _Bends(EdgeDistances):
+class Bends(EdgeDistances):
     """Ways around edges, and the edges that are candidates for them.
 
     `fit_of` (e,) is the number of each edge, followed by `_FIT_BITS` that count how often it has been fitted. The edges
@@ -99,27 +96,11 @@ class _Bends(EdgeDistances):
     `met` (n,); there is room for `most_offers` and `most_lists`. No way to a vertex is longer than its `bound`.
     """
 
-    fit_of: cython.int[::1]
-    newest: cython.int[::1]
-    met: cython.int[::1]
-    offers: cython.pointer[_Offer]
-    lists: cython.pointer[_Met]
-    n_offers: cython.int
-    n_lists: cython.int
-    most_offers: cython.size_t
-    most_lists: cython.size_t
-    failed: cython.bint
-    is_guess: cython.bint
-    waiting: PriorityQueue
-    bound: cython.double[::1]
-
     def __dealloc__(self):
         free(self.offers)
         free(self.lists)
 
-    @cython.cfunc
-    @cython.nogil
-    def begin_around(self, i: cython.int) -> cython.void:
+    def begin_around(self, i):
         """Make an edge whose ends have shorter distances a candidate for those around them."""
         to_a: cython.double = self.d[self.edges[i, 0]]
         to_b: cython.double = self.d[self.edges[i, 1]]
@@ -127,16 +108,12 @@ class _Bends(EdgeDistances):
         if is_new and max(to_a, to_b) < INFINITY:
             self.begin(i, False)
 
-    @cython.cfunc
-    @cython.nogil
-    def is_source(self, i: cython.int) -> cython.bint:
+    def is_source(self, i):
         """Whether an edge is one from the beginning, or has been woken."""
         u: cython.int = self.edges[i, 0]
         return u != self.edges[i, 1] or self.last_at_end[u] == self.first_at_end[u + 1]
 
-    @cython.cfunc
-    @cython.nogil
-    def wake_at(self, v: cython.int) -> cython.int:
+    def wake_at(self, v):
         """Let v and the ends of its way's edge be candidates for neighbours left without a way; returns how many."""
         way: cython.int = self.way[v]
         n_left: cython.int = 0
@@ -149,9 +126,7 @@ class _Bends(EdgeDistances):
                         self.wake(self.edges[way, c], self.body.neighbours[m])
         return n_left
 
-    @cython.cfunc
-    @cython.nogil
-    def wake(self, u: cython.int, v: cython.int) -> cython.void:
+    def wake(self, u, v):
         """Make the edge from an end of edges to itself, if u is one, a candidate for v."""
         k: cython.int = self.first_at_end[u + 1]
         if k > self.first_at_end[u] and self.edges[self.at_end[k - 1], 0] == self.edges[self.at_end[k - 1], 1]:
@@ -160,9 +135,7 @@ class _Bends(EdgeDistances):
                 self.begin(self.at_end[k - 1], False)
             self.offer(self.at_end[k - 1], v, 0.0)
 
-    @cython.cfunc
-    @cython.nogil
-    def begin(self, i: cython.int, follows: cython.bint) -> cython.void:
+    def begin(self, i, follows):
         """Fit an edge, anew after one whose ways do not hold, and make it a candidate for those around it."""
         self.fit(i, follows)
         j: cython.int = self.refuted
@@ -176,9 +149,7 @@ class _Bends(EdgeDistances):
         self.offer_around(i, self.edges[i, 0])
         self.offer_around(i, self.edges[i, 1])
 
-    @cython.cfunc
-    @cython.nogil
-    def begin_at(self, v: cython.int) -> cython.void:
+    def begin_at(self, v):
         """Begin around the edges that end at v, in the order of the other ends: ways lead from edge to edge."""
         last: cython.double = -1.0
         while last < INFINITY:
@@ -192,9 +163,7 @@ class _Bends(EdgeDistances):
                     self.begin_around(self.at_end[k])
             last = nearest
 
-    @cython.cfunc
-    @cython.nogil
-    def offer_around(self, i: cython.int, u: cython.int) -> cython.void:
+    def offer_around(self, i, u):
         """Make an edge a candidate for the neighbours of u, none of which is farther than along an edge from u."""
         for m in range(self.body.first_neighbour[u], self.body.first_neighbour[u + 1]):
             v: cython.int = self.body.neighbours[m]
@@ -202,16 +171,12 @@ class _Bends(EdgeDistances):
                 self.bound[v] = min(self.bound[v], self.d[u] + self.body.apart(v, u))
             self.offer(i, v, 0.0)
 
-    @cython.cfunc
-    @cython.nogil
-    def offer_at(self, a: cython.int, v: cython.int, least: cython.double) -> cython.void:
+    def offer_at(self, a, v, least):
         """Make the edges that end at a candidates for v."""
         for k in range(self.first_at_end[a], self.last_at_end[a]):
             self.offer(self.at_end[k], v, least)
 
-    @cython.cfunc
-    @cython.nogil
-    def offer(self, i: cython.int, v: cython.int, least: cython.double) -> cython.void:
+    def offer(self, i, v, least):
         """Make an edge a candidate for v, which waits, if the way around it would be shorter and v has not met it."""
         here: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[v, 0])
         most: cython.double = self.most(v)
@@ -231,14 +196,12 @@ class _Bends(EdgeDistances):
         self.lists[k].count += 1
         if v in (self.edges[i, 0], self.edges[i, 1]) or not self.is_hidden_from_before(i, here, self.body.reach[v]):
             return
-        one: cython.pointer[_Offer] = cython.address(self.offers[self.n_offers])
+        one: cython.pointer[Offer] = cython.address(self.offers[self.n_offers])
         one.fit, one.next, one.is_guess, one.value = self.fit_of[i], self.newest[v], self.is_guess, value
         self.newest[v], self.n_offers = self.n_offers, self.n_offers + 1
         self.waiting.set_key(v, max(self.waiting.key[v], 1 / value))
 
-    @cython.cfunc
-    @cython.nogil
-    def has_met(self, v: cython.int, fit: cython.int) -> cython.bint:
+    def has_met(self, v, fit):
         """Whether an edge has been offered to v since it was fitted last."""
         k: cython.int = self.met[v]
         while k >= 0:
@@ -250,42 +213,35 @@ class _Bends(EdgeDistances):
             k = self.lists[k].next
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    def lacks_room(self) -> cython.bint:
+    def lacks_room(self):
         """Whether there is no memory for one more offer and one more list."""
         if self.n_offers == self.most_offers:
             self.most_offers = 2 * self.most_offers + 8 * self.d.shape[0]
-            found: cython.p_void = realloc(self.offers, self.most_offers * cython.sizeof(_Offer))
+            found: cython.p_void = realloc(self.offers, self.most_offers * cython.sizeof(Offer))
             self.failed = found == cython.NULL
             if not self.failed:
-                self.offers = cython.cast(cython.pointer[_Offer], found)
+                self.offers = cython.cast(cython.pointer[Offer], found)
         if self.n_lists == self.most_lists and not self.failed:
             self.most_lists = 2 * self.most_lists + 2 * self.d.shape[0]
-            found = realloc(self.lists, self.most_lists * cython.sizeof(_Met))
+            found = realloc(self.lists, self.most_lists * cython.sizeof(Met))
             self.failed = found == cython.NULL
             if not self.failed:
-                self.lists = cython.cast(cython.pointer[_Met], found)
+                self.lists = cython.cast(cython.pointer[Met], found)
         return self.failed
 
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def most(self, v: cython.int) -> cython.double:
+    def most(self, v):
         """What a way to v is to be shorter than; a vertex that sees a source passes on edges that are no better."""
         if self.way[v] == -1:
             return self.d[v] + _SLACK * self.body.reach[v]
         return min(self.d[v] * (1 - GAIN), self.bound[v] + _SLACK * self.body.reach[v])
 
-    @cython.cfunc
-    @cython.nogil
-    def shortest(self, v: cython.int) -> cython.int:
+    def shortest(self, v):
         """The candidate of v around which the way is the shortest, of equal ones the oldest; those that are done go."""
         least: cython.double = INFINITY
         best: cython.int = _NONE
         link: cython.pointer[cython.int] = cython.address(self.newest[v])
         while link[0] >= 0:
-            one: cython.pointer[_Offer] = cython.address(self.offers[link[0]])
+            one: cython.pointer[Offer] = cython.address(self.offers[link[0]])
             if one.fit != self.fit_of[one.fit >> _FIT_BITS] or one.value >= self.most(v):
                 link[0] = one.next
                 continue
@@ -295,9 +251,7 @@ class _Bends(EdgeDistances):
         self.waiting.set_key(v, 1 / least)
         return best
 
-    @cython.cfunc
-    @cython.nogil
-    def ask(self, v: cython.int) -> cython.void:
+    def ask(self, v):
         """Give v the way around its first candidate if the line is clear, and offer the edge to the neighbours.
 
         Edges that share an end with it may give shorter ways, if it is clear, and are asked for at once. If it is

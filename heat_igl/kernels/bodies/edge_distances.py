@@ -69,7 +69,7 @@ class EdgeDistances(Ray):
         np.asarray(self.last_at_end)[np.asarray(edges)[n_first:, 0]] -= 2
         self.followed, self.refuted, self.point_of = np.zeros(e, np.uint8), -1, np.zeros(e, np.int32)
 
-    def fit(self, i: cython.int, follows: cython.bint) -> cython.void:
+    def fit(self, i, follows):
         """Find distance along an edge, at its ends, quarters and middle, whose ways it follows or may presume.
 
         If the ways to both ends come from one source or edge, so do those to points between, or they are hidden.
@@ -123,9 +123,7 @@ class EdgeDistances(Ray):
                 self.meet(i, j, slope[j - 1], slope[j], hidden)
             self.add_piece(i, j * part, edge.at[j], label[j])
 
-    def meet(
-        self, i: cython.int, j: cython.int, one: cython.double, other: cython.double, hidden: cython.bint
-    ) -> cython.void:
+    def meet(self, i, j, one, other, hidden):
         """Begin a piece between points j - 1 and j of an edge, at which distance has these slopes, if two fronts meet.
 
         That is if one of the fronts is `hidden` at the other's point, or slopes do not grow from one to the next. The
@@ -148,13 +146,13 @@ class EdgeDistances(Ray):
             value: cython.double = self.shortest_to(i, x, most)
             self.add_piece(i, (j - 1 + share) * part, value, self.origin)
 
-    def is_hidden(self, i: cython.int, j: cython.int, f: cython.int) -> cython.bint:
+    def is_hidden(self, i, j, f):
         """Whether the way from a front, as of `front_at`, would be shorter to point j of an edge than the shortest."""
         x: cython.double[3]
         self.point_along(i, j, x)
         return f >= 0 and self.from_front(f, x) < self.edge[i].at[j] * (1 - GAIN)
 
-    def slope_along(self, i: cython.int) -> cython.double:
+    def slope_along(self, i):
         """The slope of distance along an edge, at the origin of the `line`."""
         along: cython.double = 0.0
         squared: cython.double = 0.0
@@ -164,7 +162,7 @@ class EdgeDistances(Ray):
             squared += off * off
         return along / sqrt(squared) if squared > 0 else 0.0
 
-    def add_piece(self, i: cython.int, begin: cython.double, value: cython.double, label: cython.int) -> cython.void:
+    def add_piece(self, i, begin, value, label):
         """Let a piece of an edge begin at a place and a distance, where the one before it ends."""
         edge: cython.pointer[Edge] = cython.address(self.edge[i])
         piece: cython.pointer[Piece] = cython.address(edge.pieces[edge.count])
@@ -176,7 +174,7 @@ class EdgeDistances(Ray):
             last.lean = last.slope / sqrt(max(1 - last.slope * last.slope, 1e-12))
         edge.count += 1
 
-    def label_at(self, i: cython.int) -> cython.int:
+    def label_at(self, i):
         """The source of the point of an edge at its `share`: that of the beginning of a piece next to it."""
         edge: cython.pointer[Edge] = cython.address(self.edge[i])
         best: cython.int = 0
@@ -186,22 +184,22 @@ class EdgeDistances(Ray):
                 best = j
         return edge.label[best]
 
-    def front_at(self, v: cython.int) -> cython.int:
+    def front_at(self, v):
         """The edge around which the way to v bends last; if that is straight, e added to its source; -2 if unknown."""
         return self.n_edges + self.label[v] if self.way[v] == -1 else self.way[v]
 
-    def from_front(self, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+    def from_front(self, f, x):
         """The way to a point that comes from an edge or a source, as `front_at` numbers them."""
         if f < self.n_edges:
             return self.around(f, x, INFINITY)
         return self.offset[f - self.n_edges] + self.body.away(self.sources[f - self.n_edges], x)
 
-    def point_along(self, i: cython.int, j: cython.double, x: cython.pointer[cython.double]) -> cython.void:
+    def point_along(self, i, j, x):
         """Set x to the place j quarters along an edge."""
         for k in range(3):
             x[k] = self.body.positions[self.edges[i, 0], k] + 0.25 * j * self.edge[i].length * self.edge[i].tangent[k]
 
-    def holds(self, i: cython.int) -> cython.bint:
+    def holds(self, i):
         """Whether the ways to the points of an edge are clear; they are followed when one bends between its ends."""
         x: cython.double[3]
         quarters: cython.double = 4 * self.share
@@ -216,7 +214,7 @@ class EdgeDistances(Ray):
                     return False
         return True
 
-    def lay_flat(self, i: cython.int, a: cython.int, b: cython.int) -> cython.void:
+    def lay_flat(self, i, a, b):
         """Find the point beside an edge from which distance along it is measured, and whether there is one."""
         edge: cython.pointer[Edge] = cython.address(self.edge[i])
         size: cython.double = edge.length
@@ -241,9 +239,7 @@ class EdgeDistances(Ray):
             if fabs(edge.start + sqrt(off * off + squared) - edge.at[j]) > _MISFIT * size:
                 edge.fits = False
 
-    def shortest_to(
-        self, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
-    ) -> cython.double:
+    def shortest_to(self, i, x, most):
         """The shortest way to a point of edge i whose last line stays inside, or `most`.
 
         It bends last around an edge at an end of i, around an edge around which the way to such an end or to one of its
@@ -297,9 +293,7 @@ class EdgeDistances(Ray):
                     self.add_at(i, self.body.cells[self.line.t, (self.line.out + c) & 3], x, most)
         return most
 
-    def add_beside(
-        self, e: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
-    ) -> cython.void:
+    def add_beside(self, e, x, most):
         """Make the edges at the walls beside edge e candidates for its `point` x."""
         a: cython.int = self.edges[e, 0]
         b: cython.int = self.edges[e, 1]
@@ -315,7 +309,7 @@ class EdgeDistances(Ray):
                         self.add_at(e, at[w], x, most)
             k = self.next_around(e, k + 1)
 
-    def next_around(self, e: cython.int, k: cython.int) -> cython.int:
+    def next_around(self, e, k):
         """The place from k on at which the next tetrahedron around edge e is `incident` to its first end, or -1."""
         for i in range(k, self.body.first[self.edges[e, 0] + 1]):
             at: cython.pointer[cython.const[cython.int]] = cython.address(
@@ -325,16 +319,12 @@ class EdgeDistances(Ray):
                 return i
         return -1
 
-    def add_at(
-        self, e: cython.int, v: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
-    ) -> cython.void:
+    def add_at(self, e, v, x, most):
         """Make the edges that end at v candidates for the `point` x of edge e."""
         for k in range(self.first_at_end[v], self.last_at_end[v]):
             self.add(e, self.at_end[k], x, most)
 
-    def add(
-        self, e: cython.int, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
-    ) -> cython.void:
+    def add(self, e, i, x, most):
         """Make edge i one of 256 candidates (65 at most so far) for the `point` x of e if its way may be shorter."""
         if self.point_of[i] != self.point:
             self.point_of[i] = self.point
@@ -345,9 +335,7 @@ class EdgeDistances(Ray):
                 self.near[self.n_near], self.near_value[self.n_near] = i, value
                 self.n_near += 1
 
-    def around(
-        self, i: cython.int, x: cython.pointer[cython.const[cython.double]], most: cython.double
-    ) -> cython.double:
+    def around(self, i, x, most):
         """Length of the way to a point that bends around an edge last, at `place` / `whole`, if it is below `most`.
 
         Otherwise something that is not, without a look at the pieces where the `least` distance tells.
@@ -395,7 +383,7 @@ class EdgeDistances(Ray):
                 best, self.place = through, begin
         return best
 
-    def look_back(self, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.void:
+    def look_back(self, f, x):
         """Make the place from which a way comes to x the goal of the `line`; f is its front, as of `front_at`."""
         line: cython.pointer[Line] = cython.address(self.line)
         line.origin = x
@@ -411,7 +399,7 @@ class EdgeDistances(Ray):
             line.goal_a = line.goal_b = self.sources[f - self.n_edges]
             line.goal = cython.address(self.body.positions[line.goal_a, 0])
 
-    def is_lit(self, e: cython.int, f: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
+    def is_lit(self, e, f, x):
         """Whether the line back from a point x of edge e, as of `look_back`, stays inside; t is -1 if it never is."""
         self.look_back(f, x)
         line: cython.pointer[Line] = cython.address(self.line)
@@ -427,7 +415,7 @@ class EdgeDistances(Ray):
             k = self.next_around(e, k + 1)
         return False
 
-    def leaves_at_once(self, e: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.bint:
+    def leaves_at_once(self, e, x):
         """Whether the `line` from a point x of edge e begins between the two walls outside the body."""
         edge: cython.pointer[Edge] = cython.address(self.edge[e])
         out: cython.double = 0.0
@@ -438,9 +426,7 @@ class EdgeDistances(Ray):
             side += off * edge.across[k]
         return out - edge.wall * sqrt(out * out + side * side) > _LEVEL * edge.length
 
-    def is_hidden_from_before(
-        self, i: cython.int, x: cython.pointer[cython.const[cython.double]], size: cython.double
-    ) -> cython.bint:
+    def is_hidden_from_before(self, i, x, size):
         """Whether x lies behind the edge, or beside that at most by a size, that of the longest edge at x.
 
         Seen along the edge, the line from x to the point from which the way comes passes outside, and x is not below

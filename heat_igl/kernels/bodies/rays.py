@@ -66,7 +66,7 @@ class Body:
         """The tetrahedron (m, 4) behind the side opposite each corner, -1 on the boundary."""
         return np.asarray(self.cells)[:, 4:] >> 2
 
-    def across(self, t: cython.int, o: cython.int) -> cython.int:
+    def across(self, t, o):
         """The corner behind the side of t opposite corner o, or -1; its tetrahedron is told as well."""
         a: cython.int = self.cells[t, (o + 1) % 4]
         b: cython.int = self.cells[t, (o + 2) % 4]
@@ -89,7 +89,7 @@ class Body:
                     return 4 * other + beside
         return -1
 
-    def list_around(self, v: cython.int, mark: cython.int[::1], into: cython.int[::1], at: cython.int) -> cython.int:
+    def list_around(self, v, mark, into, at):
         """Write the neighbours of v down from a place on; returns the place behind them."""
         mark[v] = v
         for k in range(self.first[v], self.first[v + 1]):
@@ -101,14 +101,14 @@ class Body:
                     at += 1
         return at
 
-    def away(self, v: cython.int, x: cython.pointer[cython.const[cython.double]]) -> cython.double:
+    def away(self, v, x):
         """The distance of v from a point in space."""
         squared: cython.double = 0.0
         for i in range(3):
             squared += (self.positions[v, i] - x[i]) * (self.positions[v, i] - x[i])
         return sqrt(squared)
 
-    def apart(self, v: cython.int, u: cython.int) -> cython.double:
+    def apart(self, v, u):
         """The distance of two vertices in space."""
         return self.away(v, cython.address(self.positions[u, 0]))
 
@@ -154,7 +154,7 @@ class Ray:
         self.body, self.sources, self.offset, self.d, self.label = body, sources, offset, d, label
         self.last_cone, self.last_wall = np.full((2, d.shape[0]), -1, np.int32)
 
-    def follows(self, line: cython.pointer[Line], v: cython.int) -> cython.bint:
+    def follows(self, line, v):
         """Whether the line from v stays in the tetrahedra."""
         line.origin = cython.address(self.body.positions[v, 0])
         self.aim(line, 0, -1, 0.0, -1)
@@ -176,13 +176,11 @@ class Ray:
                 self.aim(line, 0, -1, 0.0, -1)
         return False
 
-    def arrives_from(self, line: cython.pointer[Line], begin: cython.int) -> cython.bint:
+    def arrives_from(self, line, begin):
         """Whether the line that begins in the tetrahedron of a corner arrives."""
         return self.arrives(line, begin, -1, -1) > 0
 
-    def arrives(
-        self, line: cython.pointer[Line], begin: cython.int, into: cython.int, toward: cython.int
-    ) -> cython.int:
+    def arrives(self, line, begin, into, toward):
         """What `_step` says in the end, or -2 if it does not end; the line begins and ends as `aim` moves it."""
         self.aim(line, begin // 4, into, NUDGE, toward)
         for i in range(4):
@@ -206,7 +204,7 @@ class Ray:
                 return found
         return -2
 
-    def is_blocked(self, line: cython.pointer[Line], room: cython.double) -> cython.bint:
+    def is_blocked(self, line, room):
         """Whether the line has left the body through a wall that all lines within this distance of it meet as well."""
         for i in range(3):
             j: cython.int = (i + 1) % 3
@@ -217,7 +215,7 @@ class Ray:
                 return False
         return True
 
-    def cone(self, line: cython.pointer[Line], v: cython.int) -> cython.int:
+    def cone(self, line, v):
         """The corner ``4 t + corner`` at v through whose tetrahedron the line to the goal begins, well inside; else -1.
 
         From tetrahedron to tetrahedron around v, through the side that the line lies farthest behind. That ends at the
@@ -241,9 +239,7 @@ class Ray:
                     k = 4 * t + i
         return -1
 
-    def aim(
-        self, line: cython.pointer[Line], t: cython.int, into: cython.int, nudge: cython.double, toward: cython.int
-    ) -> cython.void:
+    def aim(self, line, t, into, nudge, toward):
         """Take the line from origin to goal, both ends moved by a part of the way to the middle of a tetrahedron.
 
         A line along edges and faces, as on a grid, would touch several tetrahedra at once. The end stays if `into` is
@@ -268,7 +264,7 @@ class Ray:
         line.tilt_x, line.tilt_y = w[line.east] / w[line.up], w[line.north] / w[line.up]
         line.forward = 1.0 if w[line.up] > 0 else -1.0
 
-    def leaves(self, line: cython.pointer[Line], k: cython.int, part: cython.double) -> cython.bint:
+    def leaves(self, line, k, part):
         """Whether the line, which begins in the tetrahedron of corner k, leaves it through the triangle opposite k.
 
         It may miss the triangle by a part of it, or be inside by that if it is negative. `side` becomes the corner

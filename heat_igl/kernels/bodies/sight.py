@@ -35,7 +35,7 @@ def look_around(
     source of each; with `d` and `guess` it is changed.
     """
     n = order.shape[0]
-    one = _Sight(body, sources, offset, d, label)
+    one = Sight(body, sources, offset, d, label)
     one.turns, one.is_concave, one.guess = np.isin(sources, edges).astype(np.uint8), edges.shape[0] > 0, guess
     one.lit = np.full(n, -1, np.int32)
     np.asarray(one.lit)[np.asarray(sources)] = np.arange(sources.shape[0])
@@ -62,7 +62,7 @@ def look_around(
 
 @cython.final
 @cython.cclass
-class _Sight(Ray):
+class Sight(Ray):
     """What is read and written, the source that is looked for, the line to it, and `lit` (n,), the source on a line.
 
     If a neighbour sees the source, a vertex does, too, unless an edge around which ways bend lies between the two
@@ -71,19 +71,7 @@ class _Sight(Ray):
     there would be vertices along that of a cube. With these cells, or without such edges, it `knows_walls`.
     """
 
-    turns: cython.const[cython.uchar][::1]
-    is_concave: cython.bint
-    guess: cython.int[:, ::1]
-    is_waiting: cython.uchar[::1]
-    lit: cython.int[::1]
-    sought: cython.int
-    to_source: Line
-    open: cython.double[:, :, ::1]
-    knows_walls: cython.bint
-
-    @cython.cfunc
-    @cython.nogil
-    def is_clear(self, a: cython.int, b: cython.int, hides: cython.bint) -> cython.bint:
+    def is_clear(self, a, b, hides):
         """Whether no edge hides the line between two vertices from the only source; if it `hides`, it closes cells."""
         centre: cython.pointer[cython.const[cython.double]] = cython.address(self.body.positions[self.sources[0], 0])
         cells: cython.int = self.open.shape[1]
@@ -129,9 +117,7 @@ class _Sight(Ray):
                         return False
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    def look(self, v: cython.int) -> cython.int:
+    def look(self, v):
         """Give v the shortest line from a source of its neighbours that stays inside; returns whether there is one."""
         below: cython.double = self.d[v] * (1 - GAIN)
         looks: cython.int = _MOST_LOOKS
@@ -161,9 +147,7 @@ class _Sight(Ray):
             above = self.line(v, nearest)
         return False
 
-    @cython.cfunc
-    @cython.nogil
-    def take(self, v: cython.int, label: cython.int) -> cython.void:
+    def take(self, v, label):
         """Give v the straight line from a source, and wake those around it that may have use for this source."""
         self.d[v], self.label[v] = self.line(v, label), label
         self.lit[v] = label
@@ -172,11 +156,7 @@ class _Sight(Ray):
             if self.lit[u] != label:
                 self.is_waiting[u] = True
 
-    @cython.cfunc
-    @cython.nogil
-    def nearest_around(
-        self, centre: cython.int, v: cython.int, above: cython.double, below: cython.double, nearest: cython.int
-    ) -> cython.int:
+    def nearest_around(self, centre, v, above, below, nearest):
         """Of the labels around a vertex the one with the shortest line to v between two bounds, or `nearest`."""
         if nearest >= 0:
             below = self.line(v, nearest)
@@ -191,16 +171,11 @@ class _Sight(Ray):
                     below, nearest = value, label
         return nearest
 
-    @cython.cfunc
-    @cython.inline
-    @cython.nogil
-    def line(self, v: cython.int, label: cython.int) -> cython.double:
+    def line(self, v, label):
         """The value at v along the straight line from a source."""
         return self.offset[label] + self.body.apart(v, self.sources[label])
 
-    @cython.cfunc
-    @cython.nogil
-    def sees_source(self, v: cython.int, label: cython.int) -> cython.bint:
+    def sees_source(self, v, label):
         """Whether the straight line from v to a source stays in the tetrahedra."""
         source: cython.int = self.sources[label]
         if self.body.first[v] == self.body.first[v + 1] or self.body.first[source] == self.body.first[source + 1]:
@@ -214,9 +189,7 @@ class _Sight(Ray):
                 return True
         return self.follows(line, v)
 
-    @cython.cfunc
-    @cython.nogil
-    def arrives_from(self, line: cython.pointer[Line], begin: cython.int) -> cython.bint:
+    def arrives_from(self, line, begin):
         """As `Ray.arrives_from`; a line that touches a wall is moved to all sides, one of which is inside."""
         into: cython.int = self.body.incident[self.body.first[self.sources[self.sought]]] // 4
         if self.turns[self.sought]:
