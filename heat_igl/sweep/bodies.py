@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from heat_igl.intrinsic.frames import unit_vectors
 from heat_igl.kernels.bodies.rays import Body
 from heat_igl.kernels.mesh import incidence
-from heat_igl.mesh.connectivity import edge_middles, group_by_label, unique_rows
+from heat_igl.mesh.connectivity import edge_middles, group_by_label, mask_of, unique_rows
 from heat_igl.operators import MetricSimplices
 from heat_igl.plan import LONG_EDGE
 from heat_igl.typing import AnyArray, FloatArray, IntArray
@@ -24,8 +24,7 @@ class OrderedBody:
     """Tetrahedra in space whose vertices are in an order in which neighbours are near each other in memory as well.
 
     `order` (n,) has the vertices of the simplices, and `number` (n,) the place of each there. Positions `V` (n, 3),
-    `corners` (m, 4) int32 and the kernel's `body` are in this order, and so are the positions `apart` (n, 4), by whose
-    further coordinate no component is near another one.
+    `corners` (m, 4) int32, the `component` (n,) of each vertex and the kernel's `body` are in this order.
     """
 
     def __init__(self, simplices: MetricSimplices) -> None:
@@ -35,8 +34,7 @@ class OrderedBody:
         corners = self.number[simplices.corners]
         self.corners = corners[np.argsort(corners.min(axis=1), kind="stable")]
         self.V = simplices.place[self.order]
-        component = simplices.components[self.order, None]
-        self.apart = np.hstack([self.V, 2 * np.ptp(self.V, axis=0).sum() * component])
+        self.component = simplices.components[self.order]
         body: Any = Body
         self.body = body(self.corners, *incidence.corners_by_vertex(self.corners, simplices.n), self.V)
 
@@ -89,6 +87,11 @@ class OrderedBody:
         return found, np.pad(outward[bends], ((0, len(touching)), (0, 0))), np.pad(cosine, (0, len(touching)))
 
     @cached_property
+    def apart(self) -> FloatArray:
+        """Positions (n, 4) by whose further coordinate no component is near another one."""
+        return np.hstack([self.V, 2 * np.ptp(self.V, axis=0).sum() * self.component[:, None]])
+
+    @cached_property
     def later_edges(self) -> AnyArray:
         """Edges (k, 2) from the ends of `reflex_edges` to themselves, around which ways bend where no other is left."""
         edges = self.reflex_edges[0]
@@ -102,21 +105,19 @@ def with_long_edges_cut(simplices: MetricSimplices, edges: AnyArray) -> tuple[Me
     An edge is long beside the mean length of the sides of the tetrahedra at its ends. Returns also the weights (k, n)
     of the vertices in the old ones, which come first.
     """
-    V, n, labels = simplices.place, simplices.n, simplices.components
-    corners, edges = np.asarray(simplices.corners, np.int64), edges.astype(np.int64)
+    V, n, labels, corners = simplices.place, simplices.n, simplices.components, simplices.corners
     one, other = np.tril_indices(4, -1)
-    is_end = np.zeros(n, bool)
-    is_end[edges] = True
+    is_end = mask_of(edges, n)
     ends = corners[is_end[corners].any(axis=1)][:, np.stack([one, other], axis=1)].reshape(-1, 2)
     length = np.linalg.norm(V[ends[:, 0]] - V[ends[:, 1]], axis=1).repeat(2)
     size = np.bincount(ends.ravel(), length, n).astype(np.float64)
     size /= np.maximum(np.bincount(ends.ravel(), minlength=n), 1)
-    edges = np.sort(edges[_long(V, edges, size) > 0], axis=1)
+    edges = np.sort(edges[_long(V, edges, size) > 0].astype(np.int64), axis=1)
     # Only tetrahedra with such an edge are cut.
-    is_end[:] = False
-    is_end[edges] = True
-    near = is_end[corners].sum(axis=1) > 1
-    rest, corners, weights = corners[~near], corners[near], sp.eye_array(n, format="csr")
+    if not len(edges):
+        return None
+    near = mask_of(edges, n)[corners].sum(axis=1) > 1
+    rest, corners, weights = corners[~near], corners[near].astype(np.int64), sp.eye_array(n, format="csr")
     while (long := _long(V, edges, size)).any():
         sides, of_cell = edge_middles(corners, len(V))
         of_cell = of_cell.reshape(-1, 6)
@@ -139,8 +140,6 @@ def with_long_edges_cut(simplices: MetricSimplices, edges: AnyArray) -> tuple[Me
         V, size = (np.concatenate([x, x[sides[cut]].mean(axis=1)]) for x in (V, size))
         labels = np.append(labels, labels[sides[cut, 0]])
         weights = sp.vstack([weights, (weights[sides[cut, 0]] + weights[sides[cut, 1]]) / 2], format="csr")
-    if len(V) == n:
-        return None
     return MetricSimplices(np.concatenate([rest, corners]), len(V), V, labels=labels), weights
 
 

@@ -53,19 +53,19 @@ class LineEngine(SimplexEngine):
 
     def _from_near(self, vertices: AnyArray, offset: FloatArray) -> tuple[AnyArray, AnyArray]:
         """All vertices from near to far in space, and the sources (n, k) that each looks for first, or -1."""
-        apart = self._body.apart
+        body, nearest = self._body, np.where(self._is_small[self._body.order, None], 0, -1)
         if len(vertices) == 1:
-            far = np.sqrt(sum((x - x[vertices[0]]) ** 2 for x in self._body.V.T))
-            nearest = np.where(self._is_small[self._body.order, None], 0, -1)
+            far = np.sqrt(sum((x - x[vertices[0]]) ** 2 for x in body.V.T))
         else:
+            apart = body.apart
             # Where another arrives before a source begins, no line comes from the source.
             first = np.unique(nearest_in_value(apart[vertices], apart[vertices], offset)[1])
             # A wall may hide the nearest one, and the next one be seen between vertices that belong to others.
-            count = min(_MOST_FIRST if len(self._body.reflex_edges[0]) else 1, len(first))
+            count = min(_MOST_FIRST if len(body.reflex_edges[0]) else 1, len(first))
             far, which = nearest_in_value(apart, apart[vertices[first]], offset[first], count)
             nearest = first[which]
         # No line comes from another component.
-        nearest[apart[vertices[nearest], 3] != apart[:, [3]]] = -1
+        nearest[body.component[vertices[nearest]] != body.component[:, None]] = -1
         return np.argsort(far, kind="stable").astype(np.int32), nearest.astype(np.int32)
 
     def labelled(self, sources: SourceSet, cutoff: float = np.inf, threads: int = 1) -> tuple[FloatArray, IntArray]:
