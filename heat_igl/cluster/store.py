@@ -18,14 +18,7 @@ from typing import Any
 import numpy as np
 
 from heat_igl.errors import BatchError, MissingExtraError
-from heat_igl.io.chunks import (
-    checksum,
-    chunk_checksums,
-    damaged_chunk,
-    file_checksum,
-    read_rows,
-    zarr_module,
-)
+from heat_igl.io.chunks import checksum, chunk_checksums, damaged_chunk, file_checksum, read_rows, zarr_module
 from heat_igl.runtime.threads import BLOCK
 from heat_igl.typing import AnyArray, IntArray
 

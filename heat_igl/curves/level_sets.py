@@ -11,15 +11,7 @@ import numpy as np
 
 from heat_igl.errors import positive, raise_at_first, real_numbers, shown
 from heat_igl.geodesic import Solver
-from heat_igl.mesh import (
-    Mesh,
-    MeshLike,
-    SurfaceCurve,
-    as_triangles,
-    crossings,
-    joined_segments,
-    level_segments,
-)
+from heat_igl.mesh import Mesh, MeshLike, SurfaceCurve, as_triangles, crossings, joined_segments, level_segments
 from heat_igl.sources import Sources
 from heat_igl.typing import ArrayLike, FloatArray
 

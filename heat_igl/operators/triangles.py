@@ -186,11 +186,7 @@ def changed_operators(
 
 
 def edge_length_operators(
-    F: ArrayLike,
-    lengths: ArrayLike,
-    n: int | None = None,
-    laplacian: Laplacian = "auto",
-    twin: ArrayLike | None = None,
+    F: ArrayLike, lengths: ArrayLike, n: int | None = None, laplacian: Laplacian = "auto", twin: ArrayLike | None = None
 ) -> Operators:
     """The operators of triangles that are known by their edge lengths alone; positions are not needed.
 

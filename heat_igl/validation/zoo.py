@@ -489,12 +489,7 @@ _FAMILIES: dict[str, dict[str, Callable[[], Mesh]]] = {
         ),
         "octahedron *": lambda: build.hull(np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3]),
     },
-    "maze": {
-        "maze": _maze,
-        "spiral": _spiral,
-        "labyrinth": _labyrinth,
-        "fern *": _fern,
-    },
+    "maze": {"maze": _maze, "spiral": _spiral, "labyrinth": _labyrinth, "fern *": _fern},
 }
 
 SHAPES = [

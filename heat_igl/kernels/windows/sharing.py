@@ -13,12 +13,7 @@ have few windows in any case.
 """
 
 import cython
-from cython.cimports.cpython.pythread import (
-    NOWAIT_LOCK,
-    WAIT_LOCK,
-    PyThread_acquire_lock,
-    PyThread_release_lock,
-)
+from cython.cimports.cpython.pythread import NOWAIT_LOCK, WAIT_LOCK, PyThread_acquire_lock, PyThread_release_lock
 from cython.cimports.heat_igl.kernels.mesh.triangles import next_half_edge, previous_half_edge
 from cython.cimports.heat_igl.kernels.windows.front import append, push, release
 from cython.cimports.heat_igl.kernels.windows.structures import FLAT, PASSED, PER_LIST, p_list, p_search
