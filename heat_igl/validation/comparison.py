@@ -201,7 +201,8 @@ def validate(
     given = as_mesh(mesh)
     mesh = as_simplices(given)
     domain = mesh if isinstance(given, Mesh) else given
-    sets = _source_sets(sources, mesh.n_vertices)
+    several = isinstance(sources, (list, tuple)) and any(np.ndim(entry) > 0 for entry in sources)
+    sets = [vertex_sources(entry, mesh.n_vertices) for entry in (sources if several else [sources])]  # type: ignore[union-attr]
     if not isinstance(methods, Iterable) or isinstance(methods, str) or getattr(methods, "ndim", 1) == 0:
         raise ValueError(f"methods must be a sequence of methods, not {shown(methods)}")
     chosen = [_resolved(method) for method in methods]
@@ -254,11 +255,6 @@ def draw_sources(mesh: MeshLike, count: int, seed: int = 0) -> list[list[int]]:
     if not 1 <= count <= len(candidates):
         raise SourceError(f"{count} sources cannot be drawn from a component of {len(candidates)} vertices")
     return [[int(vertex)] for vertex in np.random.default_rng(seed).choice(candidates, count, replace=False)]
-
-
-def _source_sets(sources: Sources | Sequence[Sources], n: int) -> list[IntArray]:
-    several = isinstance(sources, (list, tuple)) and any(np.ndim(entry) > 0 for entry in sources)
-    return [vertex_sources(entry, n) for entry in (sources if several else [sources])]  # type: ignore[union-attr]
 
 
 def _truths(

@@ -77,7 +77,11 @@ def extruded(points: FloatArray, F: IntArray, height: float) -> Mesh:
 def closed(upper: FloatArray, lower: FloatArray, F: IntArray) -> Mesh:
     """Two sheets of the same triangles, on positions (k, 3) each, joined along the boundary."""
     n = len(upper)
-    return compact(np.concatenate([upper, lower]), np.concatenate([F, F[:, ::-1] + n, walls(F, n)]))
+    sides = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    _, which, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    a, b = sides[count[which.reshape(-1)] == 1].T
+    walls = np.stack([a, b + n, b], axis=1), np.stack([a, a + n, b + n], axis=1)
+    return compact(np.concatenate([upper, lower]), np.concatenate([F, F[:, ::-1] + n, *walls]))
 
 
 def caps(rings: int, around: int) -> IntArray:
@@ -126,14 +130,6 @@ def opened(is_open: BoolArray) -> Mesh:
     mesh = grid(len(is_open))
     i, j = (mesh.V[mesh.F].mean(axis=1)[:, :2] * len(is_open)).astype(int).T
     return compact(mesh.V, mesh.F[is_open[i, j]])
-
-
-def walls(F: IntArray, above: int) -> IntArray:
-    """Triangles between the boundary of F and its copy, whose vertices have numbers larger by `above`."""
-    sides = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
-    _, which, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    a, b = sides[count[which.reshape(-1)] == 1].T
-    return np.concatenate([np.stack([a, b + above, b], axis=1), np.stack([a, a + above, b + above], axis=1)])
 
 
 def raised(points: FloatArray, height: AnyArray | float = 0.0) -> FloatArray:

@@ -288,38 +288,32 @@ def _stored(rng: Generator, mesh: Mesh) -> Mesh:
     return Mesh(V, mesh.F)
 
 
-def _turned_rings(rng: Generator, radius: FloatArray, height: FloatArray, around: int) -> Mesh:
-    """Rings of vertices with these radii and heights, each rotated against the one before by the same angle."""
+def _turned_rings(profile: Callable[[Generator, int, int], tuple[FloatArray, FloatArray]], rng: Generator) -> Mesh:
+    """Rings of vertices, each rotated against the one before by the same angle.
+
+    Their radii and heights are those of a profile for so many rings with so many vertices on each.
+    """
+    along, around = int(_between(rng, 3, 40)), int(_between(rng, 3, 40))
+    radius, height = profile(rng, along, around)
     turn = rng.choice([0.0, np.pi / around, rng.uniform(0, 1)])
     return _stored(rng, build.revolved(radius, height, around, turn))
 
 
-def _rings(rng: Generator) -> tuple[int, int]:
-    """How many rings, and how many vertices on each."""
-    return int(_between(rng, 3, 40)), int(_between(rng, 3, 40))
+def _cylinder(rng: Generator, along: int, _: int) -> tuple[FloatArray, FloatArray]:
+    return np.ones(along), np.linspace(0, _between(rng, 0.1, 20), along)
 
 
-def _cylinder(rng: Generator) -> Mesh:
-    along, around = _rings(rng)
-    return _turned_rings(rng, np.ones(along), np.linspace(0, _between(rng, 0.1, 20), along), around)
+def _cone(rng: Generator, along: int, _: int) -> tuple[FloatArray, FloatArray]:
+    return np.linspace(rng.uniform(0.05, 0.95), 1, along), np.linspace(0, _between(rng, 0.1, 20), along)
 
 
-def _cone(rng: Generator) -> Mesh:
-    along, around = _rings(rng)
-    radius, height = np.linspace(rng.uniform(0.05, 0.95), 1, along), np.linspace(0, _between(rng, 0.1, 20), along)
-    return _turned_rings(rng, radius, height, around)
-
-
-def _reducer(rng: Generator) -> Mesh:
-    along, around = _rings(rng)
+def _reducer(rng: Generator, along: int, _: int) -> tuple[FloatArray, FloatArray]:
     height = np.linspace(-1, 1, along) * rng.uniform(2, 20)
-    return _turned_rings(rng, 1 + np.tanh(height) / 2, height, around)
+    return 1 + np.tanh(height) / 2, height
 
 
-def _spaced_rings(rng: Generator) -> Mesh:
-    along, around = _rings(rng)
-    height = np.cumsum(rng.uniform(1.01, 1.6) ** np.arange(along)) * 2 * np.pi / around
-    return _turned_rings(rng, np.ones(along), height, around)
+def _spaced_rings(rng: Generator, along: int, around: int) -> tuple[FloatArray, FloatArray]:
+    return np.ones(along), np.cumsum(rng.uniform(1.01, 1.6) ** np.arange(along)) * 2 * np.pi / around
 
 
 def _grid(rng: Generator) -> Mesh:
@@ -364,10 +358,10 @@ _FAMILIES: dict[str, Callable[[Generator], Mesh]] = {
     "comb": comb,
     "folds": folds,
     "several spheres": several_spheres,
-    "nearly flat cylinder": _cylinder,
-    "nearly flat cone": _cone,
-    "pipe reducer": _reducer,
-    "geometrically spaced rings": _spaced_rings,
+    "nearly flat cylinder": partial(_turned_rings, _cylinder),
+    "nearly flat cone": partial(_turned_rings, _cone),
+    "pipe reducer": partial(_turned_rings, _reducer),
+    "geometrically spaced rings": partial(_turned_rings, _spaced_rings),
     "nearly flat grid": _grid,
     "grid of integers": _integers,
 }

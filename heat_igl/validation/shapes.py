@@ -110,8 +110,7 @@ def disk(n: int) -> Mesh:
         following = inner[(sector * (k - 1) + step + 1)[zigzag] % len(inner)]
         faces.append(np.stack([below[zigzag], above, following], axis=1))
         inner = outer
-    V = np.concatenate(points)
-    return Mesh(np.column_stack([V, np.zeros(len(V))]), np.concatenate(faces))
+    return Mesh(np.concatenate(points), np.concatenate(faces))
 
 
 def icosphere(subdivisions: int) -> Mesh:
@@ -216,11 +215,8 @@ def box(n: int, size: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
     """
     n = _at_least("n", n, 1)
     side = n + 1
-    index = np.arange(side**3)
-    corner: FloatArray = np.stack([index % side, index // side % side, index // side**2], axis=1) * (
-        np.asarray(size) / n
-    )
-    cell = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    corner = np.indices((side,) * 3)[::-1].reshape(3, -1).T * (np.asarray(size) / n)
+    cell = np.indices((n,) * 3).reshape(3, -1).T
     stride = np.array([1, side, side**2])
     tetrahedra = []
     for order in permutations(range(3)):

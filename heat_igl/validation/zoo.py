@@ -222,13 +222,6 @@ def _fractal_terrain() -> Mesh:
 # Voxels and fractals.
 
 
-def _sponge() -> Mesh:
-    """Menger's sponge of level 2."""
-    i = np.indices((9, 9, 9))
-    level = [((i // step % 3) == 1).sum(axis=0) < 2 for step in (1, 3)]
-    return build.boxes(np.argwhere(level[0] & level[1]))
-
-
 def _voxel_blob() -> Mesh:
     """Cells below a random threshold, connected or not, touching along edges and in corners."""
     from scipy.ndimage import gaussian_filter
@@ -450,7 +443,8 @@ _FAMILIES: dict[str, dict[str, Callable[[], Mesh]]] = {
         # A lattice of square beams between 4 by 4 by 4 nodes, of genus 81.
         "beams": lambda: _cells(7, lambda i: (i % 2 == 0).sum(axis=0) >= 2),
         "voxel ball": lambda: _cells(15, lambda i: ((i - 7) ** 2).sum(axis=0) <= 42),
-        "sponge *": _sponge,
+        # Menger's sponge of level 2.
+        "sponge *": lambda: _cells(9, lambda i: np.all([(i // k % 3 == 1).sum(axis=0) < 2 for k in (1, 3)], axis=0)),
         "voxel blob *": _voxel_blob,
         # Cells that a random walk visits.
         "wandering cells *": lambda: build.boxes(build.walk(seeded(32), 150)),
