@@ -25,9 +25,6 @@ _SETTINGS: dict[str, Any] = {
     },
 }
 
-# Time to wait for the answer of a scheduler.
-_TIMEOUT_SECONDS = 10
-
 
 @contextmanager
 def connected(scheduler: str | None = None, n_workers: int | None = None, dashboard: bool = False) -> Iterator[Any]:
@@ -56,7 +53,7 @@ def connected(scheduler: str | None = None, n_workers: int | None = None, dashbo
         if n_workers is not None:
             raise ValueError("workers are started on this machine only: the scheduler brings its own")
         try:
-            client = distributed.Client(scheduler, timeout=_TIMEOUT_SECONDS)
+            client = distributed.Client(scheduler, timeout=10)
         except (OSError, ValueError) as error:
             raise BatchError(f"there is no Dask scheduler at {scheduler}: {error}") from None
         with client:

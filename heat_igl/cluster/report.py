@@ -159,10 +159,8 @@ def _row(store: Store, name: str) -> BatchRow:
         return BatchRow(name, name, "damaged", str(error))
     status = found.get("status", "running")
     mesh = found.get("mesh", name)
-    if status == "failed":
-        return BatchRow(name, mesh, status, reason=found["reason"])
-    if "status" not in found:
-        return BatchRow(name, mesh, status)
+    if status == "failed" or "status" not in found:
+        return BatchRow(name, mesh, status, found.get("reason", ""))
     group = store.group(name)
     problem = group.damaged_chunk() if status == "done" else ""
     if problem:

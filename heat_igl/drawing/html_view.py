@@ -30,9 +30,7 @@ from heat_igl.mesh import MeshLike, PointCloud, as_mesh, as_simplices
 from heat_igl.sources import Sources
 from heat_igl.typing import AnyArray, ArrayLike
 
-_AS_GIVEN = "Distance as given."
 _LOG_MAP = "log map"
-_SIGNED_COLOURS = "RdBu_r"
 _FRAME = (
     '<iframe srcdoc="{}" sandbox="allow-scripts allow-downloads" '
     'style="width: 100%; height: 520px; border: 1px solid #ccc"></iframe>'
@@ -83,7 +81,7 @@ def page(
     colormap: str = DISTANCE_COLOURS,
     label: str = DISTANCE_LABEL,
     title: str = "Geodesic distance",
-    method: str = _AS_GIVEN,
+    method: str = "Distance as given.",
     fields: Mapping[str, ArrayLike] | None = None,
     beside: str | None = None,
     directions: bool = False,
@@ -148,7 +146,7 @@ def page(
         "spacing": spacing,
         "style": str(get_args(Style).index(style)),
         "colours": _table(colormap),
-        "signedColours": _table(_SIGNED_COLOURS, is_trimmed=False),
+        "signedColours": _table("RdBu_r", is_trimmed=False),
         "lineInk": LINE_INK,
         "stripeInk": STRIPE_INK,
         "label": label,

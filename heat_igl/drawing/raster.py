@@ -164,5 +164,5 @@ def visible_runs(points: FloatArray, depth: FloatArray, tolerance: float) -> lis
     middle = (fine[:-1] + fine[1:]) / 2
     is_seen = visible(middle, depth, tolerance)
     cuts = np.flatnonzero(np.diff(is_seen)) + 1
-    starts, stops = np.concatenate([[0], cuts]), np.concatenate([cuts, [len(middle)]])
-    return [(bool(is_seen[start]), fine[start : stop + 1]) for start, stop in zip(starts, stops, strict=True)]
+    runs = np.split(np.arange(len(middle)), cuts)
+    return [(bool(is_seen[run[0]]), fine[run[0] : run[-1] + 2]) for run in runs]

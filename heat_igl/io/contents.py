@@ -21,8 +21,6 @@ from heat_igl.typing import AnyArray, FloatArray, IntArray
 _NUMBER = re.compile(rb"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 _SPACE, _SLASH = 32, 47
 
-_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4}
-
 
 def ragged(start: IntArray, length: IntArray) -> IntArray:
     """The concatenation of ``range(start[i], start[i] + length[i])``."""
@@ -258,7 +256,7 @@ def select(path: Path, blocks: list[tuple[str, IntArray]]) -> Cells:
     """
     blocks = [(kind, rows) for kind, rows in blocks if len(rows) and not kind.startswith(("vertex", "line"))]
     for kind, rows in blocks:
-        if kind != "polygon" and kind not in _CORNERS:
+        if kind not in ("triangle", "quad", "polygon", "tetra"):
             raise MeshError(
                 f"{path}: {len(rows)} cells are of kind {kind}; distances are computed on triangles and "
                 "four-node tetrahedra only: convert the cells (and lower their order) in the program that made them"

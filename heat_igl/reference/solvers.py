@@ -126,8 +126,7 @@ def measured(
     mesh = as_simplices(mesh)
     chosen = _SOLVERS.get(solver)
     if chosen is None and solver != WINDOWS:
-        names = ", ".join((WINDOWS, *_SOLVERS))
-        raise ReferenceSolverError(f"solver {solver!r} is unknown: choose one of {names}")
+        raise ReferenceSolverError(f"solver {solver!r} is unknown: choose one of {', '.join((WINDOWS, *_SOLVERS))}")
     if mesh.is_tetrahedral:
         raise ReferenceSolverError(
             f"{solver} works on triangles, and the mesh holds tetrahedra: use validation.closed_forms.convex_solid"
@@ -264,8 +263,7 @@ def exact(
         If the chosen solver is not installed.
     """
     if solver not in (WINDOWS, *EXACT_SOLVERS):
-        names = ", ".join((WINDOWS, *EXACT_SOLVERS))
-        raise ReferenceSolverError(f"solver must be one of {names}, not {solver!r}")
+        raise ReferenceSolverError(f"solver must be one of {', '.join((WINDOWS, *EXACT_SOLVERS))}, not {solver!r}")
     return measured(solver, mesh, sources, timeout=timeout, memory=memory).distance
 
 
