@@ -105,22 +105,11 @@ class _Triangulation:
         """Split the triangle that contains point i, or both triangles at the edge that contains it."""
         for a, b, c in self.triangles():
             edges = ((a, b), (b, c), (c, a))
-            sides = [self._left(*edge, i) for edge in edges]
-            if min(sides) < 0:
-                continue
-            if min(sides) > 0:
+            if all(self._left(*edge, i) >= 0 for edge in edges):
                 self._remove(a, b, c)
                 for edge in edges:
-                    self._add(*edge, i)
-                return
-            on = edges[sides.index(0)]
-            for tail, head in (on, on[::-1]):
-                third = self._apex.get((tail, head))
-                if third is not None:
-                    self._remove(tail, head, third)
-                    self._add(tail, i, third)
-                    self._add(i, head, third)
-            return
+                    if self._left(*edge, i) > 0:
+                        self._add(*edge, i)
 
     def enforce(self, a: int, b: int) -> None:
         """Insert the edge a b by flipping the edges that cross it; no other point may lie on the edge."""

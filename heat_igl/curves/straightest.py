@@ -210,17 +210,12 @@ class Tracer:
         in_space = np.shape(vectors)[-1:] == (3,)
         found = checked_vectors(name, vectors, k, 3 if in_space else 2)
         at_vertex = starts.vertices >= 0
-        components = np.empty((k, 2))
-        components[~at_vertex] = found[~at_vertex][:, :2]
+        at, components = starts.vertices[at_vertex], found
         if in_space:
-            face = starts.faces
-            along = frames.sides[face, 0]
-            across = np.cross(frames.face_normals[face], along)
+            along = frames.sides[starts.faces, 0]
+            across = np.cross(frames.face_normals[starts.faces], along)
             components = np.stack([np.einsum("kx,kx->k", found, axis) for axis in (along, across)], axis=1)
-        if at_vertex.any():
-            at = starts.vertices[at_vertex]
-            tangent = found[at_vertex]
-            components[at_vertex] = frames.from_world(tangent, at) if in_space else tangent
+            components[at_vertex] = frames.from_world(found[at_vertex], at)
         size = np.hypot(*components.T)
         turn = np.arctan2(components[:, 1], components[:, 0])
         if at_vertex.any():
