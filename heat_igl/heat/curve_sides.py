@@ -272,10 +272,8 @@ def _in_both_faces(
     segment, corner, twin = segment[twin >= 0], corner[twin >= 0], twin[twin >= 0]
     other, opposite = np.divmod(twin, 3)
     rows = np.arange(len(segment))
-    copies = []
-    for barycentric in (start, end):
-        copied = np.zeros((len(segment), 3))
+    copies = np.zeros((2, len(segment), 3))
+    for barycentric, copied in zip((start, end), copies, strict=True):
         copied[rows, (opposite + 1) % 3] = barycentric[segment, (corner + 2) % 3]
         copied[rows, (opposite + 2) % 3] = barycentric[segment, (corner + 1) % 3]
-        copies.append(copied)
     return np.concatenate([faces, other]), np.concatenate([start, copies[0]]), np.concatenate([end, copies[1]])

@@ -208,10 +208,9 @@ class SignedHeatSolver:
         """Distance (n,) by integration, and which vertices (n,) are on the left."""
         chosen = uncancelled(self._mesh, chosen)
         phi = self._integration.distance(chosen, level)
-        if level == "zero":
-            phi[vertices_on(self._mesh, chosen)] = 0.0
         if level != "zero":
             return np.abs(phi), phi < 0
+        phi[vertices_on(self._mesh, chosen)] = 0.0
         left, is_known = left_of_closed(self._mesh, self._faces, chosen, faces_at_gaps(self._mesh, chosen))
         return np.abs(phi), np.where(is_known, left, phi < 0)
 

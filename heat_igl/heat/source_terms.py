@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from heat_igl.heat.steps import HeatFlow
+from heat_igl.mesh.connectivity import mask_of
 from heat_igl.operators import Operators, Surface
 from heat_igl.operators.matrices import edge_paths
 from heat_igl.plan import NEAR_RADIUS
@@ -213,15 +214,10 @@ class SourceAssembler:
             everyone = np.ones(len(vertices), bool)
         if len(vertices) < 2 or np.ptp(sources.vertex_offset) > 0:
             return everyone
-        is_source = np.zeros(self._domain.n, bool)
-        is_source[vertices] = True
+        is_source = mask_of(vertices, self._domain.n)
         neighbours = self._domain.L[:, vertices]
         outward = np.repeat(np.arange(len(vertices)), np.diff(neighbours.indptr))[~is_source[neighbours.indices]]
-        if not len(outward):
-            return everyone
-        rim = np.zeros(len(vertices), bool)
-        rim[outward] = True
-        return rim
+        return mask_of(outward, len(vertices)) if len(outward) else everyone
 
     def _ring(self, sources: SourceSet, rim: BoolArray) -> Seeds:
         """Source vertices, and around those at the rim their neighbours at the lengths of edges."""
@@ -254,17 +250,14 @@ class SourceAssembler:
         places = sources.points.joined(sources.segments.ends())
         own, _ = faces.locate(places.faces, places.barycentric)
         reach = max(float(radius.max()), float(faces.l[own].max(initial=0.0)))
-        at_rim = {name: getattr(sources, name)[rim] for name in ("vertices", "vertex_label", "vertex_offset")}
-        started = replace(sources, **at_rim)
+        started = sources.among(mask_of(sources.vertices[rim], self._domain.n))
         found = self.windows.solve(
             started.with_offsets(started.offsets - begin), cutoff=reach + float(sources.offsets.max() - begin)
         )
         offset, label = started.offsets[found.origin.label], started.labels[found.origin.label]
         value = found.distance + begin
         is_near = value - offset <= radius
-        is_far = np.zeros(len(value), bool)
-        is_far[faces.F[own]] = True
-        is_far &= np.isfinite(value) & ~is_near
+        is_far = mask_of(faces.F[own], len(value)) & np.isfinite(value) & ~is_near
         all_of_them = Seeds(np.arange(len(value)), value, label)
         return all_of_them.at(is_near), all_of_them.at(is_far)
 

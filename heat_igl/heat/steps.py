@@ -217,12 +217,9 @@ class HeatFlow:
         self.t = t
         self.boundary = boundary
         self.backend = analysis.backend
-        self._neumann: Factorization | None = None
-        self._dirichlet: Factorization | None = None
-        if boundary in ("neumann", "average"):
-            self._neumann = analysis.factorize(matrix, operators.referenced)
-        if boundary in ("dirichlet", "average"):
-            self._dirichlet = analysis.factorize(matrix, inner)
+        self._neumann = None if boundary == "dirichlet" else analysis.factorize(matrix, operators.referenced)
+        self._dirichlet = None if boundary == "neumann" else analysis.factorize(matrix, inner)
+        if self._dirichlet is not None:
             self._from_boundary = matrix[:, operators.boundary]
             self._boundary_diagonal = matrix.diagonal()[operators.boundary]
             self._on_boundary = operators.boundary
