@@ -126,15 +126,11 @@ class PathDirections:
         departure, back = np.full((2, n), np.nan)
         at_vertex = root < n
         seen = np.arctan2(y, x)
-        if at_vertex.all():
-            departure[row] = self._at_corners(corner, seen)
-        else:
-            outward = np.flatnonzero(at_vertex)
-            departure[row] = seen
-            departure[row[outward]] = self._at_corners(corner[outward], seen[outward])
-            if points is not None and ways.turn is not None:
-                inside = row[~at_vertex]
-                departure[inside] += ways.turn[inside] + self._turns(points)[root[~at_vertex] - n]
+        departure[row] = seen
+        departure[row[at_vertex]] = self._at_corners(corner[at_vertex], seen[at_vertex])
+        if points is not None and ways.turn is not None:
+            inside = row[~at_vertex]
+            departure[inside] += ways.turn[inside] + self._turns(points)[root[~at_vertex] - n]
         # The path enters over the opposite half-edge, or comes from a source point in the same face.
         entered, crossing = ways.entered[row], ways.crossing[row]
         over = entered >= 0
@@ -205,10 +201,7 @@ def _handed_on(row: IntArray, root: IntArray, departure: FloatArray, back: Float
     top, turning, bend = np.arange(n), np.zeros(n), root[bends]
     top[bends] = bend
     turning[bends] = (departure[bends] - back[bend]) / scale[bend] - np.pi
-    while True:
-        further = top[top]
-        if (further == top).all():
-            break
+    while not ((further := top[top]) == top).all():
         turning += turning[top]
         top = further
     found = np.full((3, n), np.nan)

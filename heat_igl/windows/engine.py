@@ -193,11 +193,12 @@ class Query:
         """The cutoff of the search, relative to the smallest offset."""
         return cutoff if self.begin is None else cutoff - float(self.begin[np.isfinite(self.begin)].min())
 
-    def with_begin(self, distance: FloatArray) -> FloatArray:
-        """Distances (n,), or (k,) of the first vertices, from the sources with their given offsets."""
+    def with_begin(self, distance: FloatArray, at: IntArray | None = None) -> FloatArray:
+        """Distances of vertices `at` (k,), or of the first k, from the sources with their given offsets."""
         if self.begin is None:
             return distance
-        return distance + np.where(np.isfinite(distance), self.begin[: len(distance)], 0.0)
+        begin = self.begin[: len(distance)] if at is None else self.begin[at]
+        return distance + np.where(np.isfinite(distance), begin, 0.0)
 
 
 class TriangleEngine(Engine):
@@ -268,10 +269,7 @@ class WindowEngine(TriangleEngine):
             return query.with_begin(found.distance)[targets]
         surface = self._surface(query.sources, locates=True)
         found = surface.solve(query.sources, targets=targets, goals=np.empty(0, np.int64))
-        if query.begin is None:
-            return found.target_distance
-        begin = query.begin[self._triangles.given_faces[targets.faces, 0]]
-        return found.target_distance + np.where(np.isfinite(found.target_distance), begin, 0.0)
+        return query.with_begin(found.target_distance, self._triangles.given_faces[targets.faces, 0])
 
     def directed(self, sources: SourceSet) -> tuple[FloatArray, IntArray, PathAngles, SurfacePoints]:
         """Distance (n,), labels (n,), and the directions and start points of the shortest paths, all exact.

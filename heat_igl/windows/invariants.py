@@ -87,10 +87,7 @@ class Invariants:
     ) -> str | None:
         """How distances (t,) of vertices or points violate the bounds of lines and components; None if they do not."""
         vertices = self._F[targets.faces, 0] if isinstance(targets, SurfacePoints) else targets
-        if self._n_components == 1:
-            stray = ~np.isfinite(distance)
-        else:
-            stray = np.isfinite(distance) != self._has_source(sources)[self._components[vertices]]
+        stray = np.isfinite(distance) != self._has_source(sources)[self._components[vertices]]
         if stray.any():
             at = int(np.argmax(stray))
             return f"{distance[at]:.6g} at target {at}, where sources and components say otherwise"
