@@ -99,11 +99,10 @@ def log_map(
 
 def _vertex(source: Sources, n: int) -> int | None:
     """The vertex that is the one source, None for a point in a face."""
-    is_point = isinstance(source, SurfacePoints)
     places = source.faces if isinstance(source, SurfacePoints) else named_vertices(source, n, "source")
     if len(places) != 1:
         raise SourceError(f"source must be one vertex or point, not {len(places)}")
-    return None if is_point else int(places[0])
+    return None if isinstance(source, SurfacePoints) else int(places[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from heat_igl.operators import Operators
 from heat_igl.plan import MOST_WITHIN_REACH, DistanceMethod, Method, Plan, SurfaceMeasures, distance_plan, sweep_plan
 from heat_igl.runtime import n_threads
 from heat_igl.sources import OffsetSources, Sources, SourceSet, named_vertices, require_resolved, source_set
-from heat_igl.typing import ArrayLike, BoolArray, FloatArray
+from heat_igl.typing import ArrayLike, FloatArray
 from heat_igl.windows import Engine, GuardedEngine, MeshTriangles, OperatorTriangles, Triangles, guarded_windows
 from heat_igl.windows.engine import ComponentEngine
 
@@ -105,9 +105,9 @@ def geodesic_distance(
         given = given.triangles
     is_plain = targets is None and region is None and method != "sweep"
     if limit < np.inf and is_plain and isinstance(given, Mesh) and not given.has_copies:
-        near = _within_reach(given, sources, limit)
+        near = _within_reach(given, sources, tolerance, limit)
         if near is not None:
-            return _on_part(given, near, sources, tolerance, limit)
+            return near
     solver = GeodesicSolver(given, method=method, tolerance=tolerance, region=region)
     if targets is None:
         return solver.distance(sources, cutoff=limit)
@@ -116,25 +116,10 @@ def geodesic_distance(
     return found
 
 
-def _on_part(mesh: Mesh, faces: BoolArray, sources: Sources, tolerance: float, cutoff: float) -> FloatArray:
-    """Distance (n,) up to the cutoff from vertices, on the faces (m,) that lie within it."""
-    chosen = source_set(sources, mesh.n_vertices, mesh.F, mesh)
-    distance = np.full(mesh.n_vertices, np.inf)
-    distance[chosen.vertices] = chosen.vertex_offset
-    used, numbers = np.unique(mesh.F[faces], return_inverse=True)
-    is_there = np.isin(chosen.vertices, used)
-    if is_there.any():
-        solver = GeodesicSolver(Mesh(mesh.V[used], numbers.reshape(-1, 3)), tolerance=tolerance)
-        there = OffsetSources(np.searchsorted(used, chosen.vertices[is_there]), chosen.vertex_offset[is_there])
-        distance[used] = solver.distance(there, cutoff=cutoff)
-    distance[distance > cutoff] = np.inf
-    return distance
+def _within_reach(mesh: Mesh, sources: Sources, tolerance: float, cutoff: float) -> FloatArray | None:
+    """Distance (n,) up to the cutoff, on the faces that come nearer to a source vertex than that along straight lines.
 
-
-def _within_reach(mesh: Mesh, sources: Sources, cutoff: float) -> BoolArray | None:
-    """Mask (m,) with all faces that come nearer to a source vertex than the cutoff, along straight lines in space.
-
-    None if most do, or if the sources are not vertices.
+    None if most faces do, or if the sources are not vertices.
     """
     if mesh.is_tetrahedral:
         return None
@@ -152,8 +137,19 @@ def _within_reach(mesh: Mesh, sources: Sources, cutoff: float) -> BoolArray | No
     longest = reduce(np.maximum, igl.edge_lengths(mesh.V, mesh.F).T)  # three times as fast as along an axis
     nearest = reduce(np.minimum, (apart[corner] for corner in mesh.F.T))
     # By more than rounding adds up to.
-    near = np.asarray(nearest - longest / np.sqrt(3) <= (cutoff - chosen.vertex_offset.min()) * (1 + 1e-9))
-    return near if near.mean() <= MOST_WITHIN_REACH else None
+    near = nearest - longest / np.sqrt(3) <= (cutoff - chosen.vertex_offset.min()) * (1 + 1e-9)
+    if near.mean() > MOST_WITHIN_REACH:
+        return None
+    distance = np.full(mesh.n_vertices, np.inf)
+    distance[chosen.vertices] = chosen.vertex_offset
+    used, numbers = np.unique(mesh.F[near], return_inverse=True)
+    is_there = np.isin(chosen.vertices, used)
+    if is_there.any():
+        solver = GeodesicSolver(Mesh(mesh.V[used], numbers.reshape(-1, 3)), tolerance=tolerance)
+        there = OffsetSources(np.searchsorted(used, chosen.vertices[is_there]), chosen.vertex_offset[is_there])
+        distance[used] = solver.distance(there, cutoff=cutoff)
+    distance[distance > cutoff] = np.inf
+    return distance
 
 
 class GeodesicSolver(BatchedSolver):
@@ -215,7 +211,6 @@ class GeodesicSolver(BatchedSolver):
         if self._part is not None:
             self._domain = self._part.mesh
         self._triangles: Triangles | None = None
-        self._engine: Engine
         self._plan, self._engine = self._prepared()
 
     def _prepared(self) -> tuple[Plan, Engine]:
@@ -404,8 +399,7 @@ class GeodesicSolver(BatchedSolver):
 
     def _asked(self, sources: SourceSet) -> Engine:
         """The engine for these sources: points and curves in a varying metric are those of windows."""
-        is_in_faces = self._plan.engine == "hopf-lax" and not sources.on_vertices_alone
-        if is_in_faces:
+        if self._plan.engine == "hopf-lax" and not sources.on_vertices_alone:
             return self._unfolded
         return self._engine.of(sources) if isinstance(self._engine, ComponentEngine) else self._engine
 
