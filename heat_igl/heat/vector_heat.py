@@ -292,15 +292,13 @@ class HeatTransport:
 
     def extend(self, vertices: IntArray, values: FloatArray) -> FloatArray:
         """Values (k,) at `vertices` (k,), extended to all (n,): the ratio u / phi of two heat flows (equation 5)."""
-        largest = float(np.abs(values).max())
-        n = self._solver.operators.n
-        b = np.zeros((n, 2))
+        largest, domain = float(np.abs(values).max()), self._solver.operators
+        b = np.zeros((domain.n, 2))
         np.add.at(b[:, 0], vertices, values / largest if largest > 0 else values)
         np.add.at(b[:, 1], vertices, 1.0)
         unit = SOURCE_HEAT / b[:, 1].max()
         u, phi = self._heat_flow.solve(b * unit).T
         warm = phi > LOWEST_HEAT
-        domain = self._solver.operators
         cold = np.isin(domain.components, domain.components[vertices]) & ~warm
         if cold.any():
             remedy = "raise t" if domain.referenced[cold].any() else "no face uses them"
@@ -316,7 +314,15 @@ class HeatTransport:
     def transport(self, vertices: IntArray, vectors: FloatArray) -> AnyArray:
         """Vectors (k, 2) at `vertices` (k,), transported to all: complex numbers (n,) (Algorithm 1)."""
         lengths = self.extend(vertices, np.hypot(*vectors.T))
-        return self._directions(vertices, vectors @ [1, 1j]) * lengths
+        b, numbers = np.zeros(self._solver.operators.n, complex), vectors @ [1, 1j]
+        largest = float(np.abs(numbers).max())
+        np.add.at(b, vertices, numbers / largest if largest > 0 else numbers)
+        b *= SOURCE_HEAT / np.bincount(vertices).max()
+        Y = self._vector_flow.solve(b) * self._vector_flow.sign(b)
+        size = np.abs(Y)
+        # The diagonal is in every row, so that none is empty.
+        nearby = np.maximum.reduceat(size[self._pattern.indices], self._pattern.indptr[:-1])
+        return unit_numbers(np.where(size > _CANCELLED * nearby, Y, 0.0)) * lengths
 
     def log_map(self, vertex: int) -> FloatArray:
         """Vectors (n, 2) from `vertex`, by the angle between the radial field and a transported axis."""
@@ -332,19 +338,6 @@ class HeatTransport:
         distance = self._solver.distance(vertex)
         length = np.where(np.isfinite(distance), distance, 0.0)
         return np.stack([length * direction.real, length * direction.imag], axis=1)
-
-    def _directions(self, vertices: IntArray, vectors: AnyArray) -> AnyArray:
-        """Unit numbers (n,), the directions of vectors that flow from the sources, or 0."""
-        b = np.zeros(self._solver.operators.n, complex)
-        largest = float(np.abs(vectors).max())
-        np.add.at(b, vertices, vectors / largest if largest > 0 else vectors)
-        most = np.bincount(vertices).max()
-        b *= SOURCE_HEAT / most
-        Y = self._vector_flow.solve(b) * self._vector_flow.sign(b)
-        size = np.abs(Y)
-        # The diagonal is in every row, so that none is empty.
-        nearby = np.maximum.reduceat(size[self._pattern.indices], self._pattern.indptr[:-1])
-        return unit_numbers(np.where(size > _CANCELLED * nearby, Y, 0.0))
 
 
 class OutwardField:
