@@ -11,7 +11,7 @@ import numpy as np
 from heat_igl.errors import SourceError, errors_at, raise_at_first
 from heat_igl.mesh import Mesh, SurfaceCurve, SurfacePoints, named_entries, region_boundary
 from heat_igl.mesh.surface_points import require_faces, rows_in_space
-from heat_igl.sources.source_sets import concatenated, on_simplex
+from heat_igl.sources.source_sets import NO_POINTS, NO_SEGMENTS, concatenated, on_simplex
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 
 _ACCEPTED = (
@@ -110,8 +110,8 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
     parts = named_entries(curves, "curves")
     if not parts:
         raise SourceError(f"curves is empty: pass {_ACCEPTED}")
-    segments: list[tuple[IntArray, FloatArray, FloatArray, IntArray]] = []
-    points: list[tuple[IntArray, FloatArray, IntArray, FloatArray]] = []
+    segments = [NO_SEGMENTS[:4]]
+    points = [(*NO_POINTS[:3], np.empty((0, 3)))]
     for i, (name, part) in enumerate(parts):
         if isinstance(part, OrientedPoints):
             require_faces(part.points, mesh.F, mesh.V, f"{name}: ")
@@ -120,9 +120,7 @@ def oriented_set(curves: Oriented, mesh: Mesh) -> OrientedSet:
         else:
             faces, start, end = _segments(name, part, mesh)
             segments.append((faces, start, end, np.full(len(faces), i)))
-    no_segments = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64))
-    no_points = (np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64), np.empty((0, 3)))
-    return OrientedSet(*concatenated([no_segments, *segments]), *concatenated([no_points, *points]))
+    return OrientedSet(*concatenated(segments), *concatenated(points))
 
 
 def _segments(name: str, part: object, mesh: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
