@@ -87,16 +87,10 @@ def _cells(n: int, where: Callable[[IntArray], Any]) -> Mesh:
     return build.boxes(np.argwhere(where(np.indices((n, n, n)))))
 
 
-# Smooth surfaces.
-
-
 def _latitudes() -> Mesh:
     """A sphere by meridians and parallels, with fans of thin triangles at the poles."""
     theta = np.linspace(0, np.pi, 31)
     return build.merged(build.revolved(np.sin(theta), np.cos(theta), 60))
-
-
-# Surfaces without an orientation, or with edges of many faces.
 
 
 def _moebius_band() -> Mesh:
@@ -123,9 +117,6 @@ def _pinched() -> Mesh:
     """Two cones that meet in their tips."""
     one = shapes.cone(24, 8)
     return build.merged(build.joined(one, Mesh(one.V * [1, 1, -1], one.F[:, ::-1])))
-
-
-# Parts as they leave a CAD program: few vertices, long triangles, fans.
 
 
 def _pill() -> Mesh:
@@ -170,9 +161,6 @@ def _stairs() -> Mesh:
     return shapes.lattice_mesh(steps[1:], np.array([[0.0], [5.0]]), steps[:-1] * 0.5)
 
 
-# Scattered points.
-
-
 def _scattered_disk() -> Mesh:
     r, angle = seeded(5).random((2, 1500))
     return build.planar(np.sqrt(r)[:, None] * np.stack([np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)], axis=1))
@@ -196,9 +184,6 @@ def _slivers_at_the_rim() -> Mesh:
     return build.planar(np.unique(np.concatenate([rim, seeded(7).uniform(-0.9, 0.9, (120, 2))]), axis=0))
 
 
-# Height fields and terrain.
-
-
 def _height_field(n: int, height: float, seed: int) -> Mesh:
     points = seeded(seed).random((n, 2))
     return build.planar(points, height * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1]))
@@ -219,18 +204,12 @@ def _fractal_terrain() -> Mesh:
     return _heights(shapes.grid(64), z.ravel())
 
 
-# Voxels and fractals.
-
-
 def _voxel_blob() -> Mesh:
     """Cells below a random threshold, connected or not, touching along edges and in corners."""
     from scipy.ndimage import gaussian_filter
 
     field = gaussian_filter(seeded(18).standard_normal((12, 12, 12)), 1.2)
     return build.boxes(np.argwhere(field > np.quantile(field, 0.6)))
-
-
-# Mazes and walls.
 
 
 def _maze() -> Mesh:
@@ -255,9 +234,6 @@ def _labyrinth() -> Mesh:
     return build.compact(mesh.V, mesh.F[np.concatenate([fine.ravel(), fine.ravel()])])
 
 
-# Rough and thin surfaces.
-
-
 def _lantern(around: int, along: int) -> Mesh:
     """Schwarz's lantern: rings of a cylinder, each turned by half a step against the one before."""
     return build.revolved(np.ones(along + 1), 3 * np.arange(along + 1) / along, around, np.pi / around)
@@ -280,9 +256,6 @@ def _dense_pole() -> Mesh:
     """A sphere whose triangles shrink to a thousandth towards a pole."""
     t = np.concatenate([np.linspace(0, 1, 60) ** 4 * np.pi / 2, np.linspace(np.pi / 2, np.pi, 20)[1:-1]])
     return build.merged(build.revolved(np.sin(t), np.cos(t), 40))
-
-
-# Several components.
 
 
 def _dust() -> Mesh:
@@ -379,6 +352,7 @@ _FAMILIES: dict[str, dict[str, Callable[[], Mesh]]] = {
         "gyroid *": _gyroid,
         "trefoil *": _trefoil,
     },
+    # Surfaces without an orientation, or with edges of many faces.
     "topology": {
         "book": lambda: shapes.book(5, 12),
         "moebius band": _moebius_band,
@@ -386,6 +360,7 @@ _FAMILIES: dict[str, dict[str, Callable[[], Mesh]]] = {
         "pinched": _pinched,
         "crossed sheets *": _crossed_sheets,
     },
+    # Parts as they leave a CAD program: few vertices, long triangles, fans.
     "CAD": {
         "capped cylinder 128": lambda: _capped(64),
         "capped cylinder 512": lambda: _capped(256),
