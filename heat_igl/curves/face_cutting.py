@@ -104,10 +104,9 @@ class _Triangulation:
     def insert(self, i: int) -> None:
         """Split the triangle that contains point i, or both triangles at the edge that contains it."""
         for a, b, c in self.triangles():
-            edges = ((a, b), (b, c), (c, a))
-            if all(self._left(*edge, i) >= 0 for edge in edges):
+            if self._left(a, b, i) >= 0 and self._left(b, c, i) >= 0 and self._left(c, a, i) >= 0:
                 self._remove(a, b, c)
-                for edge in edges:
+                for edge in ((a, b), (b, c), (c, a)):
                     if self._left(*edge, i) > 0:
                         self._add(*edge, i)
 
