@@ -218,7 +218,8 @@ def surface_image(
 
     low, high = seen.limits
     colour = table((here - low) / (high - low))[:, :3]
-    per_pixel = screen_gradient(fine, F, finite)[pixels.face]
+    slope = np.hypot(*(igl.grad(fine[:, :2], F) @ finite).reshape(2, -1))
+    per_pixel = np.nan_to_num(slope, nan=np.inf, posinf=np.inf)[pixels.face]
     if style == "lines":
         line = isoline_coverage(here, per_pixel, seen.step, LINE * OVERSAMPLING, at_zero=low < 0)
         colour *= 1 - LINE_INK * line[:, None]
@@ -248,18 +249,13 @@ def mark_dots(axes: Any, dots: FloatArray, depth: FloatArray) -> BoolArray:
     return ~is_seen
 
 
-def screen_gradient(points: FloatArray, F: IntArray, values: FloatArray) -> FloatArray:
-    """Norm (m,) of the gradient per pixel of the linear function with `values` (n,); ``inf`` for faces seen edge on."""
-    slope = igl.grad(points[:, :2], F) @ values
-    return np.asarray(np.nan_to_num(np.hypot(*slope.reshape(2, -1)), nan=np.inf, posinf=np.inf))
-
-
 def isoline_coverage(
     values: FloatArray, per_pixel: FloatArray, step: float, width: float, at_zero: bool = False
 ) -> FloatArray:
     """Fraction (p,) of each pixel that is covered by a contour line at a multiple of `step`.
 
-    `values` (p,) are those at the pixel centres, and `per_pixel` (p,) their change per pixel, from `screen_gradient`.
+    `values` (p,) are those at the pixel centres, and `per_pixel` (p,) their change per pixel, the norm of the gradient
+    on the screen of the linear function on the face that is seen; ``inf`` for faces seen edge on.
     Lines are `width` pixels wide on the screen, but at most a quarter of the distance between lines; otherwise a
     surface that is seen at a grazing angle would become black. Distances need no line `at_zero`: their sources have
     dots.
