@@ -299,13 +299,15 @@ def test_against_halved_tetrahedra(seed):
 
 @pytest.mark.parametrize("seed", [9, 117, 161, 189, 293])
 def test_nearest_sources_behind_walls(seed):
-    """Labels were those of a farther source, up to 25 %, and distances up to 5 % too long where a wall hides one."""
+    """Labels were of a farther source (25 %), distances 5 % too long behind walls, 7 % too short beside a body."""
     rng = np.random.default_rng(seed)
     body = carved(int(rng.integers(3, 8)), lambda P: (P[:, :2] > 0.5).all(axis=1))
     solver, sources = GeodesicSolver(body), rng.choice(body.n_vertices, rng.integers(2, 6), replace=False)
     found, rows = solver.voronoi(sources), np.stack([solver.distance(int(i)) for i in sources])
     np.testing.assert_allclose(found.distance, rows.min(axis=0), rtol=3e-3)
     np.testing.assert_allclose(rows[found.labels, np.arange(body.n_vertices)], rows.min(axis=0), rtol=3e-3)
+    both = GeodesicSolver(Mesh(np.concatenate([body.V, body.V + 2]), np.concatenate([body.F, body.F + len(body.V)])))
+    np.testing.assert_allclose(both.distance([*sources, len(body.V)])[: len(body.V)], found.distance, rtol=1e-12)
 
 
 def test_an_edge_of_which_a_part_is_hidden():
@@ -379,8 +381,7 @@ def rough_u(n: int, seed: int) -> Mesh:
 
 
 @pytest.mark.parametrize(("n", "seed", "a", "b"), [
-    (10, 10, 441, 774), (10, 16, 1222, 1010), (6, 18, 321, 171),
-    (10, 0, 59, 212), (10, 22, 1031, 105),
+    (10, 10, 441, 774), (10, 16, 1222, 1010), (6, 18, 321, 171), (10, 0, 59, 212), (10, 22, 1031, 105),
     (8, 28, 666, 437), (8, 38, 606, 661), (10, 16, 251, 1222),
 ])  # fmt: skip
 def test_the_way_back_is_as_long(n, seed, a, b):
@@ -400,8 +401,7 @@ def measures(simplices: MetricSimplices) -> tuple[FloatArray, FloatArray]:
     found = connectivity.facets(F, len(V))
     e = np.diff(V[found.vertices[found.n_faces == 1]], axis=1)
     area = np.linalg.norm(np.cross(e[:, 0], e[:, 1]), axis=1).sum()
-    edges = OrderedBody(simplices).reflex_edges[0]
-    lengths = np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1)
+    lengths = np.linalg.norm(np.diff(V[OrderedBody(simplices).reflex_edges[0]], axis=1)[:, 0], axis=1)
     return np.array([np.abs(volumes).sum(), volumes[volumes > 0].sum(), area, lengths.sum()]), np.sort(lengths)
 
 

@@ -126,7 +126,7 @@ class Sight(Ray):
             # There is no other.
             if self.sources.shape[0] == 1:
                 looks = 0
-            if not self.line(v, nearest) < below:
+            if nearest < 0 or not self.line(v, nearest) < below:
                 break
             if self.sees_source(v, nearest):
                 self.guess[v, 0] = -1
