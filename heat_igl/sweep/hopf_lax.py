@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from heat_igl.kernels.mesh import incidence
 from heat_igl.kernels.sweep.adjacent_updates import AdjacentUpdate
 from heat_igl.kernels.sweep.error_estimate import estimated_errors
 from heat_igl.kernels.sweep.hopf_lax import HopfLax
@@ -93,6 +94,12 @@ class HopfLaxEngine(SimplexEngine):
         if (mark != 0).any():
             crossings = self._crossings(mark, between(kernel(corners, *metric), *self._incident, mark))
         return corners, *self._incident, crossings, *metric
+
+    @cached_property
+    def _incident(self) -> tuple[AnyArray, AnyArray]:
+        """The corners that meet in each vertex, as `MetricSimplices.incident` has them."""
+        found: tuple[AnyArray, AnyArray] | None = self._simplices.incident
+        return found or incidence.corners_by_vertex(self._corners, self._simplices.n)
 
     def _marks(self) -> AnyArray:
         """Hash (m,) of the metric of each simplex, rounded to seven digits; 0 where the metric varies within it."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heat_igl.kernels.mesh import incidence
 from heat_igl.sources import SourceSet
 from heat_igl.typing import AnyArray, FloatArray, IntArray
 from heat_igl.windows.engine import Engine
@@ -31,12 +29,6 @@ class SimplexEngine(Engine):
     def __init__(self, simplices: MetricSimplices) -> None:
         self._simplices = simplices
         self._corners = np.ascontiguousarray(simplices.corners, np.int32)
-
-    @cached_property
-    def _incident(self) -> tuple[AnyArray, AnyArray]:
-        """The corners that meet in each vertex, as `MetricSimplices.incident` has them."""
-        found: tuple[AnyArray, AnyArray] | None = self._simplices.incident
-        return found or incidence.corners_by_vertex(self._corners, self._simplices.n)
 
     @abstractmethod
     def _lower(self, vertices: AnyArray, offset: FloatArray, distance: FloatArray, label: AnyArray) -> Any:
